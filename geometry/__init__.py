@@ -1,0 +1,1 @@
+"""Shapes and arithmetic; knows nothing of milling."""

@@ -1,0 +1,1 @@
+"""Compiled loops. They import numpy, numba and math only and never raise."""

@@ -1,0 +1,1 @@
+"""Programs and STEP-NC files written from a workplan."""

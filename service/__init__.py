@@ -1,0 +1,1 @@
+"""HTTP, command line, jobs and the engine: the only layer that may import all others."""

@@ -1,0 +1,1 @@
+"""Cutters, contact, strategies, linking and the plan of a job."""

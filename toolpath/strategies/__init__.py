@@ -1,0 +1,1 @@
+"""One cutting strategy a module: each turns a zone into cutter-location passes."""

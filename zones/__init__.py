@@ -1,0 +1,1 @@
+"""Walls, connections, channels and the machinable zones between cutting planes."""
