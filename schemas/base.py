@@ -1,0 +1,77 @@
+"""What all wire models share: unknown fields refused, finite numbers only, references into the libraries.
+
+A *library reference* is the string ``"lib:NAME"`` written where an object would stand (a tool, the machine,
+the material). It is replaced by the library's entry before validation; the entries come in by the
+validation context ``{"library": {"tools": {...}, "machines": {...}, "materials": {...}}}``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+LIBRARY_PREFIX = "lib:"
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+REFERENCE_PATTERN = r"^lib:[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A finite JSON number; strings and booleans are refused."""
+Count = Annotated[int, Field(strict=True)]
+"""A JSON integer; strings and booleans are refused."""
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+"""Three numbers x, y, z."""
+FaceId = Annotated[str, Field(pattern=r"^F[1-9][0-9]{0,6}$", examples=["F12"])]
+"""A B-rep face by its place in the STEP file."""
+
+
+class WireModel(BaseModel):
+    """Base of everything a client may send: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, str_max_length=4000)
+
+
+class ReportModel(BaseModel):
+    """Base of everything the service sends: later fields may be added, so unknown ones are kept."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+
+
+def library_entry(value: Any, shelf: str, info: ValidationInfo) -> Any:
+    """Replace ``"lib:NAME"`` by the entry of that shelf; anything else passes through.
+
+    value : what stands in the setup
+    shelf : 'tools', 'machines' or 'materials'
+    info  : carries the libraries in ``context["library"]``
+
+    Raises
+    ------
+    ValueError
+        The shelf has no such entry; the message lists the names it has.
+    """
+    if not (isinstance(value, str) and value.startswith(LIBRARY_PREFIX)):
+        return value
+    library: Mapping[str, Mapping[str, Any]] = (info.context or {}).get("library", {})
+    entries, name = library.get(shelf, {}), value[len(LIBRARY_PREFIX):]
+    if name not in entries:
+        known = ", ".join(sorted(entries)) or "none"
+        raise ValueError(f"the library of {shelf} has no entry '{name}' (it has: {known})")
+    return entries[name]
+
+
+class Shelf:
+    """Annotation: the field also takes ``"lib:NAME"``, looked up on this shelf; the JSON schema says so."""
+
+    def __init__(self, shelf: str) -> None:
+        self.shelf = shelf
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        return BeforeValidator(lambda v, info: library_entry(v, self.shelf, info)).__get_pydantic_core_schema__(
+            source, handler)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [handler(schema), {"type": "string", "pattern": REFERENCE_PATTERN,
+                                            "title": f"Reference into /v1/{self.shelf}"}]}

@@ -1,0 +1,116 @@
+"""Workpiece materials and their stated default cutting data.
+
+The figures are stated defaults, deliberately conservative: coated solid carbide, side and ball milling of
+slender tools at small engagement with coolant. A shop with its own figures writes a material into the
+library (``/v1/materials``) or inline into the setup.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from schemas.base import Number, WireModel, library_entry
+
+SOURCE = "stated default, conservative"
+
+
+class FeedPoint(WireModel):
+    """Feed per tooth at one cutter diameter; values between two points are interpolated linearly."""
+
+    diameter_mm: Annotated[Number, Field(gt=0, description="Cutter diameter, mm.")]
+    feed_per_tooth_mm: Annotated[Number, Field(gt=0, le=2, description="Feed per tooth at that diameter, mm.")]
+
+
+class Material(WireModel):
+    """A workpiece material with its cutting data."""
+
+    name: Annotated[str, Field(min_length=1, max_length=64, description="Name, as it stands in programs.",
+                               examples=["Ti-6Al-4V"])]
+    cutting_speed_m_min: Annotated[Number, Field(gt=0, le=5000, description="Cutting speed at the full diameter, "
+                                                                            "m/min.")]
+    feed_per_tooth: Annotated[list[FeedPoint], Field(
+        min_length=1, description="Feed per tooth by diameter, ascending; beyond the ends it scales with diameter.")]
+    source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"
+
+    @model_validator(mode="after")
+    def _ascending(self) -> Material:
+        d = [p.diameter_mm for p in self.feed_per_tooth]
+        if any(b <= a for a, b in pairwise(d)):
+            raise ValueError("feed_per_tooth must be listed by strictly ascending diameter_mm")
+        return self
+
+
+def _material(name: str, speed: float, *feeds: float) -> Material:
+    """A built-in material; ``feeds`` in mm per tooth at 1, 3, 6, 12 and 20 mm."""
+    points = [FeedPoint(diameter_mm=d, feed_per_tooth_mm=f)
+              for d, f in zip((1.0, 3.0, 6.0, 12.0, 20.0), feeds, strict=True)]
+    return Material(name=name, cutting_speed_m_min=speed, feed_per_tooth=points, source=SOURCE)
+
+
+MATERIALS: dict[str, Material] = {m.name: m for m in (
+    _material("Ti-6Al-4V", 60.0, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("Inconel 718", 25.0, 0.004, 0.011, 0.020, 0.038, 0.055),
+    _material("AlMgSi1 6082", 250.0, 0.010, 0.030, 0.055, 0.100, 0.150),
+    _material("AlZnMgCu1.5 7075", 250.0, 0.010, 0.030, 0.055, 0.100, 0.150),
+    _material("1.4301", 80.0, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("316L", 75.0, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("C45", 130.0, 0.008, 0.020, 0.038, 0.070, 0.100),
+)}
+"""The built-in materials by name."""
+
+ALIASES: dict[str, str] = {
+    "ti6al4v": "Ti-6Al-4V", "titaniumgrade5": "Ti-6Al-4V", "3.7165": "Ti-6Al-4V",
+    "in718": "Inconel 718", "2.4668": "Inconel 718",
+    "6082": "AlMgSi1 6082", "almgsi1": "AlMgSi1 6082", "enaw6082": "AlMgSi1 6082", "al6082": "AlMgSi1 6082",
+    "7075": "AlZnMgCu1.5 7075", "enaw7075": "AlZnMgCu1.5 7075", "al7075": "AlZnMgCu1.5 7075",
+    "304": "1.4301", "aisi304": "1.4301", "x5crni1810": "1.4301",
+    "1.4404": "316L", "aisi316l": "316L",
+    "1.0503": "C45", "1045": "C45", "aisi1045": "C45",
+}
+
+
+def _key(name: str) -> str:
+    return name.casefold().replace(" ", "").replace("-", "").replace("_", "")
+
+
+_BY_KEY = {_key(n): n for n in MATERIALS} | {_key(a): n for a, n in ALIASES.items()}
+
+
+def find_material(name: str) -> Material:
+    """The built-in material of that name; case, blanks and hyphens do not count.
+
+    Raises
+    ------
+    ValueError
+        No such material; the message lists the known ones.
+
+    >>> find_material("ti6al4v").name
+    'Ti-6Al-4V'
+    """
+    found = _BY_KEY.get(_key(name))
+    if found is None:
+        raise ValueError(f"material '{name}' is not known (known: {', '.join(MATERIALS)}); "
+                         "give one of these, an object with its cutting data, or 'lib:NAME'")
+    return MATERIALS[found]
+
+
+def _resolve(value: Any, info: ValidationInfo) -> Any:
+    value = library_entry(value, "materials", info)
+    return find_material(value) if isinstance(value, str) else value
+
+
+class _NameOrObject:
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        return BeforeValidator(_resolve).__get_pydantic_core_schema__(source, handler)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "string", "maxLength": 200}, handler(schema)]}
+
+
+MaterialField = Annotated[Material, _NameOrObject()]
+"""A material by built-in name, by ``"lib:NAME"``, or as an object."""

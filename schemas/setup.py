@@ -1,0 +1,219 @@
+"""SETUP.json: everything about a job but the part. Lengths are always mm; unknown fields are refused.
+
+Only ``tools`` must be given. ``canonical_json`` and ``setup_sha256`` see the setup with all defaults filled
+in, so leaving a field out and writing its default are the same job.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from schemas.base import Count, FaceId, Number, Shelf, Vector, WireModel
+from schemas.machine import Machine
+from schemas.materials import MATERIALS, Material, MaterialField
+from schemas.tools import HolderSegment, Tool, numbered
+
+AXIS_TOLERANCE = 1e-6
+Box = Annotated[list[Vector], Field(min_length=2, max_length=2, description="Lower and upper corner, mm.")]
+
+
+class PartChoice(WireModel):
+    """Which body of the STEP file is meant."""
+
+    solid: Annotated[Count | None, Field(ge=1, description="1-based number of one of several separate solids; null: "
+                                                           "the only one.")] = None
+
+
+class Placement(WireModel):
+    """The setup frame in STEP coordinates; its origin is program zero."""
+
+    origin_mm: Annotated[Vector, Field(description="Origin of the setup frame, mm.")] = [0.0, 0.0, 0.0]
+    z_axis: Annotated[Vector, Field(description="Z of the setup frame; any length above 0.")] = [0.0, 0.0, 1.0]
+    x_axis: Annotated[Vector, Field(description="X of the setup frame, at right angles to Z.")] = [1.0, 0.0, 0.0]
+
+    @model_validator(mode="after")
+    def _check(self) -> Placement:
+        lengths = math.hypot(*self.z_axis), math.hypot(*self.x_axis)
+        if min(lengths) < AXIS_TOLERANCE:
+            raise ValueError("placement.z_axis and x_axis must not be of zero length")
+        cosine = sum(a * b for a, b in zip(self.z_axis, self.x_axis, strict=True)) / (lengths[0] * lengths[1])
+        if abs(cosine) > AXIS_TOLERANCE:
+            raise ValueError(f"placement.z_axis and x_axis must be at right angles; their angle is "
+                             f"{math.degrees(math.acos(max(-1.0, min(1.0, cosine)))):.4f} degrees")
+        return self
+
+
+class Access(WireModel):
+    """A direction the part is machined from: tool tip to spindle, in the setup frame."""
+
+    id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
+    direction: Annotated[Vector, Field(description="Tool axis; only [0, 0, 1] is built so far.")] = [0.0, 0.0, 1.0]
+    work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
+                                      "G59.1 to G59.3.")] = "G54"
+
+    @model_validator(mode="after")
+    def _check(self) -> Access:
+        x, y, z = self.direction
+        if math.hypot(x, y) > AXIS_TOLERANCE * max(z, 0.0) or z <= 0:
+            raise ValueError(f"access {self.id}: direction {self.direction} is not built yet, only [0, 0, 1]; turn "
+                             "the part with placement.z_axis instead")
+        return self
+
+
+class Stock(WireModel):
+    """The blank the job starts from."""
+
+    kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
+        description="part_offset: the part grown by margin_mm; box: see box_mm; the others are not built yet.")
+        ] = "part_offset"
+    margin_mm: Annotated[Number, Field(ge=0, le=1000, description="How far the blank stands off the part, mm.")] = 1.0
+    uncertainty_mm: Annotated[Number, Field(ge=0, le=100, description="How far the real blank may stand beyond the "
+                                                                      "nominal one, mm.")] = 0.5
+    box_mm: Annotated[Box | None, Field(
+        description="Corners of a box blank in the setup frame, mm; null: the part's bounding box grown by "
+                    "margin_mm.")] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Stock:
+        if self.kind in ("cylinder", "step"):
+            raise ValueError(f"stock.kind '{self.kind}' is not built yet; use part_offset or box")
+        if self.box_mm is not None:
+            if self.kind != "box":
+                raise ValueError("stock.box_mm belongs to stock.kind 'box'")
+            _check_box(self.box_mm, "stock.box_mm")
+        return self
+
+
+class Fixture(WireModel):
+    """A box that nothing may touch."""
+
+    box_mm: Annotated[Box, Field(description="Lower and upper corner in the setup frame, mm.")]
+
+    @model_validator(mode="after")
+    def _check(self) -> Fixture:
+        _check_box(self.box_mm, "a fixture's box_mm")
+        return self
+
+
+class Clearance(WireModel):
+    """Radial distances kept to the part and to the stock that stands there, mm."""
+
+    neck: Annotated[Number, Field(ge=0, le=100, description="Neck, mm.")] = 0.05
+    shank: Annotated[Number, Field(ge=0, le=100, description="Shank, mm.")] = 0.2
+    holder: Annotated[Number, Field(ge=0, le=100, description="Holder, mm.")] = 1.0
+    rapid: Annotated[Number, Field(ge=0, le=100, description="The whole tool in a rapid, mm.")] = 1.0
+
+
+class Quality(WireModel):
+    """What the finished surface must keep."""
+
+    scallop_height_mm: Annotated[Number, Field(gt=0, description="Highest cusp between passes, along the normal, "
+                                                                 "mm.")] = 0.01
+    chordal_tolerance_mm: Annotated[Number, Field(gt=0, le=1, description="Greatest distance of path to surface along "
+                                                                          "a pass, mm.")] = 0.002
+    gouge_tolerance_mm: Annotated[Number, Field(gt=0, le=1, description="Deepest cut into the part that is no "
+                                                                        "finding, mm.")] = 0.01
+    stock_allowance_mm: Annotated[Number, Field(ge=0, le=50, description="Material left on the part, mm.")] = 0.0
+    coverage_min: Annotated[Number, Field(ge=0, le=1, description="Least share of the machinable area for state "
+                                                                  "proved.")] = 0.0
+
+
+class Operations(WireModel):
+    """What to do and where."""
+
+    roughing: Annotated[bool, Field(description="Take the stock off in layers first.")] = True
+    finishing: Annotated[bool, Field(description="Finish the zones.")] = True
+    faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all that are in reach.")] = None
+    exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave alone.")] = []
+    cut_direction: Annotated[Literal["climb", "conventional", "either"], Field(
+        description="Direction of cut on walls.")] = "climb"
+
+    @model_validator(mode="after")
+    def _check(self) -> Operations:
+        if not (self.roughing or self.finishing):
+            raise ValueError("operations.roughing and operations.finishing are both false: nothing to do")
+        if both := sorted(set(self.faces or ()) & set(self.exclude_faces)):
+            raise ValueError(f"faces {', '.join(both)} stand in operations.faces and in exclude_faces")
+        return self
+
+
+Labels = Annotated[dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")],
+                        Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]],
+                   Field(max_length=32, description="Passed through to job, report, program header and STEP-NC.")]
+
+
+class Setup(WireModel):
+    """A setup: tools, machine, stock and the quality asked for. Only ``tools`` has no default."""
+
+    model_config = {"json_schema_extra": {"examples": [{
+        "tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 9, "neck_diameter_mm": 2.8,
+                   "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 45,
+                   "holder": [{"diameter_mm": 20, "length_mm": 30}]}],
+        "quality": {"scallop_height_mm": 0.01}, "material": "Ti-6Al-4V", "labels": {"order": "4711"}}]}}
+
+    part: Annotated[PartChoice, Field(description="Which solid of the STEP file.")] = PartChoice()
+    placement: Annotated[Placement, Field(description="The setup frame in STEP coordinates.")] = Placement()
+    access: Annotated[list[Access], Field(min_length=1, max_length=6,
+                                          description="Directions to machine from.")] = [Access()]
+    tools: Annotated[list[Annotated[Tool, Shelf("tools")]], Field(min_length=1, max_length=200,
+                                                                  description="Tools at hand, or 'lib:NAME'.")]
+    machine: Annotated[Machine, Shelf("machines"), Field(description="Machine, or 'lib:NAME'.")] = Machine()
+    stock: Annotated[Stock, Field(description="The blank.")] = Stock()
+    fixtures: Annotated[list[Fixture], Field(max_length=200, description="Boxes nothing may touch.")] = []
+    clearance_mm: Annotated[Clearance, Field(description="Radial clearances.")] = Clearance()
+    quality: Annotated[Quality, Field(description="What the surface must keep.")] = Quality()
+    operations: Annotated[Operations, Field(description="What to do and where.")] = Operations()
+    material: Annotated[MaterialField, Field(
+        description=f"Built-in material ({', '.join(MATERIALS)}), 'lib:NAME', or an object.")] = MATERIALS["Ti-6Al-4V"]
+    labels: Labels = {}
+
+    @model_validator(mode="after")
+    def _check(self) -> Setup:
+        self.tools = numbered(self.tools)
+        ids = [a.id for a in self.access]
+        if len(ids) > 1:
+            raise ValueError("several access directions are not built yet; post one job per access, turned with "
+                             "placement")
+        smallest = min(self.tools, key=lambda t: t.diameter_mm)
+        if self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
+            raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
+                             f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")
+        return self
+
+
+def _check_box(box: list[list[float]], name: str) -> None:
+    if any(high <= low for low, high in zip(box[0], box[1], strict=True)):
+        raise ValueError(f"{name}: the second corner must lie above the first in x, y and z")
+
+
+def canonical_json(setup: Setup) -> bytes:
+    """The setup as canonical JSON: all defaults filled in, keys sorted, no blanks, UTF-8.
+
+    Two setups that mean the same give the same bytes: 3 and 3.0 too, as every number field is one float.
+    """
+    data = setup.model_dump(mode="json")
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def setup_sha256(setup: Setup) -> str:
+    """SHA-256 of the canonical JSON, hex."""
+    return hashlib.sha256(canonical_json(setup)).hexdigest()
+
+
+def content_hash(part_bytes: bytes, setup: Setup) -> str:
+    """What makes two jobs the same: SHA-256 over the hashes of the part's bytes and of the canonical setup, hex.
+
+    File name, media type and multipart boundary do not count.
+    """
+    return hashlib.sha256(f"{hashlib.sha256(part_bytes).hexdigest()}:{setup_sha256(setup)}".encode()).hexdigest()
+
+
+__all__ = [
+    "Access", "Clearance", "Fixture", "HolderSegment", "Machine", "Material", "Operations", "PartChoice", "Placement",
+    "Quality", "Setup", "Stock", "Tool", "canonical_json", "content_hash", "setup_sha256",
+]

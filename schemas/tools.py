@@ -1,0 +1,176 @@
+"""Tools as they stand in a setup; every length in mm from the tip upwards."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from schemas.base import Count, Number, WireModel
+
+ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel"]
+BUILT_KINDS = ("ball", "flat", "bull")
+LENGTH_EPSILON = 1e-9
+
+Length = Annotated[Number, Field(gt=0, le=2000)]
+
+
+class HolderSegment(WireModel):
+    """A frustum of the holder; segments stack upwards from the holder nose."""
+
+    diameter_mm: Annotated[Length, Field(description="Diameter at the lower end, mm.")]
+    diameter_top_mm: Annotated[Length | None, Field(description="Diameter at the upper end, mm; "
+                                                                "default: diameter_mm.")] = None
+    length_mm: Annotated[Length, Field(description="Height of the segment, mm.")]
+
+    @model_validator(mode="after")
+    def _derive(self) -> HolderSegment:
+        if self.diameter_top_mm is None:
+            self.diameter_top_mm = self.diameter_mm
+        return self
+
+
+class Tool(WireModel):
+    """One tool assembly: cutter, neck, shank and holder."""
+
+    model_config = {"json_schema_extra": {"examples": [{
+        "id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2, "flute_length_mm": 9,
+        "neck_diameter_mm": 2.8, "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 45,
+        "holder": [{"diameter_mm": 20, "diameter_top_mm": 20, "length_mm": 30}]}]}}
+
+    id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$", description="Id of the tool.",
+                             examples=["T1"])]
+    number: Annotated[Count | None, Field(
+        ge=1, le=99999, description="T and H word of the program; default: the digits of the id where unique, else "
+                                    "the place in the list.")] = None
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting end; tapered_ball and barrel are not built yet.")]
+    diameter_mm: Annotated[Length, Field(description="Diameter of the cutting part, mm.")]
+    corner_radius_mm: Annotated[Number, Field(
+        ge=0, description="Corner radius, mm: a bull nose needs it, a flat has 0; for a ball 0 means half the "
+                          "diameter.")] = 0.0
+    taper_angle_deg: Annotated[Number, Field(ge=0, lt=90, description="0 for every kind built so far.")] = 0.0
+    profile_radius_mm: Annotated[Number | None, Field(gt=0, description="Barrels only; null so far.")] = None
+    flutes: Annotated[Count, Field(ge=1, le=50, description="Number of teeth.")] = 2
+    flute_length_mm: Annotated[Length | None, Field(
+        description="Tip to the end of the cutting part, mm; default: 3 x diameter_mm, but no more than "
+                    "neck_length_mm and stickout_mm where given.")] = None
+    center_cutting: Annotated[bool, Field(description="The end cuts to the centre.")] = True
+    neck_diameter_mm: Annotated[Length | None, Field(description="Diameter of the relieved part, mm; default: "
+                                                                 "diameter_mm.")] = None
+    neck_length_mm: Annotated[Length | None, Field(description="Tip to shank, mm; default: flute_length_mm, that "
+                                                               "is, no neck.")] = None
+    shank_diameter_mm: Annotated[Length | None, Field(description="Diameter of the shank, mm; default: "
+                                                                  "diameter_mm.")] = None
+    stickout_mm: Annotated[Length | None, Field(
+        description="Tip to holder nose, mm. Must be given with a holder; without one the default is the greater of "
+                    "neck_length_mm and 10 x diameter_mm.")] = None
+    gauge_length_mm: Annotated[Length | None, Field(
+        description="Tip to spindle face, mm, for the length offset and kinematics only; default: stickout_mm + the "
+                    "holder's lengths.")] = None
+    max_rpm: Annotated[Number | None, Field(gt=0, description="Highest spindle speed, 1/min; null: no limit of the "
+                                                              "tool's own.")] = None
+    life_min: Annotated[Number | None, Field(gt=0, description="Life in cut, min; null: not given.")] = None
+    holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
+                                                                            "no holder is checked.")] = []
+
+    @model_validator(mode="after")
+    def _check(self) -> Tool:
+        self._check_kind()
+        self._derive()
+        self._check_lengths()
+        return self
+
+    def _check_kind(self) -> None:
+        radius = self.diameter_mm / 2
+        if self.kind not in BUILT_KINDS:
+            raise ValueError(f"tool {self.id}: kind '{self.kind}' is not built yet; "
+                             f"use one of {', '.join(BUILT_KINDS)}")
+        if self.taper_angle_deg != 0 or self.profile_radius_mm is not None:
+            raise ValueError(f"tool {self.id}: taper_angle_deg and profile_radius_mm belong to tapered and barrel "
+                             "tools, which are not built yet; leave them at 0 and null")
+        if self.corner_radius_mm > radius + LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
+                             f"diameter, {radius:g}")
+        if self.kind == "flat" and self.corner_radius_mm != 0:
+            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; call it bull")
+        if self.kind == "bull" and self.corner_radius_mm == 0:
+            raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; call it flat")
+        if self.kind == "ball":
+            if self.corner_radius_mm not in (0, radius) and abs(self.corner_radius_mm - radius) > LENGTH_EPSILON:
+                raise ValueError(f"tool {self.id}: the corner_radius_mm of a ball is half its diameter, {radius:g}, "
+                                 f"not {self.corner_radius_mm:g}; call it bull")
+            self.corner_radius_mm = radius
+
+    def _derive(self) -> None:
+        if self.flute_length_mm is None:
+            bounds = [v for v in (self.neck_length_mm, self.stickout_mm) if v is not None]
+            self.flute_length_mm = min([3 * self.diameter_mm, *bounds])
+        if self.neck_length_mm is None:
+            if self.neck_diameter_mm is not None and self.neck_diameter_mm < self.diameter_mm:
+                raise ValueError(f"tool {self.id}: neck_diameter_mm is given without neck_length_mm (tip to shank)")
+            self.neck_length_mm = self.flute_length_mm
+        if self.neck_diameter_mm is None:
+            self.neck_diameter_mm = self.diameter_mm
+        if self.shank_diameter_mm is None:
+            self.shank_diameter_mm = self.diameter_mm
+        if self.stickout_mm is None:
+            if self.holder:
+                raise ValueError(f"tool {self.id}: a tool with a holder needs stickout_mm (tip to holder nose)")
+            self.stickout_mm = max(self.neck_length_mm, 10 * self.diameter_mm)
+        if self.gauge_length_mm is None:
+            self.gauge_length_mm = self.stickout_mm + sum(s.length_mm for s in self.holder)
+
+    def _check_lengths(self) -> None:
+        chain = [(n, _given(getattr(self, n)))
+                 for n in ("flute_length_mm", "neck_length_mm", "stickout_mm", "gauge_length_mm")]
+        for (low, a), (high, b) in pairwise(chain):
+            if a > b + LENGTH_EPSILON:
+                raise ValueError(f"tool {self.id}: {low} {a:g} is longer than {high} {b:g}; from the tip upwards it "
+                                 "must hold that flute_length_mm <= neck_length_mm <= stickout_mm <= gauge_length_mm")
+        if _given(self.neck_diameter_mm) > self.diameter_mm + LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than diameter_mm "
+                             f"{self.diameter_mm:g}; a neck is relieved")
+        if _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
+                             f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")
+
+
+def _given(value: float | None) -> float:
+    """A length that ``_derive`` has filled in."""
+    assert value is not None
+    return value
+
+
+def default_numbers(tools: list[Tool]) -> dict[str, int]:
+    """Tool numbers by id: as given, else the digits of the id where unique, else the place in the list.
+
+    Raises
+    ------
+    ValueError
+        Two tools end up with the same number, or share an id.
+    """
+    ids = [t.id for t in tools]
+    if doubled := sorted({i for i in ids if ids.count(i) > 1}):
+        raise ValueError(f"tool ids must be unique; {', '.join(doubled)} stands more than once")
+    digits = ["".join(c for c in t.id if c.isdigit()) for t in tools]
+    numbers: dict[str, int] = {}
+    for place, (tool, own) in enumerate(zip(tools, digits, strict=True), start=1):
+        usable = own != "" and digits.count(own) == 1 and 1 <= int(own) <= 99999
+        numbers[tool.id] = tool.number if tool.number is not None else int(own) if usable else place
+    taken: dict[int, str] = {}
+    for tool_id, number in numbers.items():
+        if number in taken:
+            raise ValueError(f"tools {taken[number]} and {tool_id} both have number {number}; give each tool its own "
+                             "number")
+        taken[number] = tool_id
+    return numbers
+
+
+def numbered(tools: list[Tool]) -> list[Tool]:
+    """The tools with ``number`` filled in; see ``default_numbers``."""
+    numbers = default_numbers(tools)
+    return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
+
+
+__all__: list[Any] = ["BUILT_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers", "numbered"]
