@@ -1,0 +1,204 @@
+"""Solid -> watertight triangle mesh with face numbers, and how far it is from the exact surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED, TopAbs_VERTEX
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+from OCP.TopTools import TopTools_IndexedMapOfShape
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64, I32, TriangleMesh
+from geometry.occ.deviation import largest_deviation
+from geometry.occ.topology import Shape, faces_of
+
+MAX_REMESH = 2
+MAX_TRIANGLES = 4_000_000
+# A mesh counts as good while its measured deviation stays below this multiple of the chord asked for.
+DEVIATION_ROOM = 1.5
+# Nodes nearer than this on one edge of a triangle are one point (the kernel's own confusion distance).
+WELD = 1e-7
+
+
+@dataclass
+class FaceMesh:
+    """Triangles of one face as the kernel made them.
+
+    nodes     : (n, 3) float64, mm
+    uv        : (n, 2) float64, surface parameters of the nodes
+    triangles : (m, 3) int32, outward, indices into ``nodes``
+    """
+
+    nodes: F64
+    uv: F64
+    triangles: I32
+
+
+@dataclass
+class SolidMesh:
+    """Mesh of a solid with the links back to the B-rep.
+
+    mesh      : TriangleMesh, STEP coordinates (mm), faces numbered from 1
+    faces     : FaceMesh per B-rep face
+    edge_nodes: per edge in kernel order, (k,) indices into ``mesh.vertices`` along the edge; empty when degenerate
+    deviation : float, mm, largest measured distance of triangle centres to the exact surface
+    chord     : float, mm, the deflection the kernel was given at last
+    warnings  : sentences
+    """
+
+    mesh: TriangleMesh
+    faces: list[FaceMesh]
+    edge_nodes: list[np.ndarray]
+    deviation: float
+    chord: float
+    warnings: list[str] = field(default_factory=list)
+
+
+def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
+    """Mesh a solid until its measured deviation is within 1.5 times the chord, or the mesh grows too large.
+
+    solid : kernel solid, mm
+    chord : float, mm, absolute deflection
+    angle : float, rad
+
+    Returns SolidMesh.
+    Raises GeometryError (``mesh_failed``) when faces stay without triangles.
+    """
+    asked = chord
+    for attempt in range(MAX_REMESH + 1):
+        faces = _triangulate(solid, chord, angle)
+        deviation = largest_deviation(faces_of(solid), faces)
+        count = sum(len(f.triangles) for f in faces)
+        if deviation <= DEVIATION_ROOM * asked or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES:
+            break
+        chord, angle = 0.5 * chord, 0.75 * angle
+    mesh, edge_nodes = _join(solid, faces)
+    warnings = []
+    if deviation > DEVIATION_ROOM * asked:
+        warnings.append(f"the mesh deviates up to {deviation:.4g} mm from the exact surface; {asked:g} mm were asked for")
+    open_edges = count_open_edges(mesh)
+    if open_edges:
+        warnings.append(f"{open_edges} edges of the mesh are not shared by exactly two triangles")
+    return SolidMesh(mesh, faces, edge_nodes, deviation, chord, warnings)
+
+
+def count_open_edges(mesh: TriangleMesh) -> int:
+    """Number of directed triangle edges without exactly one partner in the other direction; 0 when watertight."""
+    f = mesh.faces.astype(np.int64)
+    n = len(mesh.vertices)
+    start, end = f.ravel(), f[:, [1, 2, 0]].ravel()
+    keys, counts = np.unique(start * n + end, return_counts=True)
+    partner = np.searchsorted(keys, (keys % n) * n + keys // n)
+    inside = np.minimum(partner, len(keys) - 1)
+    matched = (keys[inside] == (keys % n) * n + keys // n) & (counts == counts[inside])
+    return int(counts[~matched].sum())
+
+
+def _triangulate(solid: Shape, chord: float, angle: float) -> list[FaceMesh]:
+    # A mesh left from an earlier, coarser run would be kept silently, hence the clean-up.
+    BRepTools.Clean_s(solid)
+    BRepMesh_IncrementalMesh(solid, chord, False, angle, True)
+    out, bare = [], []
+    for number, face in enumerate(faces_of(solid), 1):
+        location = TopLoc_Location()
+        triangulation = BRep_Tool.Triangulation_s(face, location)
+        if triangulation is None or triangulation.NbTriangles() == 0:
+            bare.append(f"F{number}")
+            continue
+        out.append(_face_mesh(face, triangulation, location))
+    if bare:
+        raise GeometryError(f"{len(bare)} faces could not be meshed: {', '.join(bare[:10])}", code="mesh_failed",
+                            subjects=tuple(bare), measured=len(bare), limit=0,
+                            remedy="rebuild these faces in the CAD system; they are probably degenerate")
+    return out
+
+
+def _face_mesh(face: Shape, triangulation: Shape, location: TopLoc_Location) -> FaceMesh:
+    count = triangulation.NbNodes()
+    node, uv_node = triangulation.Node, triangulation.UVNode
+    nodes = np.array([node(i).Coord() for i in range(1, count + 1)])
+    uv = np.array([uv_node(i).Coord() for i in range(1, count + 1)])
+    triangle = triangulation.Triangle
+    triangles = np.array([triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)], np.int32) - 1
+    if not location.IsIdentity():
+        move = location.Transformation()
+        matrix = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+        nodes = nodes @ matrix[:, :3].T + matrix[:, 3]
+    if face.Orientation() == TopAbs_REVERSED:
+        triangles = triangles[:, ::-1]
+    return FaceMesh(nodes, uv, np.ascontiguousarray(triangles))
+
+
+def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, list[np.ndarray]]:
+    """One vertex per point: nodes on a shared B-rep edge or vertex are the same by topology, not by distance."""
+    offsets = np.concatenate([[0], np.cumsum([len(f.nodes) for f in faces])])
+    pairs, edge_nodes = _shared_nodes(solid, offsets)
+    label = _components(pairs, int(offsets[-1]))
+    nodes = np.concatenate([f.nodes for f in faces])
+    corners = np.concatenate([f.triangles + offsets[i] for i, f in enumerate(faces)])
+    ids = np.repeat(np.arange(1, len(faces) + 1), [len(f.triangles) for f in faces])
+    triangles = label[corners]
+    # points that the kernel set apart by less than its own resolution are one as well
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    short = np.linalg.norm(nodes[sides[:, 0]] - nodes[sides[:, 1]], axis=1) < WELD
+    if short.any():
+        label = _components(np.concatenate([pairs, sides[short]]), int(offsets[-1]))
+        triangles = label[corners]
+    first = np.full(label.max() + 1, -1, np.int64)
+    first[label[::-1]] = np.arange(len(label))[::-1]
+    whole = ((triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])
+             & (triangles[:, 2] != triangles[:, 0]))
+    triangles, ids = triangles[whole], ids[whole]
+    used, packed = np.unique(np.concatenate([triangles.ravel(), *[label[e] for e in edge_nodes]]), return_inverse=True)
+    corners_packed = packed[:triangles.size].reshape(-1, 3)
+    cuts = np.cumsum([triangles.size, *[len(e) for e in edge_nodes]])
+    edges = [packed[cuts[i]:cuts[i + 1]] for i in range(len(edge_nodes))]
+    return TriangleMesh(nodes[first[used]], corners_packed.astype(np.int32), ids.astype(np.int32)), edges
+
+
+def _components(pairs: np.ndarray, count: int) -> np.ndarray:
+    graph = coo_matrix((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _shared_nodes(solid: Shape, offsets: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    edges, vertices = TopTools_IndexedMapOfShape(), TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(solid, TopAbs_EDGE, edges)
+    TopExp.MapShapes_s(solid, TopAbs_VERTEX, vertices)
+    edge_nodes: list[np.ndarray | None] = [None] * edges.Extent()
+    vertex_node: dict[int, int] = {}
+    pairs: list[np.ndarray] = [np.zeros((0, 2), np.int64)]
+    for number, face in enumerate(faces_of(solid)):
+        location = TopLoc_Location()
+        triangulation = BRep_Tool.Triangulation_s(face, location)
+        explorer = TopExp_Explorer(face, TopAbs_EDGE)
+        while explorer.More():
+            edge = TopoDS.Edge_s(explorer.Current())
+            explorer.Next()
+            polygon = BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, location)
+            if polygon is None:
+                continue
+            count = polygon.NbNodes()
+            nodes = np.array([polygon.Node(i) for i in range(1, count + 1)], np.int64) - 1 + offsets[number]
+            index = edges.FindIndex(edge) - 1
+            known = edge_nodes[index]
+            if BRep_Tool.Degenerated_s(edge):
+                pairs.append(np.stack([nodes, np.full(count, nodes[0])], axis=1))
+            elif known is None:
+                edge_nodes[index] = nodes
+            elif len(known) == count:
+                pairs.append(np.stack([known, nodes], axis=1))
+            for vertex, node in ((TopExp.FirstVertex_s(edge), nodes[0]), (TopExp.LastVertex_s(edge), nodes[-1])):
+                if not vertex.IsNull():
+                    other = vertex_node.setdefault(vertices.FindIndex(vertex), int(node))
+                    pairs.append(np.array([[other, node]]))
+    return np.concatenate(pairs), [np.zeros(0, np.int64) if e is None else e for e in edge_nodes]

@@ -1,0 +1,60 @@
+"""The door from a STEP file to a ``Part``.
+
+    part = read_part("wheel.step", placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
+
+The CAD kernel runs in a child process (``geometry.step_child``), so a file that crashes it, hangs it or eats
+memory ends as a typed error here. Importing this module does not import the kernel.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import Any
+
+from geometry.child import run_limited
+from geometry.errors import SetupError
+from geometry.frames import Placement
+from geometry.part import Part
+
+
+def read_part(path: str | os.PathLike[str], *, placement: Placement | None = None, solid: int | None = None,
+              chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
+              memory_limit: float = 6e9) -> Part:
+    """Read one solid from a STEP file, heal it where that is safe, and mesh it.
+
+    path         : STEP file (ISO 10303-21 clear text); mm, cm, m, inch ... are converted to mm
+    placement    : Placement, the setup frame in STEP coordinates (mm); the file's own frame when None
+    solid        : int, 1-based number of one of several separate solids; None when there is one
+    chord        : float, mm, largest distance between mesh and exact surface asked for
+    angle        : float, rad, largest turn of the normal between neighbouring mesh points asked for
+    time_limit   : float, s of wall time
+    memory_limit : float, bytes of resident memory
+
+    Returns Part in the setup frame; ``part.deviation`` is the distance measured against the exact surface.
+    Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
+    ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``, ``several_solids``,
+    ``no_such_solid``, ``part_too_small``, ``part_too_large``), SetupError (``bad_placement``,
+    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``), ResourceError (``reader_crashed``,
+    ``reader_timeout``, ``reader_memory``).
+    """
+    check_tolerances(chord, angle)
+    request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "chord": chord, "angle": angle,
+                               "placement": placement.as_dict() if placement else None}
+    command = [sys.executable, "-m", "geometry.step_child"]
+    data = run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
+    return Part.from_bytes(data)
+
+
+def check_tolerances(chord: float, angle: float) -> None:
+    """Refuse mesh tolerances that no mesh can meet.
+
+    chord : float, mm; angle : float, rad
+    Raises SetupError (``bad_tolerance``).
+    """
+    for name, value, low, high in (("chord", chord, 1e-5, 10.0), ("angle", angle, 0.01, 1.5)):
+        if not low <= value <= high:
+            raise SetupError(f"mesh {name} {value:g} is outside {low:g} to {high:g}", code="bad_tolerance",
+                             subjects=(name,), measured=value, limit=[low, high],
+                             remedy="0.002 mm and 0.2 rad suit most parts")

@@ -1,0 +1,49 @@
+"""Entry of the reader's child process: request on stdin, part or error in the result file.
+
+Kept free of heavy imports at module level so that limits stand before the CAD kernel is loaded.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+from geometry.child import TYPED_ERROR, guard_child
+from geometry.errors import CamError, GeometryError, ResourceError
+
+
+def main() -> int:
+    """Read the request, load the part, write the answer; returns the exit code."""
+    result = guard_child()
+    request = json.load(sys.stdin)
+    try:
+        data = _load(request)
+    except CamError as error:
+        result.write_text(json.dumps(error.as_dict()))
+        return TYPED_ERROR
+    except MemoryError:
+        result.write_text(json.dumps(ResourceError("out of memory", code="out_of_memory").as_dict()))
+        return TYPED_ERROR
+    result.write_bytes(data)
+    return 0
+
+
+def _load(request: dict) -> bytes:
+    from geometry.frames import Placement
+    from geometry.occ.loading import load_part
+
+    placement = request.pop("placement")
+    try:
+        return load_part(placement=Placement(**placement) if placement else None, **request).to_bytes()
+    except CamError:
+        raise
+    except Exception as problem:
+        # pybind registers the kernel's exceptions below Exception; anything else is a bug and shows as a crash
+        if not type(problem).__module__.startswith("OCP"):
+            raise
+        raise GeometryError(f"the CAD kernel gave up: {type(problem).__name__}: {problem}", code="kernel_failed",
+                            remedy="export the part again, if possible from another program") from problem
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,147 @@
+"""What the bytes of a STEP file say before any CAD kernel sees them.
+
+A kernel that meets a cut-off or foreign file may return an empty shape, a partial one, or crash. These checks
+read the clear-text encoding (ISO 10303-21) itself: header, sections, end mark, references that lead nowhere.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from geometry.errors import StepError
+
+MAX_BYTES = 512 * 1024 * 1024
+# Looking for dangling references costs about 0.1 s a MB; above this size the kernel's own check must do.
+REFERENCE_CHECK_BYTES = 64 * 1024 * 1024
+
+_STRING = re.compile(rb"'[^']*'")
+_COMMENT = re.compile(rb"/\*.*?\*/", re.DOTALL)
+_DEFINED = re.compile(rb"#(\d+)\s*=")
+_REFERENCE = re.compile(rb"#(\d+)")
+_FACE = re.compile(rb"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
+_UNCERTAINTY = re.compile(rb"UNCERTAINTY_MEASURE_WITH_UNIT\s*\(\s*LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)")
+_PRODUCT = re.compile(rb"=\s*PRODUCT\s*\(\s*'([^']*)'\s*,\s*'([^']*)'")
+_START = b"ISO-10303-21;"
+_END = b"END-ISO-10303-21"
+
+
+@dataclass(frozen=True)
+class StepText:
+    """Facts read from the text alone.
+
+    sha256      : hex digest of the bytes
+    faces       : number of faces the text defines (instances of an assembly are counted once)
+    uncertainty : length uncertainty in units of the file, None when the file names none
+    has_unit    : the text declares a length unit
+    products    : names of products
+    """
+
+    sha256: str
+    faces: int
+    uncertainty: float | None
+    has_unit: bool
+    products: tuple[str, ...]
+
+
+def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
+    """Read a STEP file as text and refuse what no kernel should be given.
+
+    path      : file
+    max_bytes : int, largest size accepted
+
+    Returns StepText.
+    Raises StepError with code ``no_file``, ``empty_file``, ``file_too_large``, ``not_step``, ``truncated_step``
+    or ``dangling_reference``.
+    """
+    data = _read(Path(path), max_bytes)
+    _check_frame(data)
+    bare = _COMMENT.sub(b"", _STRING.sub(b"''", data))
+    if len(data) <= REFERENCE_CHECK_BYTES:
+        _check_references(bare)
+    uncertainty = [float(x) for x in _UNCERTAINTY.findall(bare) if _is_positive(x)]
+    products = tuple(dict.fromkeys(
+        name.decode("latin-1") for pair in _PRODUCT.findall(data) for name in pair if name.strip()))
+    return StepText(
+        sha256=hashlib.sha256(data).hexdigest(),
+        faces=len(_FACE.findall(bare)),
+        uncertainty=max(uncertainty) if uncertainty else None,
+        has_unit=b"LENGTH_UNIT" in bare,
+        products=products,
+    )
+
+
+def _read(path: Path, max_bytes: int) -> bytes:
+    try:
+        size = path.stat().st_size
+        if size > max_bytes:
+            raise StepError(f"the STEP file has {size} bytes, more than the {max_bytes} that are accepted",
+                            code="file_too_large", subjects=(path.name,), measured=size, limit=max_bytes,
+                            remedy="export the part alone, without product data and drawings")
+        data = path.read_bytes()
+    except OSError as problem:
+        raise StepError(f"the STEP file cannot be read: {problem.strerror}", code="no_file", subjects=(path.name,),
+                        remedy="check the path and the permissions") from problem
+    if not data.strip():
+        raise StepError("the STEP file is empty", code="empty_file", subjects=(path.name,), measured=len(data),
+                        limit=1, remedy="export the part again; the transfer may have been cut off")
+    return data
+
+
+def _check_frame(data: bytes) -> None:
+    head = data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
+    head = _COMMENT.sub(b"", head).lstrip()
+    if not head.upper().startswith(_START):
+        raise StepError(f"the file is not a STEP file: it starts with {_shown(data)} instead of 'ISO-10303-21;'",
+                        code="not_step", measured=_shown(data), limit="ISO-10303-21;", remedy=_format_hint(data))
+    bare = _STRING.sub(b"''", data)
+    for word in (b"HEADER;", b"DATA"):
+        if word not in bare:
+            raise StepError(f"the STEP file has no {word.decode().rstrip(';')} section", code="truncated_step",
+                            measured="missing", limit=word.decode(), remedy="export the part again")
+    sections = bare.count(b"ENDSEC")
+    if _END not in bare[-4096:] or sections < 2:
+        missing = "'END-ISO-10303-21;'" if _END not in bare[-4096:] else "'ENDSEC;'"
+        raise StepError(f"the STEP file is cut off after {len(data)} bytes: its closing {missing} is missing",
+                        code="truncated_step", measured=len(data), limit="END-ISO-10303-21;",
+                        remedy="transfer or export the file again")
+
+
+def _check_references(bare: bytes) -> None:
+    defined = set(_DEFINED.findall(bare))
+    used = set(_REFERENCE.findall(bare))
+    lost = sorted(int(x) for x in used - defined)
+    if lost:
+        names = tuple(f"#{n}" for n in lost[:10])
+        raise StepError(f"{len(lost)} entities are used but nowhere defined, the first is #{lost[0]}; part of the file "
+                        "is missing", code="dangling_reference", subjects=names, measured=len(lost), limit=0,
+                        remedy="transfer or export the file again")
+
+
+def _shown(data: bytes) -> str:
+    return repr(data[:24].decode("latin-1"))
+
+
+def _format_hint(data: bytes) -> str:
+    if data[:2] == b"\x1f\x8b":
+        try:
+            inner = gzip.GzipFile(fileobj=io.BytesIO(data)).read(64)
+        except (OSError, EOFError):
+            inner = b""
+        return "unpack the gzip file first" + (", there is a STEP file inside" if _START in inner else "")
+    if data[:2] == b"PK":
+        return "unpack the zip file first"
+    if data[:5].lower() == b"solid" or data[:80].lower().startswith(b"solid"):
+        return "this looks like STL; a STEP file with a solid is needed"
+    return "export the part as STEP (AP203, AP214 or AP242, clear text)"
+
+
+def _is_positive(text: bytes) -> bool:
+    try:
+        return float(text) > 0
+    except ValueError:
+        return False
