@@ -1,0 +1,159 @@
+"""Lowest height of a body of revolution over a mesh: drop, blocked, contact and grids.
+
+The cutter stands upright (+z), tip down. Its body is a disc-bottomed shape of ``radius`` and
+``corner_radius`` (ball: equal, flat: 0, bull nose: between) under an endless cylinder. A tip height is the
+lowest at which the body does not enter the mesh; -inf where nothing is below. Theory: docs/theory/drop.md.
+
+Arrays are split over numba's threads where it has several. Where it has one (``NUMBA_NUM_THREADS=1`` or
+``numba.set_num_threads(1)``), the threading layer is not touched, so such calls may come from several
+Python threads at once. The bytes are the same either way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.errors import GeometryError
+from geometry.kernels import drop as kernels
+from geometry.mesh import F64, I32
+
+
+@dataclass(frozen=True, eq=False)
+class DropContacts:
+    """Tips with what holds them up.
+
+    z        : (n,) float64, mm, tip heights; -inf where nothing is below
+    triangle : (n,) int32, triangle of the mesh that is touched; -1 where none
+    point    : (n, 3) float64, mm, where it is touched; NaN where nothing is
+    """
+
+    z: F64
+    triangle: I32
+    point: F64
+
+
+def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float, out: F64 | None = None) -> F64:
+    """Lowest tip height over each point.
+
+    tree          : TriangleTree
+    xy            : (n, 2) float64, mm, places of the axis
+    radius        : float, mm, >= 0; 0 gives the height of the mesh itself
+    corner_radius : float, mm, 0 <= corner_radius <= radius
+    out           : (n,) float64 to write into, new when None
+
+    Returns
+    -------
+    (n,) float64, mm
+        Exact for the mesh to rounding, 1e-10 mm; -inf where nothing is below.
+
+    Raises
+    ------
+    GeometryError
+        The points or the radii are not as above; the subjects name what.
+    """
+    points = _points(xy, 2, "xy")
+    _check_radii(radius, corner_radius)
+    result = np.empty(len(points)) if out is None else out
+    if result.shape != (len(points),) or result.dtype != np.float64:
+        raise GeometryError(f"out must be ({len(points)},) float64, got {result.shape} {result.dtype}",
+                            code="bad_array", subjects=("out",))
+    r, c = float(radius), float(corner_radius)
+    if _one_thread():
+        kernels.drop_range(tree.arrays, points, r, c, 0, len(points), result)
+    else:
+        kernels.drop_many_parallel(tree.arrays, points, r, c, result)
+    return result
+
+
+def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> DropContacts:
+    """``drop_tips`` with the triangle and the point that hold each tip up; parameters and errors as there.
+
+    Where several triangles share the contact (an edge, a vertex), any one of them is named, always the same
+    one for the same mesh.
+    """
+    points = _points(xy, 2, "xy")
+    _check_radii(radius, corner_radius)
+    n = len(points)
+    z, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))
+    kernels.contact_range(tree.arrays, points, float(radius), float(corner_radius), 0, n, z, triangle, contact)
+    return DropContacts(z, triangle, contact)
+
+
+def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float) -> NDArray[np.bool_]:
+    """Whether the body enters the mesh with its tip at each point.
+
+    tips : (n, 3) float64, mm; the other parameters and the errors are those of ``drop_tips``
+
+    Returns
+    -------
+    (n,) bool
+        True where the lowest free tip is more than 1e-9 mm above the given one.
+    """
+    points = _points(tips, 3, "tips")
+    _check_radii(radius, corner_radius)
+    out = np.empty(len(points), np.bool_)
+    r, c = float(radius), float(corner_radius)
+    if _one_thread():
+        kernels.blocked_range(tree.arrays, points, r, c, 0, len(points), out)
+    else:
+        kernels.blocked_many_parallel(tree.arrays, points, r, c, out)
+    return out
+
+
+def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
+              corner_radius: float) -> F64:
+    """Lowest tip height over a grid of points.
+
+    x0, y0 : float, mm, the first point
+    step   : float, mm, > 0, distance of neighbours
+    nx, ny : int, number of points along x and y
+
+    Returns
+    -------
+    (ny, nx) float64, mm
+        Element [j, i] is the tip over (x0 + i step, y0 + j step), as ``drop_tips`` gives it.
+    """
+    _check_radii(radius, corner_radius)
+    if not (np.isfinite([x0, y0]).all() and np.isfinite(step) and step > 0.0) or nx < 0 or ny < 0:
+        raise GeometryError(f"a grid needs finite corners, a positive step and counts, got {x0}, {y0}, {step}, "
+                            f"{nx}, {ny}", code="bad_grid", subjects=("grid",))
+    out = np.empty((int(ny), int(nx)))
+    args: tuple[Any, ...] = (tree.arrays, float(x0), float(y0), float(step), float(radius), float(corner_radius))
+    if _one_thread():
+        kernels.grid_rows(*args, 0, len(out), out)  # type: ignore[call-arg]
+    else:
+        kernels.grid_parallel(*args, out)  # type: ignore[call-arg]
+    return out
+
+
+def _one_thread() -> bool:
+    return bool(numba.get_num_threads() == 1)
+
+
+def _points(values: ArrayLike, width: int, name: str) -> F64:
+    try:
+        points = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} must be numbers of shape (n, {width}): {error}", code="bad_array",
+                            subjects=(name,)) from error
+    if points.shape == (0,):
+        return points.reshape(0, width)
+    if points.ndim != 2 or points.shape[1] != width:
+        raise GeometryError(f"{name} must have shape (n, {width}), got {points.shape}", code="bad_array",
+                            subjects=(name,))
+    if not np.isfinite(points).all():
+        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise GeometryError(f"{name}[{row}] is not finite", code="bad_array", subjects=(f"{name}[{row}]",))
+    return points
+
+
+def _check_radii(radius: float, corner_radius: float) -> None:
+    if not (np.isfinite(radius) and 0.0 <= corner_radius <= radius):
+        raise GeometryError(f"need 0 <= corner radius <= radius, got {corner_radius} and {radius} mm",
+                            code="bad_cutter", subjects=("radius",), measured=corner_radius, limit=radius)

@@ -1,0 +1,250 @@
+"""Bounding volume hierarchy over triangles: build, and the arrays every traversal reads.
+
+Notation
+    k nodes, m triangles. Node 0 is the root; the two children of an inner node are adjacent
+    (``child``, ``child + 1``), so the sibling of node i > 0 is ``((i - 1) ^ 1) + 1``.
+    A leaf holds the triangles ``first .. first + size - 1`` in leaf order; ``order`` maps leaf order
+    to the triangle numbers of the mesh.
+    column row: x_lo, x_hi, y_lo, y_hi, z_max, a, b, c with z <= a x + b y + c for every point of the node.
+    facet row: unit normal turned upwards (nx, ny, nz >= 0), orientation seen from above (+1/-1), quality.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+LEAF_SIZE = 4
+BINS = 16
+# Traversals keep one bit a level in a 64-bit trail. From this depth on the builder halves by count,
+# which adds at most 31 levels for 2**31 triangles.
+DEPTH_OF_MEDIAN = 30
+STACK = 72
+
+# Facets by quality: the plane is of no use (no area, or vertical) / usable with care / well conditioned.
+EDGES_ONLY, CAREFUL, SOUND = 0.0, 1.0, 2.0
+
+
+class TreeArrays(NamedTuple):
+    """The hierarchy as plain arrays; njit functions take it as one argument.
+
+    lower, upper : (k, 3) float64, mm    bounding boxes
+    column       : (k, 8) float64        box in plan, top z, and a plane above everything in the node
+    child        : (k,) int32            first of two adjacent children, -1 in a leaf
+    parent       : (k,) int32            -1 at the root
+    first, size  : (k,) int32            range of a leaf in leaf order, size 0 in inner nodes
+    order        : (m,) int32            triangle of the mesh at each place of the leaf order
+    corners      : (m, 3, 3) float64, mm corner points in leaf order
+    facets       : (m, 5) float64        upward unit normal, orientation from above, quality; leaf order
+    """
+
+    lower: F64
+    upper: F64
+    column: F64
+    child: I32
+    parent: I32
+    first: I32
+    size: I32
+    order: I32
+    corners: F64
+    facets: F64
+
+
+@njit(cache=True, nogil=True)
+def _half_area(lo: F64, hi: F64) -> float:
+    dx, dy, dz = hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]
+    if dx < 0.0:
+        return 0.0
+    return dx * dy + dy * dz + dz * dx
+
+
+@njit(cache=True, nogil=True)
+def _boxes(triangles: F64, lower: F64, upper: F64) -> None:
+    for i in range(triangles.shape[0]):
+        for j in range(3):
+            lower[i, j] = min(triangles[i, 0, j], triangles[i, 1, j], triangles[i, 2, j])
+            upper[i, j] = max(triangles[i, 0, j], triangles[i, 1, j], triangles[i, 2, j])
+
+
+@njit(cache=True, nogil=True)
+def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_n, right):
+    """Axis and number of bins on the left of the cheapest plane (surface area heuristic), axis -1: none."""
+    best_axis, best_bin, best_cost = -1, 0, np.inf
+    for axis in range(3):
+        extent = chi[axis] - clo[axis]
+        if not extent > 0.0:
+            continue
+        bin_lo[:] = np.inf
+        bin_hi[:] = -np.inf
+        bin_n[:] = 0
+        scale = BINS / extent
+        for i in range(start, stop):
+            t = order[i]
+            b = min(int((0.5 * (lower[t, axis] + upper[t, axis]) - clo[axis]) * scale), BINS - 1)
+            bin_n[b] += 1
+            for j in range(3):
+                bin_lo[b, j] = min(bin_lo[b, j], lower[t, j])
+                bin_hi[b, j] = max(bin_hi[b, j], upper[t, j])
+        lo = np.full(3, np.inf)
+        hi = np.full(3, -np.inf)
+        n = 0
+        for b in range(BINS - 1, 0, -1):
+            n += bin_n[b]
+            for j in range(3):
+                lo[j] = min(lo[j], bin_lo[b, j])
+                hi[j] = max(hi[j], bin_hi[b, j])
+            right[b] = n * _half_area(lo, hi)
+        lo[:] = np.inf
+        hi[:] = -np.inf
+        n = 0
+        for b in range(BINS - 1):
+            n += bin_n[b]
+            for j in range(3):
+                lo[j] = min(lo[j], bin_lo[b, j])
+                hi[j] = max(hi[j], bin_hi[b, j])
+            if 0 < n < stop - start:
+                cost = n * _half_area(lo, hi) + right[b + 1]
+                if cost < best_cost:
+                    best_axis, best_bin, best_cost = axis, b + 1, cost
+    return best_axis, best_bin
+
+
+@njit(cache=True, nogil=True)
+def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
+    """Reorder so that the triangles of the first ``left_bins`` bins come first; the first of the others."""
+    i, j = start, stop - 1
+    while i <= j:
+        t = order[i]
+        b = min(int((0.5 * (lower[t, axis] + upper[t, axis]) - clo) * scale), BINS - 1)
+        if b < left_bins:
+            i += 1
+        else:
+            order[i], order[j] = order[j], t
+            j -= 1
+    return i
+
+
+@njit(cache=True, nogil=True)
+def build_nodes(triangles: F64, leaf_size: int):
+    """Boxes, topology and leaf order of the hierarchy over (m, 3, 3) corner points, m > 0."""
+    m = triangles.shape[0]
+    lower, upper = np.empty((m, 3)), np.empty((m, 3))
+    _boxes(triangles, lower, upper)
+    k_max = 2 * m - 1
+    node_lo, node_hi = np.empty((k_max, 3)), np.empty((k_max, 3))
+    child, parent = np.full(k_max, -1, np.int32), np.full(k_max, -1, np.int32)
+    first, count = np.zeros(k_max, np.int32), np.zeros(k_max, np.int32)
+    order = np.arange(m).astype(np.int32)
+    bin_lo, bin_hi = np.empty((BINS, 3)), np.empty((BINS, 3))
+    bin_n, right = np.empty(BINS, np.int64), np.empty(BINS)
+    clo, chi = np.empty(3), np.empty(3)
+    stack = np.empty((STACK, 4), np.int64)
+    stack[0] = (0, 0, m, 0)
+    top, k = 1, 1
+    while top > 0:
+        top -= 1
+        node, start, stop, depth = stack[top]
+        node_lo[node] = np.inf
+        node_hi[node] = -np.inf
+        clo[:] = np.inf
+        chi[:] = -np.inf
+        for i in range(start, stop):
+            t = order[i]
+            for j in range(3):
+                node_lo[node, j] = min(node_lo[node, j], lower[t, j])
+                node_hi[node, j] = max(node_hi[node, j], upper[t, j])
+                mid = 0.5 * (lower[t, j] + upper[t, j])
+                clo[j] = min(clo[j], mid)
+                chi[j] = max(chi[j], mid)
+        if stop - start <= leaf_size:
+            first[node], count[node] = start, stop - start
+            continue
+        middle = (start + stop) // 2
+        if depth < DEPTH_OF_MEDIAN:
+            axis, left = _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_n, right)
+            if axis >= 0:
+                scale = BINS / (chi[axis] - clo[axis])
+                middle = _partition(lower, upper, order, start, stop, axis, left, clo[axis], scale)
+        else:
+            axis = np.argmax(chi - clo)
+            part = order[start:stop].copy()
+            keys = lower[part, axis] + upper[part, axis]
+            order[start:stop] = part[np.argsort(keys, kind="mergesort")]
+        child[node] = k
+        parent[k] = node
+        parent[k + 1] = node
+        stack[top] = (k + 1, middle, stop, depth + 1)
+        stack[top + 1] = (k, start, middle, depth + 1)
+        top += 2
+        k += 2
+    return (node_lo[:k].copy(), node_hi[:k].copy(), child[:k].copy(), parent[:k].copy(), first[:k].copy(),
+            count[:k].copy(), order)
+
+
+@njit(cache=True, nogil=True)
+def facet_rows(corners: F64):
+    """(m, 5) upward normals, orientation and quality of each triangle."""
+    m = corners.shape[0]
+    out = np.zeros((m, 5))
+    for i in range(m):
+        p, q, r = corners[i, 0], corners[i, 1], corners[i, 2]
+        ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        wx, wy, wz = r[0] - q[0], r[1] - q[1], r[2] - q[2]
+        longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
+        side = 1.0 if nz >= 0.0 else -1.0
+        # length / longest is height over longest edge: the normal's error is about 1e-16 over that.
+        if length <= 1e-11 * longest or abs(nz) <= 1e-9 * length:
+            out[i, 3] = side
+            out[i, 4] = EDGES_ONLY
+            continue
+        out[i, 0], out[i, 1], out[i, 2] = side * nx / length, side * ny / length, abs(nz) / length
+        out[i, 3] = side
+        out[i, 4] = SOUND if length > 1e-5 * longest and abs(nz) > 1e-3 * length else CAREFUL
+    return out
+
+
+@njit(cache=True, nogil=True)
+def column_rows(node_lo, node_hi, child, parent, first, count, corners):
+    """(k, 8) plan box, top z and covering plane of each node; the plane leans as the node does on average."""
+    k = node_lo.shape[0]
+    normal = np.zeros((k, 3))
+    out = np.zeros((k, 8))
+    for i in range(k - 1, -1, -1):
+        for t in range(first[i], first[i] + count[i]):
+            p, q, r = corners[t, 0], corners[t, 1], corners[t, 2]
+            ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+            vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+            nz = ux * vy - uy * vx
+            side = 1.0 if nz >= 0.0 else -1.0
+            normal[i, 0] += side * (uy * vz - uz * vy)
+            normal[i, 1] += side * (uz * vx - ux * vz)
+            normal[i, 2] += side * nz
+        if parent[i] >= 0:
+            normal[parent[i]] += normal[i]
+        out[i, 0], out[i, 1] = node_lo[i, 0], node_hi[i, 0]
+        out[i, 2], out[i, 3] = node_lo[i, 1], node_hi[i, 1]
+        out[i, 4] = node_hi[i, 2]
+        n = normal[i]
+        if n[2] > 0.05 * math.sqrt(n[0] * n[0] + n[1] * n[1]):
+            out[i, 5], out[i, 6] = -n[0] / n[2], -n[1] / n[2]
+        out[i, 7] = -np.inf
+    for leaf in range(k):
+        for t in range(first[leaf], first[leaf] + count[leaf]):
+            i = leaf
+            while i >= 0:
+                for j in range(3):
+                    c = corners[t, j, 2] - out[i, 5] * corners[t, j, 0] - out[i, 6] * corners[t, j, 1]
+                    if c > out[i, 7]:
+                        out[i, 7] = c
+                i = parent[i]
+    return out
