@@ -1,0 +1,231 @@
+"""A family part before it becomes a solid: base, walls, connections, and the checks between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from shapely.geometry import LineString, Point, Polygon
+
+from examples.connections import ConnectionSpec
+from examples.gaps import Gap, channels
+from examples.splines import F64
+from examples.walls import WallSpec
+
+
+class LayoutError(ValueError):
+    """A drawn layout breaks a rule of the family; the recipe draws again."""
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Rectangular base from z = 0 to ``thickness``: bounds x0, y0, x1, y1 in mm."""
+
+    bounds: tuple[float, float, float, float]
+    thickness: float
+
+    def solid(self) -> Any:
+        """The plate as a cadquery Solid."""
+        import cadquery as cq
+
+        x0, y0, x1, y1 = self.bounds
+        return cq.Solid.makeBox(x1 - x0, y1 - y0, self.thickness, cq.Vector(x0, y0, 0))
+
+    def holds(self, outline: Polygon) -> bool:
+        """Whether a plan outline lies on the plate, 1 mm from its rim."""
+        x0, y0, x1, y1 = outline.bounds
+        b = self.bounds
+        return x0 >= b[0] + 1 and y0 >= b[1] + 1 and x1 <= b[2] - 1 and y1 <= b[3] - 1
+
+    def blocked(self, start: F64, end: F64) -> np.ndarray:
+        """(n,) bool: whether the base stands above its floor between two points; a plate never does."""
+        return np.zeros(len(start), bool)
+
+
+@dataclass(frozen=True)
+class HubDisc:
+    """Round base with a conical hub about the Z axis.
+
+    radius, thickness : mm, of the disc
+    hub_radius        : mm, of the hub at the floor and at its top
+    hub_height        : mm above the floor
+    """
+
+    radius: float
+    thickness: float
+    hub_radius: tuple[float, float]
+    hub_height: float
+
+    def solid(self) -> Any:
+        """Disc and hub as one cadquery Solid, turned from one profile."""
+        import cadquery as cq
+
+        r0, r1 = self.hub_radius
+        z0, z1 = self.thickness, self.thickness + self.hub_height
+        profile = [(0, 0), (self.radius, 0), (self.radius, z0), (r0, z0), (r1, z1), (0, z1)]
+        wire = cq.Wire.makePolygon([cq.Vector(r, 0, z) for r, z in profile], close=True)
+        return cq.Solid.revolve(wire, [], 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))
+
+    def holds(self, outline: Polygon) -> bool:
+        """Whether a plan outline lies on the disc, 1 mm from its rim."""
+        xy = np.array(outline.exterior.coords)
+        return bool(np.hypot(xy[:, 0], xy[:, 1]).max() <= self.radius - 1)
+
+    def blocked(self, start: F64, end: F64) -> np.ndarray:
+        """(n,) bool: whether the hub touches the segment between two points, (n, 3) float64 in mm."""
+        f = np.linspace(0.0, 1.0, 65)[:, None]
+        p = start[:, None] + (end - start)[:, None] * f
+        share = np.clip((p[..., 2] - self.thickness) / self.hub_height, 0.0, 1.0)
+        limit = self.hub_radius[0] + (self.hub_radius[1] - self.hub_radius[0]) * share
+        above = p[..., 2] > self.thickness + self.hub_height
+        return np.asarray(((np.hypot(p[..., 0], p[..., 1]) <= limit) & ~above).any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Everything a recipe decides.
+
+    name        : of the recipe
+    base        : Plate or HubDisc
+    walls       : WallSpec in order, the indices of the truth
+    connections : ConnectionSpec in order
+    fillet      : mm, radius of the fillets between walls and floor, 0 for none
+    """
+
+    name: str
+    base: Plate | HubDisc
+    walls: list[WallSpec]
+    connections: list[ConnectionSpec] = field(default_factory=list)
+    fillet: float = 0.0
+
+    def gaps(self, **sampling: int) -> list[Gap]:
+        """True channels between the walls, see ``examples.gaps.channels``."""
+        return channels(self.walls, self.base.blocked, **sampling)
+
+
+def connect(
+    walls: list[WallSpec],
+    pair: tuple[int, int],
+    kind: str,
+    u: float,
+    z: tuple[float, float],
+    *,
+    width: float,
+    depth: float,
+    bend: float = 0.0,
+) -> ConnectionSpec:
+    """Connection from wall ``pair[0]`` square across to wall ``pair[1]``.
+
+    u     : parameter on the centre line of the first wall
+    z     : mm, height of the axis on the first and on the second wall
+    width, depth, bend : mm, see ConnectionSpec; the width is reduced until both ends are buried
+    Raises LayoutError where the second wall is missed, the ends cannot be buried, there is no void below,
+    or the connection would meet a third wall.
+    """
+    first, second = walls[pair[0]], walls[pair[1]]
+    start = first.axis_point(u, z[0])
+    target = _centre_polyline(second, z[1])
+    normal = first.plan_normal(np.array([u]))[0]
+    hit = LineString([start - 40 * normal, start + 40 * normal]).intersection(LineString(target))
+    points = [np.array(g.coords[0]) for g in getattr(hit, "geoms", [hit]) if not g.is_empty]
+    if not points:
+        raise LayoutError("the second wall is not opposite")
+    end = min(points, key=lambda p: float(np.linalg.norm(p - start)))
+    u_end = LineString(target).project(Point(end), normalized=True)
+    tangents = np.array([_tangent(first, u), _tangent(second, u_end)])
+    spec = ConnectionSpec(kind, (first, second), pair, np.array([*start, z[0]]), np.array([*end, z[1]]),
+                          tangents, width, depth, bend)
+    for _ in range(8):
+        if spec.buried(0.12):
+            break
+        spec = spec.narrowed(0.8)
+    else:
+        raise LayoutError("ends cannot be buried")
+    if spec.width < 0.7 or spec.span[1] - spec.span[0] < 0.05 or spec.void_share < 0.25:
+        raise LayoutError("too narrow, no span, or no void below")
+    outline = spec.footprint()
+    if any(w.section(0.5 * sum(spec.z_range)).intersects(outline) for k, w in enumerate(walls) if k not in pair):
+        raise LayoutError("meets a third wall")
+    return spec
+
+
+def _centre_polyline(wall: WallSpec, z: float) -> F64:
+    return np.array([wall.axis_point(t, z) for t in np.linspace(0.02, 0.98, 97)])
+
+
+def _tangent(wall: WallSpec, u: float) -> F64:
+    n = wall.plan_normal(np.array([u]))[0]
+    return np.array([n[1], -n[0]])
+
+
+def clear_of(spec: ConnectionSpec, others: list[ConnectionSpec], plan: float = 1.5, height: float = 1.5) -> bool:
+    """Whether a connection keeps ``plan`` mm beside or ``height`` mm above or below every other one."""
+    for other in others:
+        stacked = spec.z_range[0] - other.z_range[1] >= height or other.z_range[0] - spec.z_range[1] >= height
+        if not stacked and spec.footprint().distance(other.footprint()) < plan and set(spec.indices) & set(other.indices):
+            return False
+    return True
+
+
+def check(layout: Layout) -> None:
+    """Hold a layout to the rules of the family; raises LayoutError naming the broken one."""
+    outlines = [[w.section(z) for z in (w.z_floor, 0.5 * (w.z_floor + w.z_top), w.z_top)] for w in layout.walls]
+    for wall, cuts in zip(layout.walls, outlines, strict=True):
+        if not all(c.is_valid and layout.base.holds(c) for c in cuts):
+            raise LayoutError("a wall crosses itself or leaves the base")
+        if wall.steepest_turn > np.radians(44):
+            raise LayoutError("a wall could face itself")
+        if max(wall.thickness) > 0.45 * wall.height:
+            raise LayoutError("a wall is a block")
+    for i, a in enumerate(outlines):
+        for b in outlines[:i]:
+            if any(p.distance(q) < 0.5 for p, q in zip(a, b, strict=True)):
+                raise LayoutError("two walls meet")
+
+
+def try_connections(
+    rng: Generator, layout: Layout, pairs: list[tuple[int, int]], count: int, kinds: tuple[str, ...]
+) -> list[ConnectionSpec]:
+    """Draw up to ``count`` connections between given pairs of walls.
+
+    Returns the ConnectionSpec list; shorter than asked only where 40 draws a piece found no room.
+    """
+    out: list[ConnectionSpec] = []
+    for k in range(count):
+        for _ in range(40):
+            pair = pairs[k % len(pairs)] if k < len(pairs) else pairs[int(rng.integers(len(pairs)))]
+            spec = _draw(rng, layout, pair, str(rng.choice(kinds)))
+            if spec is not None and clear_of(spec, out):
+                out.append(spec)
+                break
+    return out
+
+
+def _draw(rng: Generator, layout: Layout, pair: tuple[int, int], kind: str) -> ConnectionSpec | None:
+    first, second = (layout.walls[k] for k in pair)
+    floor, top = first.z_floor, min(first.z_top, second.z_top)
+    depth = float({"web": rng.uniform(0.8, 1.5)}.get(kind, rng.uniform(1.2, 2.2)))
+    width = depth if kind == "round_bar" else float(rng.uniform(3, 7) if kind == "web" else rng.uniform(1.0, 2.5))
+    low, high = floor + 1.5 + 0.5 * depth, top - 1.2 - 0.5 * depth
+    bend = 0.0
+    if kind == "arch":
+        bend = float(rng.uniform(0.8, 1.8))
+        high -= bend
+    if kind == "bow":
+        bend = float(rng.uniform(0.8, 1.6) * rng.choice([-1, 1]))
+    u = float(rng.uniform(0.18, 0.82))
+    draw = rng.uniform(0, 1, 3)
+    if high <= low:
+        return None
+    z0 = low + (high - low) * float(draw[0])
+    z1 = z0
+    if kind in ("bar", "round_bar", "arch") and draw[1] < 0.4:
+        z1 = low + (high - low) * float(draw[2])
+    if kind == "bar" and draw[1] > 0.85:
+        z0 = floor
+    try:
+        return connect(layout.walls, pair, kind, u, (z0, z1), width=width, depth=depth, bend=bend)
+    except LayoutError:
+        return None
