@@ -57,7 +57,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     GeometryError
         The points or the radii are not as above; the subjects name what.
     """
-    points = _points(xy, 2, "xy")
+    points = finite_points(xy, 2, "xy")
     _check_radii(radius, corner_radius)
     result = np.empty(len(points)) if out is None else out
     if result.shape != (len(points),) or result.dtype != np.float64:
@@ -77,7 +77,7 @@ def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radiu
     Where several triangles share the contact (an edge, a vertex), any one of them is named, always the same
     one for the same mesh.
     """
-    points = _points(xy, 2, "xy")
+    points = finite_points(xy, 2, "xy")
     _check_radii(radius, corner_radius)
     n = len(points)
     z, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))
@@ -95,7 +95,7 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
     (n,) bool
         True where the lowest free tip is more than 1e-9 mm above the given one.
     """
-    points = _points(tips, 3, "tips")
+    points = finite_points(tips, 3, "tips")
     _check_radii(radius, corner_radius)
     out = np.empty(len(points), np.bool_)
     r, c = float(radius), float(corner_radius)
@@ -136,7 +136,8 @@ def _one_thread() -> bool:
     return bool(numba.get_num_threads() == 1)
 
 
-def _points(values: ArrayLike, width: int, name: str) -> F64:
+def finite_points(values: ArrayLike, width: int, name: str) -> F64:
+    """``values`` as a C-contiguous (n, width) float64 array; GeometryError, naming ``name``, where it is none."""
     try:
         points = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -1,0 +1,72 @@
+"""First hits of rays on a mesh, and its height seen from above."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.bvh import TriangleTree
+from geometry.drop import drop_grid, drop_tips, finite_points
+from geometry.errors import GeometryError
+from geometry.kernels import ray as kernels
+from geometry.mesh import F64, I32
+
+
+def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_min: float = 0.0,
+               t_max: float = np.inf) -> tuple[F64, I32]:
+    """First triangle that each ray meets, from either side.
+
+    tree       : TriangleTree
+    origins    : (n, 3) float64, mm
+    directions : (n, 3) float64, or (3,) for all rays; not zero. t counts in their lengths: mm for unit vectors
+    t_min      : float, hits nearer than this are passed over (an offset for rays that start on the mesh)
+    t_max      : float, hits farther than this do not count
+
+    Returns
+    -------
+    t        : (n,) float64, inf where nothing is met
+    triangle : (n,) int32, -1 where nothing is met
+
+    Raises
+    ------
+    GeometryError
+        Arrays of another shape, not finite, or a direction of zero; the subjects name what.
+
+    Notes
+    -----
+    Triangles count 1e-10 of their size beyond their edges, so a ray cannot slip through a shared edge.
+    """
+    start = finite_points(origins, 3, "origins")
+    way = np.asarray(directions, dtype=np.float64)
+    if way.shape == (3,):
+        way = np.broadcast_to(way, start.shape)
+    way = finite_points(way, 3, "directions")
+    if way.shape != start.shape:
+        raise GeometryError(f"{len(start)} origins need as many directions, got {len(way)}", code="bad_array",
+                            subjects=("directions",), measured=len(way), limit=len(start))
+    if len(way) and not way.any(axis=1).all():
+        row = int(np.flatnonzero(~way.any(axis=1))[0])
+        raise GeometryError(f"directions[{row}] is zero", code="bad_array", subjects=(f"directions[{row}]",))
+    n = len(start)
+    t, triangle = np.empty(n), np.empty(n, np.int32)
+    if numba.get_num_threads() == 1:
+        kernels.hit_range(tree.arrays, start, way, float(t_min), float(t_max), 0, n, t, triangle)
+    else:
+        kernels.hits_parallel(tree.arrays, start, way, float(t_min), float(t_max), t, triangle)
+    return t, triangle
+
+
+def heights(tree: TriangleTree, xy: ArrayLike) -> F64:
+    """Top z of the mesh over each point (n, 2), mm; -inf where there is nothing. Errors as ``drop_tips``."""
+    return drop_tips(tree, xy, 0.0, 0.0)
+
+
+def height_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int) -> F64:
+    """Top z of the mesh over a grid of points.
+
+    Element [j, i] of the (ny, nx) float64 result, mm, is the height at (x0 + i step, y0 + j step), -inf where
+    there is nothing. Parameters and errors are those of ``drop_grid``. A facet steeper than 1e-9 rad from
+    vertical counts as its edges only, which have no height over a point.
+    """
+    return drop_grid(tree, x0, y0, step, nx, ny, 0.0, 0.0)
