@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_Plane
-from OCP.gp import gp_Pnt, gp_Vec
+from OCP.GeomAbs import GeomAbs_Cone, GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere, GeomAbs_Torus
+from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 
 from geometry.mesh import F64
 from geometry.occ.topology import Shape
@@ -17,31 +19,62 @@ if TYPE_CHECKING:
     from geometry.occ.meshing import FaceMesh
 
 MAX_SAMPLES = 20_000
-NEWTON_STEPS = 3
+NEWTON_STEPS = 4
+MAX_PROJECTIONS = 200
 
 
-def largest_deviation(shapes: Sequence[Shape], faces: Sequence[FaceMesh]) -> float:
+def largest_deviation(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord: float) -> float:
     """Largest distance from sampled triangle centres to their exact face.
 
     shapes : kernel faces
     faces  : FaceMesh of each
+    chord  : float, mm; distances above it are looked at more closely
 
     Returns float, mm.
-    Notes   at most some 20 000 triangles are measured, an even share of each face and always its largest ones. The
-            distance to the surface point at the mean (u, v) of the corners bounds the true distance from above; a few
-            Gauss-Newton steps towards the foot point bring the bound down, so the value is never too small for a
-            sampled triangle. Centres are where a chord errs most on a smooth surface.
+    Notes   planes, cylinders, cones, spheres and tori by formula, every triangle. Of the others at most some 20 000
+            triangles, an even share of each face and always its largest ones: the distance to the surface point at
+            the mean (u, v) of the corners bounds the true distance from above, a few Gauss-Newton steps towards the
+            foot point bring the bound down, and where it still exceeds ``chord`` the kernel projects the point.
+            So the value is never too small for a measured triangle. Centres are where a chord errs most on a smooth
+            surface; the trim of the face is not looked at.
     """
     total = sum(len(f.triangles) for f in faces)
     worst = 0.0
     for shape, face in zip(shapes, faces, strict=True):
         surface = BRepAdaptor_Surface(shape, True)
-        if surface.GetType() == GeomAbs_Plane:
+        exact = _formula(surface, face.nodes[face.triangles].mean(axis=1))
+        if exact is not None:
+            worst = max(worst, exact)
             continue
         count = len(face.triangles)
         share = max(10, int(MAX_SAMPLES * count / max(total, 1)))
-        worst = max(worst, _face_deviation(surface, face, _sample(face, min(share, count))))
+        worst = max(worst, _face_deviation(shape, surface, face, _sample(face, min(share, count)), chord))
     return worst
+
+
+def _formula(surface: BRepAdaptor_Surface, points: F64) -> float | None:
+    """Largest distance of points to an elementary surface, None for a free-form one."""
+    kind = surface.GetType()
+    if kind == GeomAbs_Plane:
+        plane = surface.Plane()
+        return float(np.abs((points - plane.Location().Coord()) @ plane.Axis().Direction().Coord()).max())
+    if kind == GeomAbs_Sphere:
+        sphere = surface.Sphere()
+        return float(np.abs(np.linalg.norm(points - sphere.Location().Coord(), axis=1) - sphere.Radius()).max())
+    if kind not in (GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Torus):
+        return None
+    body = {GeomAbs_Cylinder: surface.Cylinder, GeomAbs_Cone: surface.Cone, GeomAbs_Torus: surface.Torus}[kind]()
+    offset = points - body.Location().Coord()
+    along = offset @ np.array(body.Axis().Direction().Coord())
+    away = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - along**2, 0.0))
+    if kind == GeomAbs_Cylinder:
+        return float(np.abs(away - body.Radius()).max())
+    if kind == GeomAbs_Torus:
+        return float(np.abs(np.hypot(away - body.MajorRadius(), along) - body.MinorRadius()).max())
+    slope = body.SemiAngle()
+    # the kernel's cone axis points where the radius grows for a positive angle; the lower nappe is never meshed
+    sides = [(s * away - body.RefRadius()) * np.cos(slope) - along * np.sin(slope) for s in (1.0, -1.0)]
+    return float(np.minimum(np.abs(sides[0]), np.abs(sides[1])).max())
 
 
 def _sample(face: FaceMesh, share: int) -> np.ndarray:
@@ -52,10 +85,22 @@ def _sample(face: FaceMesh, share: int) -> np.ndarray:
     return np.unique(np.concatenate([order[:share - share // 2], order[spread]]))
 
 
-def _face_deviation(surface: BRepAdaptor_Surface, face: FaceMesh, rows: np.ndarray) -> float:
+def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, rows: np.ndarray,
+                    chord: float) -> float:
     corners = face.triangles[rows]
     centres, uv = face.nodes[corners].mean(axis=1), face.uv[corners].mean(axis=1)
-    return max((_distance(surface, c, q) for c, q in zip(centres.tolist(), uv, strict=True)), default=0.0)
+    bounds = np.array([_distance(surface, c, q) for c, q in zip(centres.tolist(), uv, strict=True)])
+    order = np.argsort(-bounds)
+    worst = 0.0
+    projector = ShapeAnalysis_Surface(BRep_Tool.Surface_s(shape))
+    for row in order[:MAX_PROJECTIONS]:
+        bound = float(bounds[row])
+        if bound <= max(chord, worst):
+            return max(bound, worst)
+        projector.NextValueOfUV(gp_Pnt2d(*uv[row]), gp_Pnt(*centres[row]), 1e-9, -1.0)
+        worst = max(worst, min(bound, float(projector.Gap())))
+    rest = order[MAX_PROJECTIONS:]
+    return max(worst, float(bounds[rest].max()) if len(rest) else 0.0)
 
 
 def _distance(surface: BRepAdaptor_Surface, centre: list[float], uv: F64) -> float:

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS
+from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
@@ -16,7 +20,7 @@ SAMPLES = 33
 
 
 def free_edge_gap(edges: Sequence[Shape]) -> float:
-    """Largest distance from a free edge to its nearest neighbour among the other free edges.
+    """Largest, over the free edges, of the distance to their neighbours among the other free edges.
 
     edges : kernel edges
 
@@ -39,8 +43,22 @@ def free_edge_gap(edges: Sequence[Shape]) -> float:
         distance = _to_segments(inner, start[near], end[near])
         distance[owner[near] == number] = np.inf
         best = distance.min(axis=1)
-        worst = max(worst, float(np.median(best)))
+        worst = max(worst, float(best.max()))
     return worst
+
+
+def free_edges(shape: Shape) -> list[Shape]:
+    """Edges that bound one face only (seams and degenerate edges left out)."""
+    owners = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, owners)
+    out = []
+    for i in range(1, owners.Extent() + 1):
+        edge = TopoDS.Edge_s(owners.FindKey(i))
+        if owners.FindFromIndex(i).Extent() > 1 or BRep_Tool.Degenerated_s(edge):
+            continue
+        if not BRep_Tool.IsClosed_s(edge, TopoDS.Face_s(owners.FindFromIndex(i).First())):
+            out.append(edge)
+    return out
 
 
 def _points(edge: Shape) -> F64:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
 from OCP.ShapeFix import ShapeFix_Shape
@@ -15,8 +16,8 @@ from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_ListOfShape
 
 from geometry.errors import PartError
-from geometry.occ.gaps import free_edge_gap
-from geometry.occ.topology import Shape, box_of, faces_of, shells_of, solids_of, volume_of
+from geometry.occ.gaps import free_edge_gap, free_edges
+from geometry.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
 
 # Faces further apart than this are a different part, not a sloppy export: sewing must stay below what is machined.
 SEWING_TOLERANCE = 0.01
@@ -141,7 +142,7 @@ def _fuse(bodies: list[Shape], warnings: list[str]) -> list[Shape]:
 
 def _unified(solid: Shape) -> Shape:
     """Faces that the fuse cut although they lie on one surface, merged again where nothing else changes."""
-    tool = ShapeUpgrade_UnifySameDomain(solid, True, True, False)
+    tool = ShapeUpgrade_UnifySameDomain(BRepBuilderAPI_Copy(solid).Shape(), True, True, False)
     tool.Build()
     merged = solids_of(tool.Shape())
     before = volume_of(solid)
@@ -179,22 +180,32 @@ def _listing(solids: list[Shape]) -> str:
 def _valid(solid: Shape, warnings: list[str]) -> Shape:
     if BRepCheck_Analyzer(solid).IsValid():
         return solid
-    fixer = ShapeFix_Shape(solid)
+    # the fixer widens tolerances in place, so it gets a copy
+    fixer = ShapeFix_Shape(BRepBuilderAPI_Copy(solid).Shape())
     fixer.Perform()
     fixed = solids_of(fixer.Shape())
-    before = volume_of(solid)
-    if len(fixed) == 1 and abs(volume_of(fixed[0]) - before) <= 1e-4 * abs(before):
-        if BRepCheck_Analyzer(fixed[0]).IsValid():
-            warnings.append("the solid had faults in its topology, which were repaired")
-            return fixed[0]
-    warnings.append("the CAD kernel finds faults in the solid that it could not repair; the mesh decides")
+    if len(fixed) == 1 and _is_better(fixed[0], solid):
+        warnings.append("the solid had faults in its topology, which were repaired")
+        return fixed[0]
+    warnings.append(f"the CAD kernel finds faults in the solid that it could not repair (edges up to "
+                    f"{_tolerance(solid):.3g} mm off their faces); look at the deviation of the mesh")
     return solid
 
 
+def _is_better(fixed: Shape, solid: Shape) -> bool:
+    """A repair that moves the volume, or only declares wider tolerances, is none."""
+    before = volume_of(solid)
+    return (BRepCheck_Analyzer(fixed).IsValid() and abs(volume_of(fixed) - before) <= 1e-4 * abs(before)
+            and _tolerance(fixed) <= max(1.5 * _tolerance(solid), SEWING_TOLERANCE))
+
+
+def _tolerance(solid: Shape) -> float:
+    return max((BRep_Tool.Tolerance_s(e) for e in edges_of(solid)), default=0.0)
+
+
 def _outward(solid: Shape, warnings: list[str]) -> Shape:
-    closed = [s for s in shells_of(solid) if not s.Closed() and free_edges(s)]
-    if closed:
-        edges = [e for s in closed for e in free_edges(s)]
+    edges = [e for s in shells_of(solid) for e in free_edges(s)]
+    if edges:
         gap = free_edge_gap(edges)
         raise PartError(f"the solid is open: {len(edges)} free edges, the largest gap between neighbours is "
                         f"{gap:.4g} mm", code="open_shell",
@@ -206,24 +217,6 @@ def _outward(solid: Shape, warnings: list[str]) -> Shape:
         BRepLib.OrientClosedSolid_s(turned)
         return turned
     return solid
-
-
-def free_edges(shape: Shape) -> list[Shape]:
-    """Edges that bound one face only (seams and degenerate edges left out)."""
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-    from OCP.TopExp import TopExp
-    from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
-
-    owners = TopTools_IndexedDataMapOfShapeListOfShape()
-    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, owners)
-    out = []
-    for i in range(1, owners.Extent() + 1):
-        edge = TopoDS.Edge_s(owners.FindKey(i))
-        if owners.FindFromIndex(i).Extent() == 1 and not BRep_Tool.Degenerated_s(edge):
-            if not BRep_Tool.IsClosed_s(edge, TopoDS.Face_s(owners.FindFromIndex(i).First())):
-                out.append(edge)
-    return out
 
 
 def _size(size: np.ndarray) -> str:

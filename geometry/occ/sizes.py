@@ -16,7 +16,7 @@ DOUBT_THICKNESS = 0.1
 # What one unit is when it was meant to be another: mm per mm, cm, inch, foot, m.
 FACTORS = {"mm": 1.0, "cm": 10.0, "inch": 25.4, "foot": 304.8, "m": 1000.0}
 # Things nobody makes smaller than a metre in earnest; a small one under such a name is worth a question.
-LARGE_THINGS = re.compile(r"wind[\s_-]*(turbine|blade)|turbine[\s_-]*tower|fuselage|\bhull\b|wing[\s_-]*spar|bridge[\s_-]*deck",
+LARGE_THINGS = re.compile(r"wind[\s_-]*(turbine|blade)|turbine[\s_-]*tower|fuselage|\bhull\b|wing[\s_-]*spar",
                           re.IGNORECASE)
 
 
