@@ -1,0 +1,1 @@
+"""Compiled loops of the witness; they import numpy, numba and math only."""

@@ -1,0 +1,131 @@
+"""What is left on the normal ray of every surface sample, tile by tile.
+
+Notation as in ``sweep``. Samples lie sorted by the cells of a 3-D grid; one call works through all moves
+for one block of cell columns, so blocks can run side by side and every sample still sees the moves in
+program order: the result does not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from verify.kernels.sweep import capsule_start, cutter_interval
+
+TOUCH = 1e-6
+
+
+@njit(cache=True, nogil=True)
+def plan_distance(x, y, ax, ay, dx, dy, length2):
+    """Distance in plan from (x, y) to the segment a, a + d."""
+    wx, wy = x - ax, y - ay
+    s = 0.0
+    if length2 > 0.0:
+        s = min(max((wx * dx + wy * dy) / length2, 0.0), 1.0)
+    wx -= s * dx
+    wy -= s * dy
+    return math.sqrt(wx * wx + wy * wy)
+
+
+@njit(cache=True, nogil=True)
+def _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
+    """A lower bound of the distance from a point to the swept cutting part (may be negative inside)."""
+    plan = plan_distance(x, y, ax, ay, dx, dy, plan2)
+    side = plan - radius
+    low = min(az, az + dz)
+    if z >= low + corner:
+        return max(side, z - max(az, az + dz) - length)
+    over = plan - (radius - corner)
+    if dz == 0.0 or corner <= 0.0:
+        over, drop = max(over, 0.0), low + corner - z
+        return max(side, math.sqrt(over * over + drop * drop) - corner)
+    if corner < radius - 1e-12:
+        return max(side, low - z)
+    cz = az + corner
+    space2 = plan2 + dz * dz
+    s = min(max(((x - ax) * dx + (y - ay) * dy + (z - cz) * dz) / space2, 0.0), 1.0)
+    wx, wy, wz = x - ax - s * dx, y - ay - s * dy, z - cz - s * dz
+    return max(side, math.sqrt(wx * wx + wy * wy + wz * wz) - corner)
+
+
+@njit(cache=True, nogil=True)
+def _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
+    """Lower the residual of sample i by move m."""
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    left = residual[i]
+    if _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
+        return
+    nz = normals[i, 2]
+    if corner >= radius - 1e-12 and nz >= 0.0 and z + nz * left < min(az, az + dz) + min(corner, length - corner):
+        # the ray meets the ball below its equator first: one root decides nearly all pairs
+        t = capsule_start(x - ax, y - ay, z - az, normals[i, 0], normals[i, 1], nz, dx, dy, dz, radius, corner)
+        if t >= left:
+            return
+        if t >= 0.0:
+            residual[i] = t
+            mover[i] = m
+            return
+    lo, hi = cutter_interval(x - ax, y - ay, z - az, normals[i, 0], normals[i, 1], normals[i, 2], dx, dy, dz,
+                             radius, corner, length)
+    if lo <= hi and hi >= -TOUCH and lo < left:
+        residual[i] = lo
+        mover[i] = m
+
+
+@njit(cache=True, nogil=True)
+def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, residual, mover, left,
+             starts, ends, feeds, tool, cutters):
+    """Work all feed moves through the cell columns cx0..cx1-1, cy0..cy1-1.
+
+    origin, size, shape : of the grid; first (cells + 1,) int64 is the first sample of each cell
+    points, normals     : (n, 3) float64, sorted by cell
+    residual, mover     : (n,) float64 and int32, changed in place
+    left                : (cells,) float64, largest residual of each cell, changed in place
+    starts, ends        : (m, 3) float64 tip positions; feeds (m,) bool; tool (m,) int32 row of ``cutters``
+    cutters             : (k, 3) float64: radius, corner radius, flute length
+    """
+    half = 0.5 * math.sqrt(2.0) * size
+    pad = 0.0
+    for cx in range(cx0, cx1):
+        for cy in range(cy0, cy1):
+            for c in range((cx * shape[1] + cy) * shape[2], (cx * shape[1] + cy + 1) * shape[2]):
+                pad = max(pad, left[c])
+    for m in range(len(starts)):
+        if not feeds[m]:
+            continue
+        ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
+        dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
+        radius, corner, length = cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2]
+        reach = radius + pad
+        x0 = max(cx0, int(math.floor((min(ax, ax + dx) - reach - origin[0]) / size)))
+        x1 = min(cx1 - 1, int(math.floor((max(ax, ax + dx) + reach - origin[0]) / size)))
+        y0 = max(cy0, int(math.floor((min(ay, ay + dy) - reach - origin[1]) / size)))
+        y1 = min(cy1 - 1, int(math.floor((max(ay, ay + dy) + reach - origin[1]) / size)))
+        if x0 > x1 or y0 > y1:
+            continue
+        z0 = max(0, int(math.floor((min(az, az + dz) - pad - origin[2]) / size)))
+        z1 = min(shape[2] - 1, int(math.floor((max(az, az + dz) + length + pad - origin[2]) / size)))
+        plan2 = dx * dx + dy * dy
+        for cx in range(x0, x1 + 1):
+            for cy in range(y0, y1 + 1):
+                row = (cx * shape[1] + cy) * shape[2]
+                if first[row + z0] == first[row + z1 + 1]:
+                    continue
+                px, py = origin[0] + (cx + 0.5) * size, origin[1] + (cy + 0.5) * size
+                side = plan_distance(px, py, ax, ay, dx, dy, plan2) - half - radius
+                if side > pad:
+                    continue
+                for c in range(row + z0, row + z1 + 1):
+                    if first[c] == first[c + 1] or side > left[c] + TOUCH:
+                        continue
+                    pz = origin[2] + (c - row + 0.5) * size
+                    if _gap(px, py, pz, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) \
+                            > left[c] + 0.5 * math.sqrt(3.0) * size + TOUCH:
+                        continue
+                    most = 0.0
+                    for i in range(first[c], first[c + 1]):
+                        _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, plan2,
+                                    radius, corner, length)
+                        most = max(most, residual[i])
+                    left[c] = most

@@ -1,0 +1,247 @@
+"""Where a straight ray meets the volume that a cutting part sweeps along a straight move.
+
+Notation
+    p, n     : start and unit direction of the ray, p + t n
+    A, D     : tip at the start of the move and its displacement; the tip is A + s D, 0 <= s <= 1
+    q        : p - A
+    R, r, L  : radius, corner radius and flute length of the cutting part; a = R - r
+    h        : height over the tip, h(s, t) = q_z + t n_z - s D_z
+
+The cutting part is convex and a translation keeps it so: the swept volume is convex and the ray meets
+it in one interval of t. In the plane (s, t) a swept sphere or cylinder is an ellipse, the limits of the
+move and of the height are lines, and the interval is the extent in t of their intersection: it is
+reached at an extreme of the ellipse or on one of the four lines, all of them quadratics.
+A torus corner is a disc of radius a grown by r: the distance to the swept disc is convex in t, so
+Newton's step from outside never passes the root.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+INF = np.inf
+FLAT_RAY = 1e-9
+ROOT_ERROR = 1e-9
+
+
+@njit(cache=True, nogil=True)
+def _below_zero(a, b, c):
+    """The interval of x with a x² + 2 b x + c <= 0 for a >= 0; (inf, -inf) where there is none."""
+    if a <= 1e-18:
+        if abs(b) <= 1e-15:
+            return (-INF, INF) if c <= 0.0 else (INF, -INF)
+        x = -c / (2.0 * b)
+        return (-INF, x) if b > 0.0 else (x, INF)
+    disc = b * b - a * c
+    if disc < 0.0:
+        return INF, -INF
+    w = math.sqrt(disc)
+    return (-b - w) / a, (-b + w) / a
+
+
+@njit(cache=True, nogil=True)
+def _on_line_s(s, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
+    """Extent in t of the region on the line s = const."""
+    lo, hi = _below_zero(att, bt + ats * s, c + 2.0 * bs * s + ass * s * s)
+    if lo > hi:
+        return lo, hi
+    base = qz - s * dz
+    if abs(nz) <= FLAT_RAY:
+        if base < h0 - 1e-12 or base > h1 + 1e-12:
+            return INF, -INF
+        return lo, hi
+    ta, tb = (h0 - base) / nz, (h1 - base) / nz
+    lo, hi = max(lo, min(ta, tb)), min(hi, max(ta, tb))
+    return (lo, hi) if lo <= hi else (INF, -INF)
+
+
+@njit(cache=True, nogil=True)
+def _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz):
+    """Extent in t of the region on the line of constant height h (a ray that is not flat)."""
+    t0, t1 = (h - qz) / nz, dz / nz
+    a = att * t1 * t1 + 2.0 * ats * t1 + ass
+    b = att * t0 * t1 + ats * t0 + bt * t1 + bs
+    lo, hi = _below_zero(max(a, 0.0), b, att * t0 * t0 + 2.0 * bt * t0 + c)
+    lo, hi = max(lo, 0.0), min(hi, 1.0)
+    if lo > hi:
+        return INF, -INF
+    ta, tb = t0 + lo * t1, t0 + hi * t1
+    return min(ta, tb), max(ta, tb)
+
+
+@njit(cache=True, nogil=True)
+def quadric_interval(att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
+    """Extent in t of {att t² + 2 ats t s + ass s² + 2 bt t + 2 bs s + c <= 0, 0 <= s <= 1, h0 <= h <= h1}.
+
+    Returns (t_min, t_max), (inf, -inf) where the ray misses.
+    """
+    lo, hi = _on_line_s(0.0, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1)
+    if ass <= 1e-24 and abs(dz) <= 1e-12:
+        return lo, hi
+    u, v = _on_line_s(1.0, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1)
+    lo, hi = min(lo, u), max(hi, v)
+    for k in range(2):
+        h = h0 if k == 0 else h1
+        if abs(nz) > FLAT_RAY:
+            u, v = _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz)
+            lo, hi = min(lo, u), max(hi, v)
+        elif abs(dz) > 1e-12:
+            s = (qz - h) / dz
+            if 0.0 < s < 1.0:
+                u, v = _below_zero(att, bt + ats * s, c + 2.0 * bs * s + ass * s * s)
+                if u <= v:
+                    lo, hi = min(lo, u), max(hi, v)
+    if ats * ats < att * ass * (1.0 - 1e-12):
+        u, v = _below_zero(att - ats * ats / ass, bt - ats * bs / ass, c - bs * bs / ass)
+        if u <= v:
+            for k in range(2):
+                t = u if k == 0 else v
+                s = -(bs + ats * t) / ass
+                h = qz + t * nz - s * dz
+                if 0.0 <= s <= 1.0 and h0 <= h <= h1:
+                    lo, hi = min(lo, t), max(hi, t)
+    return lo, hi
+
+
+@njit(cache=True, nogil=True)
+def cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, h0, h1):
+    """Interval of t inside the sweep of a vertical cylinder h0 <= h <= h1."""
+    return quadric_interval(nx * nx + ny * ny, -(nx * dx + ny * dy), dx * dx + dy * dy, qx * nx + qy * ny,
+                            -(qx * dx + qy * dy), qx * qx + qy * qy - radius * radius, qz, nz, dz, h0, h1)
+
+
+@njit(cache=True, nogil=True)
+def sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre, h1):
+    """Interval of t inside the sweep of a sphere centred at height ``centre``, cut off above height h1."""
+    z = qz - centre
+    return quadric_interval(nx * nx + ny * ny + nz * nz, -(nx * dx + ny * dy + nz * dz), dx * dx + dy * dy + dz * dz,
+                            qx * nx + qy * ny + z * nz, -(qx * dx + qy * dy + z * dz),
+                            qx * qx + qy * qy + z * z - radius * radius, qz, nz, dz, -1e300, h1)
+
+
+@njit(cache=True, nogil=True)
+def capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre):
+    """Least t inside the sweep of a whole sphere: inf where missed, NaN where the ray runs along the move.
+
+    t_min(s) of the standing spheres is convex in s, so an extreme outside 0..1 moves to the nearer end.
+    """
+    z = qz - centre
+    ats, ass = -(nx * dx + ny * dy + nz * dz), dx * dx + dy * dy + dz * dz
+    bt, bs = qx * nx + qy * ny + z * nz, -(qx * dx + qy * dy + z * dz)
+    c = qx * qx + qy * qy + z * z - radius * radius
+    s = 0.0
+    if ass > 1e-24:
+        a = 1.0 - ats * ats / ass
+        if a < 1e-9:
+            return np.nan
+        b = bt - ats * bs / ass
+        disc = b * b - a * (c - bs * bs / ass)
+        if disc < 0.0:
+            return INF
+        t = (-b - math.sqrt(disc)) / a
+        s = -(bs + ats * t) / ass
+        if 0.0 <= s <= 1.0:
+            return t
+        s = 0.0 if s < 0.0 else 1.0
+    b = bt + ats * s
+    disc = b * b - (c + 2.0 * bs * s + ass * s * s)
+    return -b - math.sqrt(disc) if disc >= 0.0 else INF
+
+
+@njit(cache=True, nogil=True)
+def _disc_slope(s, qx, qy, qz, dx, dy, dz, a):
+    """d/ds of half the squared distance from q to the disc of radius a carried to s D."""
+    wx, wy, wz = qx - s * dx, qy - s * dy, qz - s * dz
+    rho = math.sqrt(wx * wx + wy * wy)
+    slope = -wz * dz
+    if rho > a:
+        slope -= (rho - a) / rho * (wx * dx + wy * dy)
+    return slope
+
+
+@njit(cache=True, nogil=True)
+def _disc_nearest(qx, qy, qz, dx, dy, dz, a):
+    """The s in [0, 1] at which a horizontal disc of radius a carried along D is nearest to q."""
+    lo, hi = 0.0, 1.0
+    flo = _disc_slope(lo, qx, qy, qz, dx, dy, dz, a)
+    if flo >= 0.0:
+        return lo
+    fhi = _disc_slope(hi, qx, qy, qz, dx, dy, dz, a)
+    if fhi <= 0.0:
+        return hi
+    side = 0
+    for _ in range(60):
+        s = (lo * fhi - hi * flo) / (fhi - flo)
+        f = _disc_slope(s, qx, qy, qz, dx, dy, dz, a)
+        if abs(f) < 1e-14 or hi - lo < 1e-13:
+            return s
+        if f < 0.0:
+            lo, flo = s, f
+            if side == -1:
+                fhi *= 0.5
+            side = -1
+        else:
+            hi, fhi = s, f
+            if side == 1:
+                flo *= 0.5
+            side = 1
+    return 0.5 * (lo + hi)
+
+
+@njit(cache=True, nogil=True)
+def disc_distance(qx, qy, qz, nx, ny, nz, dx, dy, dz, a):
+    """Distance from q to the swept disc and its derivative along n."""
+    s = _disc_nearest(qx, qy, qz, dx, dy, dz, a)
+    wx, wy, wz = qx - s * dx, qy - s * dy, qz - s * dz
+    rho = math.sqrt(wx * wx + wy * wy)
+    over = max(rho - a, 0.0)
+    dist = math.sqrt(over * over + wz * wz)
+    if dist == 0.0:
+        return 0.0, 0.0
+    radial = (wx * nx + wy * ny) / rho if over > 0.0 else 0.0
+    return dist, (over * radial + wz * nz) / dist
+
+
+@njit(cache=True, nogil=True)
+def _disc_root(t, limit, sign, qx, qy, qz, nx, ny, nz, dx, dy, dz, a, r):
+    """Newton from t (outside) in the direction of ``sign`` to distance r; NaN where the ray passes by."""
+    for _ in range(80):
+        dist, slope = disc_distance(qx + t * nx, qy + t * ny, qz + t * nz, nx, ny, nz, dx, dy, dz, a)
+        if dist - r <= ROOT_ERROR:
+            return t
+        if slope * sign >= -1e-12:
+            return np.nan
+        t -= (dist - r) / slope
+        if (t - limit) * sign > 0.0:
+            return np.nan
+    return t
+
+
+@njit(cache=True, nogil=True)
+def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
+    """Interval of t inside the sweep of a disc of radius R - r at height r grown by r (error 1e-9 mm)."""
+    lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r, 1e300)
+    if lo > hi:
+        return INF, -INF
+    z, a = qz - r, radius - r
+    first = _disc_root(lo, hi, 1.0, qx, qy, z, nx, ny, nz, dx, dy, dz, a, r)
+    if math.isnan(first):
+        return INF, -INF
+    last = _disc_root(hi, first, -1.0, qx, qy, z, nx, ny, nz, dx, dy, dz, a, r)
+    return first, (first if math.isnan(last) else last)
+
+
+@njit(cache=True, nogil=True)
+def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length):
+    """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
+    lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)
+    if corner <= 0.0:
+        return lo, hi
+    if corner >= radius - 1e-12:
+        u, v = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, radius, length)
+    else:
+        u, v = torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner)
+    return min(lo, u), max(hi, v)
