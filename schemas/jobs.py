@@ -1,0 +1,130 @@
+"""Jobs, their files and pages of them, as the HTTP interface shows them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from schemas.base import ReportModel
+from schemas.machine import Machine
+from schemas.materials import Material
+from schemas.problem import Problem
+from schemas.tools import Tool
+
+JobKind = Literal["plan", "zones", "verify"]
+JobState = Literal["queued", "running", "proved", "unproved", "done", "failed", "cancelled"]
+FINAL_STATES = ("proved", "unproved", "done", "failed", "cancelled")
+
+
+class JobLinks(ReportModel):
+    """Paths of what belongs to a job; null where the kind of job has no such thing."""
+
+    self: str
+    events: str
+    zones: str | None = None
+    report: str | None = None
+    files: str | None = None
+
+
+class Job(ReportModel):
+    """One job."""
+
+    id: Annotated[str, Field(description="Id of the job.", examples=["j0192f0c4a1b27c3d8e9f0a1b2c3d4e5f"])]
+    kind: Annotated[JobKind, Field(description="plan: the whole chain; zones: dry check; verify: proof of a program.")]
+    state: Annotated[JobState, Field(description="queued and running come first; all others are final. done ends a "
+                                                 "zones job, which proves nothing.")]
+    stage: Annotated[str, Field(description="What it is doing, for people.", examples=["finishing"])]
+    progress: Annotated[float, Field(ge=0, le=1, description="Share done, 0 to 1; never goes back while an attempt "
+                                                             "runs.")]
+    attempt: Annotated[int, Field(ge=0, description="How often it was started.")]
+    content_sha256: Annotated[str, Field(description="Hash of part and canonical setup (and program).")]
+    part_sha256: Annotated[str, Field(description="Hash of the part's bytes.")]
+    setup_sha256: Annotated[str, Field(description="Hash of the canonical setup.")]
+    labels: dict[str, str] = {}
+    created_at: Annotated[str, Field(description="UTC, ISO 8601.", examples=["2026-01-31T12:00:00Z"])]
+    finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while not final.")] = None
+    error: Annotated[Problem | None, Field(description="Why it failed.")] = None
+    links: JobLinks
+
+
+class JobPage(ReportModel):
+    """A page of jobs, newest first."""
+
+    items: list[Job]
+    next_cursor: Annotated[str | None, Field(description="Give it as ?cursor= for the next page; null at the "
+                                                         "end.")] = None
+
+
+class JobFile(ReportModel):
+    """One file of a job."""
+
+    name: str
+    size_bytes: Annotated[int, Field(ge=0)]
+    sha256: str
+    media_type: str
+    href: str
+
+
+class JobFiles(ReportModel):
+    """The files of a job. Programs and STEP-NC stand here only when the job is proved."""
+
+    items: list[JobFile]
+    withheld: Annotated[str | None, Field(description="Why programs are missing, null when nothing is.")] = None
+
+
+class JobEvent(ReportModel):
+    """What one server-sent event carries as data."""
+
+    id: str
+    state: JobState
+    stage: str
+    progress: Annotated[float, Field(ge=0, le=1)]
+
+
+class ToolEntry(ReportModel):
+    """A tool of the library; a setup refers to it as "lib:NAME"."""
+
+    name: str
+    entry: Tool
+
+
+class MachineEntry(ReportModel):
+    """A machine of the library."""
+
+    name: str
+    entry: Machine
+
+
+class MaterialEntry(ReportModel):
+    """A material of the library, or a built-in one."""
+
+    name: str
+    entry: Material
+    built_in: Annotated[bool, Field(description="Built-in materials are used by their name alone and cannot be "
+                                                "changed.")] = False
+
+
+class ToolList(ReportModel):
+    """All tools of the library."""
+
+    items: list[ToolEntry]
+
+
+class MachineList(ReportModel):
+    """All machines of the library."""
+
+    items: list[MachineEntry]
+
+
+class MaterialList(ReportModel):
+    """All materials, built-in ones first."""
+
+    items: list[MaterialEntry]
+
+
+class Health(ReportModel):
+    """Answer of /healthz and /readyz."""
+
+    status: Annotated[Literal["ok", "unready"], Field(description="ok, or unready with the reason in checks.")]
+    checks: dict[str, str] = {}

@@ -1,0 +1,124 @@
+"""Files by content: uploads as blobs, results as folders, all written as temporary, fsync, rename.
+
+    data/blobs/ab/abcdef....bin     an upload, named by the SHA-256 of its bytes
+    data/artifacts/ab/abcdef.../    a result, named by the hash of code version, kind and inputs
+    data/tmp/                       what is being written; worthless after a crash
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import uuid
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+
+PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
+
+
+@lru_cache(maxsize=1)
+def code_version() -> str:
+    """Hash over every source file that can change a result, hex."""
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(f"{path.relative_to(root)}\0".encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256: str | None = None) -> str:
+    """Name of a result: same code, kind, part, setup and program give the same key."""
+    text = "\n".join((code_version(), kind, part_sha256, setup_sha256, program_sha256 or ""))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's entries to the disk."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def sync_tree(folder: Path) -> None:
+    """Flush every file and folder below ``folder`` to the disk."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            with path.open("rb") as handle:
+                os.fsync(handle.fileno())
+        elif path.is_dir():
+            sync_folder(path)
+    sync_folder(folder)
+
+
+class Artifacts:
+    """Blobs and results below one data folder."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root.resolve()
+        self.tmp = self.root / "tmp"
+        self.tmp.mkdir(parents=True, exist_ok=True)
+
+    def blob(self, sha256: str) -> Path:
+        """Where the blob of that hash lies."""
+        return self.root / "blobs" / sha256[:2] / f"{sha256}.bin"
+
+    def put_blob(self, chunks: Iterable[bytes]) -> tuple[str, int]:
+        """Store bytes; returns their SHA-256 and their number. What is there already is left alone."""
+        digest, size = hashlib.sha256(), 0
+        temporary = self.tmp / f"blob-{uuid.uuid4().hex}"
+        try:
+            with temporary.open("wb") as out:
+                for chunk in chunks:
+                    digest.update(chunk)
+                    size += len(chunk)
+                    out.write(chunk)
+                out.flush()
+                os.fsync(out.fileno())
+            target = self.blob(digest.hexdigest())
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(temporary, target)
+            sync_folder(target.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+        return digest.hexdigest(), size
+
+    def result(self, key: str) -> Path:
+        """Where the result of that key lies, once it is there."""
+        return self.root / "artifacts" / key[:2] / key
+
+    def has_result(self, key: str) -> bool:
+        """Whether the result is there; a result appears by one rename, so it is whole."""
+        return self.result(key).is_dir()
+
+    def workspace(self) -> Path:
+        """A fresh empty folder to write a result into."""
+        folder = self.tmp / f"result-{uuid.uuid4().hex}"
+        folder.mkdir()
+        return folder
+
+    def commit(self, workspace: Path, key: str) -> None:
+        """Make a workspace the result of ``key``; if that exists already, the workspace is dropped."""
+        sync_tree(workspace)
+        target = self.result(key)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.rename(workspace, target)
+        except OSError:
+            if not target.is_dir():
+                raise
+            shutil.rmtree(workspace, ignore_errors=True)  # another job with the same content was faster
+        sync_folder(target.parent)
+
+    def sweep(self) -> None:
+        """Drop what a crash left half written; only for the sole owner of the data folder."""
+        for path in self.tmp.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)

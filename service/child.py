@@ -1,0 +1,104 @@
+# The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
+"""``python -m service.child REQUEST.json FD``: run one job, send progress lines to the pipe FD.
+
+The request is {"kind", "part", "setup", "program", "out", "chain", "address_bytes"}. Lines on the pipe are JSON:
+{"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
+"""
+
+
+def guard(parent, address_bytes):
+    """Die with the parent, leave no core file, and keep a soft limit on the address space."""
+    import ctypes
+    import os
+    import resource
+    import signal
+    import sys
+
+    ctypes.CDLL(None, use_errno=True).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        sys.exit(1)  # the parent died before the request above took effect
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    soft = address_bytes if hard == resource.RLIM_INFINITY else min(address_bytes, hard)
+    # The hard limit stays: the STEP reader, a child of this one, sets its own.
+    resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def reporter(send, interval=0.2):
+    """The ``progress(stage, fraction)`` callback: sends every change of stage, and fractions a few times a second."""
+    import time
+
+    last = {"stage": "", "at": 0.0, "progress": 0.0}
+
+    def progress(stage, fraction):
+        now = time.monotonic()
+        last["progress"] = max(last["progress"], float(fraction))
+        if stage == last["stage"] and now - last["at"] < interval:
+            return
+        last["stage"], last["at"] = stage, now
+        send({"stage": str(stage), "progress": last["progress"]})
+
+    return progress
+
+
+def compute(request, progress):
+    """Run the chain as the request says, leave its files in the out folder, and return the final state."""
+    import importlib
+    import json
+    from pathlib import Path
+
+    from service.convert import parse_setup
+
+    chain = importlib.import_module(request["chain"])
+    part, out = Path(request["part"]), Path(request["out"])
+    setup = parse_setup(request["setup"])
+    if request["kind"] == "plan":
+        result, name = chain.plan(part, setup, out, progress), "report.json"
+        state = result["state"]
+    elif request["kind"] == "zones":
+        result, name = chain.zones_only(part, setup, progress), "zones.json"
+        state = "done"
+    else:
+        text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
+        result, name = chain.verify_program(part, setup, text, progress), "report.json"
+        state = "unproved" if result["findings"] else "proved"
+    if not (out / name).exists():
+        (out / name).write_text(json.dumps(result, indent=1, sort_keys=True, allow_nan=False) + "\n")
+    return state
+
+
+def main(argv):
+    """Entry; see the module."""
+    import json
+    import os
+    import traceback
+
+    with open(argv[1], encoding="utf-8") as handle:
+        request = json.load(handle)
+    pipe = int(argv[2])
+    guard(request["parent"], request["address_bytes"])
+    from geometry.errors import CamError, InternalError, ResourceError
+
+    def send(message):
+        os.write(pipe, (json.dumps(message, default=str) + "\n").encode())
+
+    try:
+        send({"state": compute(request, reporter(send))})
+        return 0
+    except CamError as error:
+        send({"error": error.as_dict()})
+    except MemoryError:
+        limit = request["address_bytes"]
+        send({"error": ResourceError(f"the job needed more address space than {limit / 1e9:.1f} GB",
+                                     code="job_memory", limit=limit).as_dict()})
+    except Exception as error:
+        traceback.print_exc()
+        send({"error": InternalError(f"{type(error).__name__}: {error}", code="bug",
+                                     remedy="please report it with part and setup").as_dict()})
+    return 3
+
+
+if __name__ == "__main__":
+    import sys
+
+    sys.exit(main(sys.argv))

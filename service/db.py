@@ -1,0 +1,86 @@
+"""Tables, connections and migrations. The database alone is the truth about jobs."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy import Column, Float, Integer, String, Text
+from sqlalchemy.engine import Engine
+
+metadata = sa.MetaData()
+
+jobs = sa.Table(
+    "jobs", metadata,
+    Column("id", String(40), primary_key=True),
+    Column("kind", String(16), nullable=False),
+    Column("principal", String(100), nullable=False),
+    Column("idempotency_key", String(255), nullable=True),
+    Column("content_sha256", String(64), nullable=False),
+    Column("part_sha256", String(64), nullable=False),
+    Column("setup_sha256", String(64), nullable=False),
+    Column("program_sha256", String(64), nullable=True),
+    Column("setup_json", Text, nullable=False),
+    Column("labels_json", Text, nullable=False),
+    Column("state", String(16), nullable=False),
+    Column("stage", String(200), nullable=False),
+    Column("progress", Float, nullable=False),
+    Column("event_seq", Integer, nullable=False),
+    Column("attempt", Integer, nullable=False),
+    Column("lease_owner", String(80), nullable=True),
+    Column("lease_until", Float, nullable=True),
+    Column("artifact", String(64), nullable=True),
+    Column("error_json", Text, nullable=True),
+    Column("created", Float, nullable=False),
+    Column("finished", Float, nullable=True),
+    sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
+    sa.Index("ix_jobs_state", "state", "lease_until"),
+    sa.Index("ix_jobs_principal", "principal", "id"),
+)
+
+library = sa.Table(
+    "library", metadata,
+    Column("shelf", String(16), primary_key=True),
+    Column("name", String(64), primary_key=True),
+    Column("entry_json", Text, nullable=False),
+)
+
+
+def connect(url: str) -> Engine:
+    """An engine for a database URL; SQLite runs in WAL mode with full synchronisation.
+
+    One engine per URL and process: Dask tasks call this again and again.
+    """
+    return _connect(url)
+
+
+@lru_cache(maxsize=16)
+def _connect(url: str) -> Engine:
+    if not url.startswith("sqlite"):
+        return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=20)
+    engine = sa.create_engine(url, connect_args={"timeout": 30, "check_same_thread": False})
+    sa.event.listen(engine, "connect", _pragmas)
+    return engine
+
+
+def _pragmas(connection: Any, _record: Any) -> None:
+    cursor = connection.cursor()
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "busy_timeout=30000", "foreign_keys=ON"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
+
+
+def migrate(url: str) -> None:
+    """Bring the database to the newest schema (Alembic), making it first where it does not exist."""
+    from alembic import command
+    from alembic.config import Config
+
+    if url.startswith("sqlite:///"):
+        Path(url.removeprefix("sqlite:///")).parent.mkdir(parents=True, exist_ok=True)
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+    with connect(url).connect() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

@@ -1,0 +1,178 @@
+"""Hands queued jobs to Dask, never more than it has room for; holds nothing that the database does not know.
+
+Embedded, the cluster is a thread pool inside this process and the data folder belongs to this process alone. With a
+scheduler address it is a real cluster, and several services may share database and data folder.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from typing import IO, Any
+
+import structlog
+
+from geometry.errors import ResourceError, SetupError
+from service.artifacts import Artifacts
+from service.db import connect, migrate
+from service.settings import Settings
+from service.store import JobStore, LibraryStore
+from service.supervisor import Limits
+from service.work import WorkConfig, run_job
+
+log = structlog.get_logger(__name__)
+
+
+class Engine:
+    """Database, files and dispatcher of one service process.
+
+    >>> engine = Engine(Settings())      # doctest: +SKIP
+    >>> engine.start(); engine.close()   # doctest: +SKIP
+    """
+
+    def __init__(self, settings: Settings, chain: str = "service.chain") -> None:
+        self.settings = settings
+        self.owner = f"service-{uuid.uuid4().hex}"
+        self.work = WorkConfig(
+            settings.url, str(settings.data_dir.resolve()),
+            Limits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.child_threads,
+                   settings.poll_s),
+            settings.lease_s, chain)
+        self._wake, self._stop = threading.Event(), threading.Event()
+        self._lock: IO[str] | None = None
+        self._client: Any = None
+        self._cluster: Any = None
+        self._thread: threading.Thread | None = None
+        self._futures: dict[str, Any] = {}
+
+    def start(self) -> None:
+        """Open data folder and database, start the cluster and the dispatcher.
+
+        Raises
+        ------
+        SetupError
+            Another service uses this data folder (code 'data_dir_in_use').
+        """
+        self.artifacts = Artifacts(self.settings.data_dir)
+        embedded = self.settings.scheduler is None
+        if embedded:
+            self._lock_data_dir()
+        migrate(self.settings.url)
+        self.jobs = JobStore(connect(self.settings.url))
+        self.library = LibraryStore(connect(self.settings.url))
+        if embedded:
+            self.artifacts.sweep()
+            if left := self.jobs.release():
+                log.info("jobs of an earlier run taken up again", jobs=left)
+        self._open_client()
+        self._thread = threading.Thread(target=self._dispatch, name="dispatcher", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop dispatching and end the embedded cluster; its running jobs are left to the next start."""
+        self._stop.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(timeout=10)
+        if self._cluster is not None:
+            self.jobs.disown()
+            self._await_idle()
+        for part in (self._client, self._cluster):
+            if part is not None:
+                part.close(timeout=10)
+        if self._lock is not None:
+            self._lock.close()
+        log.info("engine closed")
+
+    def _await_idle(self, patience_s: float = 5.0) -> None:
+        """Wait until the worker threads have seen that their jobs were taken away and have killed the children."""
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline and not all(f.done() for f in self._futures.values()):
+            time.sleep(0.05)
+
+    def wake(self) -> None:
+        """Look for queued jobs now rather than at the next round."""
+        self._wake.set()
+
+    def ready(self) -> dict[str, str]:
+        """What the engine needs, each 'ok' or the reason why not."""
+        return {"database": _outcome(self.jobs.running), "engine": _outcome(self._check_engine)}
+
+    def capacity(self) -> int:
+        """Jobs that can run at a time."""
+        return sum(self._client.nthreads().values()) if self._client is not None else 0
+
+    def _check_engine(self) -> None:
+        if self._thread is None or not self._thread.is_alive():
+            raise RuntimeError("the dispatcher has stopped")
+        if self.capacity() == 0:
+            raise RuntimeError("no worker is connected")
+
+    def _lock_data_dir(self) -> None:
+        self._lock = (self.settings.data_dir / "lock").open("w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._lock.close()
+            raise SetupError(f"another service uses the data folder {self.settings.data_dir}", code="data_dir_in_use",
+                             remedy="stop it, or give this one its own --data") from None
+
+    def _open_client(self) -> None:
+        import dask
+        from distributed import Client, LocalCluster
+
+        dask.config.set({"distributed.scheduler.allowed-failures": 2})
+        if self.settings.scheduler is not None:
+            self._client = Client(self.settings.scheduler, set_as_default=False)
+            return
+        # Both dashboard addresses: without them Dask listens on 0.0.0.0.
+        self._cluster = LocalCluster(processes=False, n_workers=1, threads_per_worker=self.settings.workers,
+                                     memory_limit=0, dashboard_address="127.0.0.1:0",
+                                     worker_dashboard_address="127.0.0.1:0")
+        self._client = Client(self._cluster, set_as_default=False)
+
+    def _dispatch(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._reap()
+                self.jobs.give_up(self.settings.max_attempts)
+                while self.jobs.running() < self.capacity() and self._submit():
+                    pass
+            except Exception:
+                log.exception("dispatcher stumbled")  # database or scheduler away: the next round tries again
+            self._wake.wait(timeout=self.settings.poll_s)
+            self._wake.clear()
+
+    def _submit(self) -> bool:
+        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts)
+        if row is None:
+            return False
+        key = f"{row['id']}-{row['attempt']}"
+        future = self._client.submit(run_job, row["id"], row["attempt"], self.work.as_dict(), key=key, pure=False,
+                                     retries=0)
+        self._futures[key] = future
+        future.add_done_callback(lambda _: self.wake())
+        return True
+
+    def _reap(self) -> None:
+        for key, future in [(k, f) for k, f in self._futures.items() if f.done()]:
+            del self._futures[key]
+            if future.status != "error":
+                continue
+            job_id, _, attempt = key.rpartition("-")
+            error = ResourceError(f"the workers that ran the job were lost ({future.exception()!r})",
+                                  code="worker_lost", remedy="look into the log of the workers")
+            log.error("task lost", job=job_id, attempt=attempt, error=str(future.exception()))
+            if self.jobs.take_over(job_id, int(attempt), self.owner, self.settings.lease_s):
+                self.jobs.finish(job_id, self.owner, "failed", error=error)
+
+
+def _outcome(check: Callable[[], Any]) -> str:
+    try:
+        check()
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return "ok"

@@ -1,0 +1,147 @@
+"""Errors of the service itself, and the one table from error class to HTTP problem and exit code.
+
+    CamError
+    └── ServiceError          something about the request, not about part or plan
+        ├── NotFoundError         no such job, file, entry or path
+        ├── MethodError           the path exists, the method does not
+        ├── UnauthorizedError     no token, or a wrong one
+        ├── TooLargeError         the request body is larger than the limit
+        ├── RequestError          the request is malformed: missing part, bad cursor
+        ├── KeyConflictError      an Idempotency-Key used before with other content
+        ├── NotReadyError         the job has no such result yet
+        ├── WithheldError         programs of a job that is not proved
+        ├── RateError             too many requests
+        └── UnavailableError      database or engine cannot be reached
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from geometry import errors as cam
+from geometry.errors import CamError
+
+
+class ServiceError(CamError):
+    """Something about the request."""
+
+    default_code = "bad_request"
+
+
+class NotFoundError(ServiceError):
+    """No such job, file, entry or path."""
+
+    default_code = "not_found"
+
+
+class MethodError(ServiceError):
+    """The path exists, the method does not."""
+
+    default_code = "method_not_allowed"
+
+
+class UnauthorizedError(ServiceError):
+    """No bearer token, or a wrong one."""
+
+    default_code = "unauthorized"
+
+
+class TooLargeError(ServiceError):
+    """The request body is larger than the service takes."""
+
+    default_code = "body_too_large"
+
+
+class RequestError(ServiceError):
+    """The request is malformed."""
+
+    default_code = "malformed_request"
+
+
+class KeyConflictError(ServiceError):
+    """This Idempotency-Key was used before with other content."""
+
+    default_code = "idempotency_key_reused"
+
+
+class NotReadyError(ServiceError):
+    """The job has no such result, or not yet."""
+
+    default_code = "not_ready"
+
+
+class WithheldError(ServiceError):
+    """The programs of a job that is not proved are not handed out."""
+
+    default_code = "program_withheld"
+
+
+class RateError(ServiceError):
+    """Too many requests."""
+
+    default_code = "too_many_requests"
+
+
+class UnavailableError(ServiceError):
+    """The database or the engine cannot be reached."""
+
+    default_code = "unavailable"
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What an error class means outside: HTTP status, slug and title of the problem, exit code of the program."""
+
+    status: HTTPStatus
+    slug: str
+    title: str
+    exit_code: int
+
+
+_S = HTTPStatus
+ERROR_TABLE: dict[type[CamError], Mapping] = {
+    cam.CamError: Mapping(_S.INTERNAL_SERVER_ERROR, "error", "Something went wrong", 1),
+    cam.InputError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-input", "The input is wrong", 2),
+    cam.StepError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-step", "The STEP file cannot be used", 2),
+    cam.PartError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-part", "The part cannot be planned as it is", 2),
+    cam.SetupError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-setup", "The setup is wrong", 2),
+    cam.ProgramError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-program", "The NC program cannot be read", 2),
+    cam.GeometryError: Mapping(_S.INTERNAL_SERVER_ERROR, "geometry-failed", "A computation did not converge", 1),
+    cam.ResourceError: Mapping(_S.SERVICE_UNAVAILABLE, "out-of-resources", "A limit was reached", 1),
+    cam.PlanningError: Mapping(_S.INTERNAL_SERVER_ERROR, "planning-failed", "No plan could be made", 1),
+    cam.VerificationError: Mapping(_S.INTERNAL_SERVER_ERROR, "verification-failed", "The proof broke off", 1),
+    cam.OutputError: Mapping(_S.INTERNAL_SERVER_ERROR, "output-failed", "A file could not be written", 1),
+    cam.CancelledError: Mapping(_S.CONFLICT, "cancelled", "The job was cancelled", 1),
+    cam.InternalError: Mapping(_S.INTERNAL_SERVER_ERROR, "internal-error", "A bug", 1),
+    ServiceError: Mapping(_S.BAD_REQUEST, "bad-request", "The request is wrong", 2),
+    NotFoundError: Mapping(_S.NOT_FOUND, "not-found", "No such thing", 2),
+    MethodError: Mapping(_S.METHOD_NOT_ALLOWED, "method-not-allowed", "This method is not offered here", 2),
+    UnauthorizedError: Mapping(_S.UNAUTHORIZED, "unauthorized", "A valid bearer token is needed", 2),
+    TooLargeError: Mapping(_S.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large", 2),
+    RequestError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-request", "The request is wrong", 2),
+    KeyConflictError: Mapping(_S.UNPROCESSABLE_ENTITY, "key-conflict", "The key was used for other content", 2),
+    NotReadyError: Mapping(_S.CONFLICT, "not-ready", "The job has no such result", 2),
+    WithheldError: Mapping(_S.CONFLICT, "withheld", "Programs of an unproved job are withheld", 3),
+    RateError: Mapping(_S.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests", 2),
+    UnavailableError: Mapping(_S.SERVICE_UNAVAILABLE, "unavailable", "The service is not ready", 1),
+}
+"""Every error class of the project; a test walks the tree and compares."""
+
+EXIT_PROVED, EXIT_BUG, EXIT_INPUT, EXIT_UNPROVED = 0, 1, 2, 3
+
+
+def mapping_of(error: CamError) -> Mapping:
+    """The row of an error's class, or of its nearest base in the table."""
+    return next(ERROR_TABLE[c] for c in type(error).__mro__ if c in ERROR_TABLE)
+
+
+def problem_document(error: CamError, instance: str | None = None, request_id: str | None = None) -> dict[str, Any]:
+    """The problem+json members of an error (RFC 9457), as plain data."""
+    row = mapping_of(error)
+    return {
+        "type": f"urn:zonemill:problem:{row.slug}:{error.code}", "title": row.title, "status": int(row.status),
+        "detail": error.message, "instance": instance, "code": error.code, "subjects": list(error.subjects),
+        "measured": error.measured, "limit": error.limit, "remedy": error.remedy, "request_id": request_id,
+    }

@@ -1,0 +1,92 @@
+"""Every setting of the service; read from the environment (``ZONEMILL_PORT=9000``) or given in code.
+
+Each is described in docs/settings.md; a test keeps the page complete.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, SecretStr
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from geometry.errors import SetupError
+
+
+def _cores() -> int:
+    return max(1, len(os.sched_getaffinity(0)))
+
+
+class Settings(BaseSettings):
+    """Settings with their defaults."""
+
+    model_config = SettingsConfigDict(env_prefix="ZONEMILL_", extra="ignore")
+
+    host: Annotated[str, Field(description="Address to listen on.")] = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")] = 8000
+    data_dir: Annotated[Path, Field(description="Folder of uploads, results and the embedded database.")] = Path("data")
+    database_url: Annotated[str | None, Field(
+        description="SQLAlchemy URL; unset: SQLite inside data_dir. PostgreSQL: postgresql+psycopg://...")] = None
+    scheduler: Annotated[str | None, Field(
+        description="Address of a Dask scheduler (tcp://host:8786); unset: embedded.")] = None
+    workers: Annotated[int, Field(ge=1, le=1024, description="Jobs at a time of the embedded engine.")] = max(
+        1, _cores() // 2)
+    child_threads: Annotated[int, Field(ge=1, le=1024, description="Kernel threads of one job.")] = max(
+        1, _cores() // max(1, _cores() // 2))
+    job_time_limit_s: Annotated[float, Field(gt=0, description="Wall time of one attempt, s.")] = 1800.0
+    job_memory_limit_mb: Annotated[int, Field(ge=64, description="Resident memory of a job, its children counted, "
+                                                                 "MB.")] = 8000
+    max_attempts: Annotated[int, Field(ge=1, le=10, description="How often a job is started when its process is "
+                                                                "lost.")] = 3
+    lease_s: Annotated[float, Field(gt=0, description="How long a silent worker keeps a job, s.")] = 20.0
+    poll_s: Annotated[float, Field(gt=0, le=5, description="How often cancel and progress are looked at, s.")] = 0.2
+    max_body_mb: Annotated[float, Field(gt=0, description="Largest request body, MB.")] = 256.0
+    tokens: Annotated[dict[str, SecretStr], Field(
+        description="Bearer tokens by principal, as JSON: {\"alice\": \"...\"}; empty: no token is asked for.")] = {}
+    insecure: Annotated[bool, Field(description="Listen beyond loopback without tokens.")] = False
+    post_rate: Annotated[str, Field(description="Most job submissions of a principal, for example 120/minute.")
+                         ] = "120/minute"
+    log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Least level logged.")
+                         ] = "info"
+    log_format: Annotated[Literal["console", "json"], Field(description="Form of the log on stderr.")] = "console"
+
+    @property
+    def url(self) -> str:
+        """Database URL in use."""
+        return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'zonemill.db'}"
+
+    @property
+    def max_body_bytes(self) -> int:
+        """Largest request body, bytes."""
+        return int(self.max_body_mb * 1_000_000)
+
+    def check_exposure(self) -> None:
+        """Refuse to listen beyond loopback without tokens unless ``insecure`` says so.
+
+        Raises
+        ------
+        SetupError
+            Code 'exposed_without_token'.
+        """
+        if self.tokens or self.insecure or is_loopback(self.host):
+            return
+        raise SetupError(f"{self.host} can be reached from other machines, and no bearer token is set",
+                         code="exposed_without_token", subjects=(self.host,),
+                         remedy="set ZONEMILL_TOKENS, listen on 127.0.0.1, or say --insecure")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address can be reached from this machine only.
+
+    >>> is_loopback("127.0.0.1"), is_loopback("::1"), is_loopback("0.0.0.0")
+    (True, True, False)
+    """
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

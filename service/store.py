@@ -1,0 +1,259 @@
+"""Jobs in the database: every change is one guarded statement, so two writers cannot both win.
+
+States: queued -> running -> proved | unproved | done | failed, and cancelled from queued or running. A running job
+belongs to the holder of its lease; a job whose lease has run out may be claimed again while attempts are left.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Engine, RowMapping
+from sqlalchemy.exc import IntegrityError
+
+from geometry.errors import CamError, ResourceError
+from service.db import jobs, library
+from service.errors import KeyConflictError, NotFoundError
+
+FINAL = ("proved", "unproved", "done", "failed", "cancelled")
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """What a client asked for."""
+
+    kind: str
+    principal: str
+    content_sha256: str
+    part_sha256: str
+    setup_sha256: str
+    setup_json: str
+    labels: dict[str, str]
+    program_sha256: str | None = None
+    idempotency_key: str | None = None
+
+
+def new_id() -> str:
+    """A job id that sorts by time of creation (microseconds) and cannot be guessed."""
+    return f"j{time.time_ns() // 1000:014x}{secrets.token_hex(9)}"
+
+
+class JobStore:
+    """The job table."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+
+    def create(self, new: NewJob) -> tuple[RowMapping, bool]:
+        """Queue a job, or find the one this Idempotency-Key already made.
+
+        Returns the row and whether it is new.
+
+        Raises
+        ------
+        KeyConflictError
+            The principal used the key before for other content.
+        """
+        values = {
+            "id": new_id(), "kind": new.kind, "principal": new.principal, "idempotency_key": new.idempotency_key,
+            "content_sha256": new.content_sha256, "part_sha256": new.part_sha256, "setup_sha256": new.setup_sha256,
+            "program_sha256": new.program_sha256, "setup_json": new.setup_json,
+            "labels_json": json.dumps(new.labels), "state": "queued", "stage": "queued", "progress": 0.0,
+            "event_seq": 1, "attempt": 0, "created": time.time(),
+        }
+        try:
+            with self.engine.begin() as c:
+                return c.execute(jobs.insert().values(values).returning(jobs)).mappings().one(), True
+        except IntegrityError:
+            found = self._by_key(new.principal, new.idempotency_key)
+            if found is None:
+                raise
+        if (found["kind"], found["content_sha256"]) != (new.kind, new.content_sha256):
+            raise KeyConflictError(
+                f"the Idempotency-Key belongs to job {found['id']}, which has other content",
+                subjects=(found["id"],), measured=new.content_sha256, limit=found["content_sha256"],
+                remedy="take a new key for new content")
+        return found, False
+
+    def _by_key(self, principal: str, key: str | None) -> RowMapping | None:
+        query = sa.select(jobs).where(jobs.c.principal == principal, jobs.c.idempotency_key == key)
+        with self.engine.connect() as c:
+            return c.execute(query).mappings().one_or_none()
+
+    def get(self, job_id: str, principal: str | None = None) -> RowMapping:
+        """One job; of that principal where one is given.
+
+        Raises
+        ------
+        NotFoundError
+            There is none.
+        """
+        query = sa.select(jobs).where(jobs.c.id == job_id)
+        if principal is not None:
+            query = query.where(jobs.c.principal == principal)
+        with self.engine.connect() as c:
+            row = c.execute(query).mappings().one_or_none()
+        if row is None:
+            raise NotFoundError(f"there is no job {job_id}", code="no_such_job", subjects=(job_id,))
+        return row
+
+    def page(self, principal: str, *, limit: int, before: str | None = None, state: str | None = None,
+             kind: str | None = None) -> list[RowMapping]:
+        """Up to ``limit`` jobs of a principal, newest first, older than the job ``before``."""
+        query = sa.select(jobs).where(jobs.c.principal == principal).order_by(jobs.c.id.desc()).limit(limit)
+        for column, value in ((jobs.c.state, state), (jobs.c.kind, kind)):
+            if value is not None:
+                query = query.where(column == value)
+        if before is not None:
+            query = query.where(jobs.c.id < before)
+        with self.engine.connect() as c:
+            return list(c.execute(query).mappings())
+
+    def claim(self, owner: str, lease_s: float, max_attempts: int) -> RowMapping | None:
+        """Take the oldest job that waits, or whose holder went silent; None when there is none."""
+        now = time.time()
+        expired = sa.and_(jobs.c.state == "running", jobs.c.lease_until < now)
+        oldest = (sa.select(jobs.c.id).where(sa.or_(jobs.c.state == "queued", expired), jobs.c.attempt < max_attempts)
+                  .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
+        change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired))
+                  .values(state="running", stage="starting", progress=0.0, attempt=jobs.c.attempt + 1,
+                          event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s)
+                  .returning(jobs))
+        with self.engine.begin() as c:
+            return c.execute(change).mappings().one_or_none()
+
+    def take_over(self, job_id: str, attempt: int, owner: str, lease_s: float) -> bool:
+        """Make ``owner`` the holder of that attempt; False when the attempt is no longer running."""
+        return self._change(
+            sa.and_(jobs.c.id == job_id, jobs.c.attempt == attempt, jobs.c.state == "running"),
+            lease_owner=owner, lease_until=time.time() + lease_s)
+
+    def renew(self, job_id: str, owner: str, lease_s: float) -> bool:
+        """Heartbeat: keep the lease; False when the job was cancelled or belongs to another holder."""
+        return self._change(self._held(job_id, owner), lease_until=time.time() + lease_s)
+
+    def is_held(self, job_id: str, owner: str) -> bool:
+        """Whether the job still runs and still belongs to ``owner``."""
+        with self.engine.connect() as c:
+            return c.execute(sa.select(jobs.c.id).where(self._held(job_id, owner))).first() is not None
+
+    def progress(self, job_id: str, owner: str, stage: str, fraction: float) -> bool:
+        """Record what the holder is doing; also a heartbeat's worth of proof that it lives."""
+        return self._change(self._held(job_id, owner), stage=stage[:200], progress=min(max(fraction, 0.0), 1.0),
+                            event_seq=jobs.c.event_seq + 1)
+
+    def finish(self, job_id: str, owner: str, state: str, *, artifact: str | None = None,
+               error: CamError | None = None) -> bool:
+        """End a job that ``owner`` holds; False when it was cancelled or taken over meanwhile."""
+        values: dict[str, Any] = {"progress": 1.0} if state != "failed" else {}
+        return self._change(self._held(job_id, owner), state=state, stage=state, artifact=artifact,
+                            error_json=json.dumps(error.as_dict()) if error else None, finished=time.time(),
+                            event_seq=jobs.c.event_seq + 1, lease_owner=None, lease_until=None, **values)
+
+    def cancel(self, job_id: str) -> bool:
+        """Cancel a job that has not ended; whoever runs it sees that at its next look."""
+        return self._change(sa.and_(jobs.c.id == job_id, jobs.c.state.in_(("queued", "running"))),
+                            state="cancelled", stage="cancelled", finished=time.time(), lease_owner=None,
+                            lease_until=None, event_seq=jobs.c.event_seq + 1)
+
+    def release(self) -> int:
+        """Let every lease run out now; only for the sole owner of the database, after a restart."""
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(jobs.c.state == "running").values(lease_until=0.0)).rowcount
+
+    def disown(self) -> int:
+        """Put every running job back into the queue without counting the attempt: an orderly stop is no failure.
+
+        Only for the sole owner of the database. Holders see that they lost the job and stop their children.
+        """
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(jobs.c.state == "running").values(
+                state="queued", stage="queued", progress=0.0, attempt=jobs.c.attempt - 1, lease_owner=None,
+                lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
+
+    def give_up(self, max_attempts: int) -> int:
+        """Fail the jobs whose holder went silent in their last attempt."""
+        error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
+                              code="attempts_exhausted", measured=max_attempts, limit=max_attempts,
+                              remedy="look into the log of the service; the job may need more memory than there is")
+        gone = sa.and_(jobs.c.state == "running", jobs.c.lease_until < time.time(), jobs.c.attempt >= max_attempts)
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(gone).values(
+                state="failed", stage="failed", finished=time.time(), error_json=json.dumps(error.as_dict()),
+                lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
+
+    def running(self) -> int:
+        """How many jobs run under a lease that has not run out."""
+        query = sa.select(sa.func.count()).where(jobs.c.state == "running", jobs.c.lease_until >= time.time())
+        with self.engine.connect() as c:
+            return int(c.execute(query).scalar_one())
+
+    def counts(self) -> dict[str, int]:
+        """Number of jobs by state."""
+        with self.engine.connect() as c:
+            rows = c.execute(sa.select(jobs.c.state, sa.func.count()).group_by(jobs.c.state))
+            return {state: count for state, count in rows}
+
+    @staticmethod
+    def _held(job_id: str, owner: str) -> sa.ColumnElement[bool]:
+        return sa.and_(jobs.c.id == job_id, jobs.c.lease_owner == owner, jobs.c.state == "running")
+
+    def _change(self, where: sa.ColumnElement[bool], **values: Any) -> bool:
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(where).values(**values)).rowcount == 1
+
+
+class LibraryStore:
+    """Tools, machines and materials that setups refer to; entries are JSON that was validated before."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+
+    def all(self) -> dict[str, dict[str, Any]]:
+        """Every entry by shelf and name."""
+        found: dict[str, dict[str, Any]] = {"tools": {}, "machines": {}, "materials": {}}
+        with self.engine.connect() as c:
+            for row in c.execute(sa.select(library).order_by(library.c.name)).mappings():
+                found.setdefault(row["shelf"], {})[row["name"]] = json.loads(row["entry_json"])
+        return found
+
+    def get(self, shelf: str, name: str) -> Any:
+        """One entry.
+
+        Raises
+        ------
+        NotFoundError
+            There is none of that name.
+        """
+        entries = self.all()[shelf]
+        if name not in entries:
+            raise NotFoundError(f"the library of {shelf} has no entry '{name}'", code="no_such_entry", subjects=(name,),
+                                remedy=f"GET /v1/{shelf} lists the entries")
+        return entries[name]
+
+    def put(self, shelf: str, name: str, entry: Any) -> bool:
+        """Write an entry; returns whether it is new."""
+        at = sa.and_(library.c.shelf == shelf, library.c.name == name)
+        text = json.dumps(entry, sort_keys=True)
+        with self.engine.begin() as c:
+            if c.execute(library.update().where(at).values(entry_json=text)).rowcount:
+                return False
+            c.execute(library.insert().values(shelf=shelf, name=name, entry_json=text))
+        return True
+
+    def delete(self, shelf: str, name: str) -> None:
+        """Remove an entry.
+
+        Raises
+        ------
+        NotFoundError
+            There is none of that name.
+        """
+        self.get(shelf, name)
+        with self.engine.begin() as c:
+            c.execute(library.delete().where(library.c.shelf == shelf, library.c.name == name))

@@ -1,0 +1,203 @@
+"""Runs one job in a child process and watches it: progress, cancel, wall time, memory, signals.
+
+Whatever happens, nothing of the child is left running when ``supervise`` returns. The thread that calls it only
+waits; the computing is done by the child.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psutil  # type: ignore[import-untyped]
+
+from geometry.errors import CancelledError, ResourceError, error_from_dict
+
+ROOT = Path(__file__).resolve().parent.parent
+# Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
+ADDRESS_ROOM = 8_000_000_000
+THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one attempt.
+
+    time_s       : wall time, s
+    memory_bytes : resident in the child and its descendants together
+    threads      : kernel threads
+    poll_s       : how often limits and ``keep`` are looked at, s
+    """
+
+    time_s: float
+    memory_bytes: int
+    threads: int = 1
+    poll_s: float = 0.2
+
+
+def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_progress: Callable[[str, float], None],
+              keep: Callable[[], bool]) -> str:
+    """Run a job in a child.
+
+    request     : see ``service.child``; 'parent' and 'address_bytes' are filled in here
+    scratch     : folder for what lives as long as the child
+    on_progress : called with stage and fraction, at most once per look
+    keep        : asked at every look; False kills the child
+
+    Returns the final state the child reported.
+
+    Raises
+    ------
+    CancelledError
+        ``keep`` said no.
+    ResourceError
+        Codes 'job_timeout', 'job_memory', 'job_crashed' (a signal of its own, such as SIGSEGV) and 'job_killed'
+        (SIGKILL from outside).
+    CamError
+        The typed error the child reported.
+    """
+    with tempfile.TemporaryDirectory(prefix="job-", dir=scratch) as folder:
+        path, log = Path(folder, "request.json"), Path(folder, "log")
+        path.write_text(json.dumps({**request, "parent": os.getpid(),
+                                    "address_bytes": limits.memory_bytes + ADDRESS_ROOM}))
+        reading, writing = os.pipe()
+        try:
+            with log.open("wb") as out:
+                child = subprocess.Popen([sys.executable, "-m", "service.child", str(path), str(writing)],
+                                         pass_fds=(writing,), stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+                                         start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
+            os.close(writing)
+            try:
+                final = _watch(child, reading, limits, on_progress, keep)
+            finally:
+                kill_tree(child)
+        finally:
+            os.close(reading)
+        return _outcome(child.returncode, final, log)
+
+
+def kill_tree(child: subprocess.Popen[bytes]) -> None:
+    """Kill a child with all its descendants, also those in sessions of their own, and wait for it."""
+    try:
+        family = psutil.Process(child.pid).children(recursive=True) if child.returncode is None else []
+    except psutil.Error:
+        family = []
+    try:
+        os.killpg(child.pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        pass  # the whole group is gone already
+    for process in family:
+        try:
+            process.kill()
+        except psutil.Error:
+            pass
+    child.wait()
+
+
+def _environment(threads: int) -> dict[str, str]:
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    return {**os.environ, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
+
+
+def _watch(child: subprocess.Popen[bytes], reading: int, limits: Limits, on_progress: Callable[[str, float], None],
+           keep: Callable[[], bool]) -> dict[str, Any]:
+    """Look at the child until it ends; returns its last word, {} when it said none."""
+    deadline = time.monotonic() + limits.time_s
+    handle, lines = psutil.Process(child.pid), _Lines(on_progress)
+    next_look = 0.0
+    os.set_blocking(reading, False)
+    with selectors.DefaultSelector() as selector:
+        selector.register(reading, selectors.EVENT_READ)
+        while True:
+            open_still = True
+            if selector.select(timeout=limits.poll_s):
+                open_still = lines.feed(reading)
+            if not open_still or child.poll() is not None:
+                while open_still and selector.select(timeout=0):
+                    open_still = lines.feed(reading)
+                _await_exit(child)
+                return lines.final
+            if time.monotonic() >= next_look:
+                next_look = time.monotonic() + limits.poll_s
+                _check(handle, limits, deadline, keep)
+
+
+class _Lines:
+    """Messages of the child, line by line; ``final`` is its last word."""
+
+    def __init__(self, on_progress: Callable[[str, float], None]) -> None:
+        self.on_progress, self.buffer = on_progress, b""
+        self.final: dict[str, Any] = {}
+
+    def feed(self, reading: int) -> bool:
+        """Read what is there and pass on the newest progress; False at the end of the pipe."""
+        chunk = os.read(reading, 65536)
+        *lines, self.buffer = (self.buffer + chunk).split(b"\n")
+        progress = None
+        for line in filter(None, lines):
+            message = json.loads(line)
+            if "stage" in message:
+                progress = message
+            else:
+                self.final = message
+        if progress is not None and not self.final:
+            self.on_progress(progress["stage"], progress["progress"])
+        return chunk != b""
+
+
+def _check(handle: psutil.Process, limits: Limits, deadline: float, keep: Callable[[], bool]) -> None:
+    if not keep():
+        raise CancelledError("the job was cancelled")
+    if time.monotonic() > deadline:
+        raise ResourceError(f"the job did not finish within {limits.time_s:g} s and was stopped", code="job_timeout",
+                            measured=limits.time_s, limit=limits.time_s,
+                            remedy="ask for a coarser scallop or fewer faces, or raise ZONEMILL_JOB_TIME_LIMIT_S")
+    used = resident(handle)
+    if used > limits.memory_bytes:
+        raise ResourceError(f"the job needed more than {limits.memory_bytes / 1e9:.2f} GB of memory and was stopped",
+                            code="job_memory", measured=used, limit=limits.memory_bytes,
+                            remedy="simplify the part or raise ZONEMILL_JOB_MEMORY_LIMIT_MB")
+
+
+def resident(handle: psutil.Process) -> int:
+    """Resident memory of a process and its descendants, bytes; 0 once it is gone."""
+    total = 0
+    try:
+        for process in [handle, *handle.children(recursive=True)]:
+            total += process.memory_info().rss
+    except psutil.Error:
+        pass  # it ended while we looked
+    return total
+
+
+def _await_exit(child: subprocess.Popen[bytes]) -> None:
+    """The pipe is closed: give the interpreter a moment to end by itself."""
+    try:
+        child.wait(timeout=5.0)
+    except subprocess.TimeoutExpired:
+        pass  # it said its last word; kill_tree ends it
+
+
+def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
+    if "state" in final:
+        return str(final["state"])
+    if "error" in final:
+        raise error_from_dict(final["error"])
+    tail = log.read_bytes()[-2000:].decode("utf-8", "replace").strip()
+    if "MemoryError" in tail or "bad_alloc" in tail:
+        raise ResourceError("the job ran out of memory", code="job_memory")
+    name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    last = tail.splitlines()[-1] if tail else "it said nothing"
+    raise ResourceError(f"the job's process died of {name} ({last})", measured=name,
+                        code="job_killed" if code == -signal.SIGKILL else "job_crashed",
+                        remedy="the same input would do it again; please report it with part and setup")

@@ -1,0 +1,126 @@
+"""One job on a worker: take the attempt, use the result that exists or make it, write the end into the database.
+
+``run_job`` is what Dask runs, in a thread; its arguments are plain data, so any worker can run it again.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+import uuid
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import structlog
+from sqlalchemy.engine import RowMapping
+from sqlalchemy.exc import OperationalError
+
+from geometry.errors import CamError, CancelledError, InternalError, ResourceError
+from service.artifacts import Artifacts, artifact_key
+from service.db import connect
+from service.store import JobStore
+from service.supervisor import Limits, supervise
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True)
+class WorkConfig:
+    """What a worker must know; travels with every task.
+
+    url, data_dir : database and data folder, as the worker sees them
+    chain         : module with ``plan``, ``zones_only`` and ``verify_program``
+    """
+
+    url: str
+    data_dir: str
+    limits: Limits
+    lease_s: float
+    chain: str = "service.chain"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
+    """Run one attempt of a job to its end; returns what became of it, for the log only."""
+    config = WorkConfig(**{**data, "limits": Limits(**data["limits"])})
+    store, owner = JobStore(connect(config.url)), f"worker-{uuid.uuid4().hex}"
+    if not store.take_over(job_id, attempt, owner, config.lease_s):
+        return "superseded"
+    row = store.get(job_id)
+    try:
+        state, key = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
+        ended = store.finish(job_id, owner, state, artifact=key)
+    except CancelledError:
+        return "stopped"
+    except CamError as error:
+        state, ended = "failed", store.finish(job_id, owner, "failed", error=error)
+        log.warning("job failed", job=job_id, attempt=attempt, error=error.as_dict())
+    except Exception as error:
+        log.exception("bug in the worker", job=job_id, attempt=attempt)
+        bug = InternalError(f"{type(error).__name__}: {error}", code="bug")
+        state, ended = "failed", store.finish(job_id, owner, "failed", error=bug)
+    log.info("job ended", job=job_id, attempt=attempt, state=state, recorded=ended)
+    return state if ended else "superseded"
+
+
+class _Attempt:
+    """One attempt: the child, its heartbeat and its progress."""
+
+    def __init__(self, store: JobStore, artifacts: Artifacts, config: WorkConfig, row: RowMapping,
+                 owner: str) -> None:
+        self.store, self.artifacts, self.config, self.row, self.owner = store, artifacts, config, row, owner
+        self.renewed = time.monotonic()
+
+    def run(self) -> tuple[str, str]:
+        """Final state and key of the result."""
+        row = self.row
+        key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"])
+        if not self.artifacts.has_result(key):
+            self._make(key)
+        return (self.artifacts.result(key) / "state").read_text().strip(), key
+
+    def _make(self, key: str) -> None:
+        try:
+            self._attempt(key)
+        except ResourceError as error:
+            if error.code != "job_killed":
+                raise
+            log.warning("job killed from outside, once more", job=self.row["id"])
+            self._attempt(key)
+
+    def _attempt(self, key: str) -> None:
+        workspace = self.artifacts.workspace()
+        program = self.row["program_sha256"]
+        request = {
+            "kind": self.row["kind"], "part": str(self.artifacts.blob(self.row["part_sha256"])),
+            "setup": self.row["setup_json"], "program": str(self.artifacts.blob(program)) if program else None,
+            "out": str(workspace), "chain": self.config.chain,
+        }
+        try:
+            state = supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
+                              keep=self._keep)
+            (workspace / "state").write_text(f"{state}\n")
+            self.artifacts.commit(workspace, key)
+        finally:
+            shutil.rmtree(workspace, ignore_errors=True)
+
+    def _progress(self, stage: str, fraction: float) -> None:
+        try:
+            self.store.progress(self.row["id"], self.owner, stage, fraction)
+        except OperationalError as error:
+            log.warning("progress not recorded", job=self.row["id"], error=str(error))
+
+    def _keep(self) -> bool:
+        """Whether to go on; renews the lease in good time. A database that does not answer is no reason to stop."""
+        try:
+            if time.monotonic() - self.renewed < self.config.lease_s / 4:
+                return self.store.is_held(self.row["id"], self.owner)
+            self.renewed = time.monotonic()
+            return self.store.renew(self.row["id"], self.owner, self.config.lease_s)
+        except OperationalError as error:
+            log.warning("database does not answer", job=self.row["id"], error=str(error))
+            return True
