@@ -1,0 +1,126 @@
+"""The grid every writer rounds to: whole ten-thousandths of a millimetre.
+
+A path is put on the grid once, as integers; text is made from the integers, so a
+reader gets back exactly the grid point, at most ``GRID / 2`` = 0.00005 mm from the
+planned one on each axis. "Equal" and "moves" mean equality on the grid.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import OutputError
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from output.model import Motion, Trajectory, Workingstep, Workplan
+
+I64 = NDArray[np.int64]
+
+PER_MM = 10_000
+"""Grid steps in a millimetre (four decimals)."""
+
+GRID = 1.0 / PER_MM
+"""Grid width, mm."""
+
+REACH = 1.0e6
+"""Largest coordinate that is taken for one, mm."""
+
+
+def to_grid(points: F64) -> I64:
+    """Put points on the grid.
+
+    points : (..., k) float64, mm
+    Returns (..., k) int64, ten-thousandths of a mm.  Raises OutputError where a value is not finite or beyond 1 km.
+    """
+    p = np.asarray(points, dtype=np.float64)
+    if not np.isfinite(p).all() or (p.size and np.abs(p).max() > REACH):
+        raise OutputError("a path holds a coordinate that is not a finite length below 1 km", code="bad_coordinate")
+    return np.rint(p * PER_MM).astype(np.int64)
+
+
+def without_repeats(points: I64) -> I64:
+    """The points without those equal to the one before them; the first stays.
+
+    points : (n, k) int64
+    Returns (m, k) int64, 1 <= m <= n for n >= 1.
+    """
+    if len(points) < 2:
+        return points
+    keep = np.empty(len(points), dtype=bool)
+    keep[0] = True
+    np.any(points[1:] != points[:-1], axis=1, out=keep[1:])
+    return points[keep]
+
+
+def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:
+    """The trajectories of a step on the grid, checked.
+
+    Returns pairs of the trajectory and its (m, 3) int64 points without repeats; m is 1 where a
+    trajectory is shorter than the grid.
+    Raises OutputError where a trajectory has a wrong shape or does not start at the end of the one
+    before it, where a rapid moves Z and XY in one block, or where a feed is no feed.
+    """
+    path: list[tuple[Trajectory, I64]] = []
+    end: I64 | None = None
+    for number, trajectory in enumerate(step.trajectories, start=1):
+        where = (step.id, f"trajectory {number}")
+        if trajectory.points.ndim != 2 or trajectory.points.shape[1] != 3 or len(trajectory.points) < 2:
+            raise OutputError(f"{step.id}: trajectory {number} is no polyline of two or more points in space",
+                              code="bad_trajectory", subjects=where, measured=list(trajectory.points.shape))
+        points = to_grid(trajectory.points)
+        if end is not None and (points[0] != end).any():
+            raise OutputError(f"{step.id}: trajectory {number} does not start where the one before it ended",
+                              code="gap_in_path", subjects=where, limit=GRID,
+                              measured=float(np.linalg.norm(points[0] - end) * GRID))
+        end = points[-1]
+        points = without_repeats(points)
+        if trajectory.motion is Motion.RAPID:
+            _check_rapid(points, where)
+        elif not (np.isfinite(trajectory.feed) and trajectory.feed >= GRID):
+            raise OutputError(f"{step.id}: trajectory {number} has no feed", code="bad_feed", subjects=where,
+                              measured=trajectory.feed, limit=GRID)
+        path.append((trajectory, points))
+    return path
+
+
+def link(here: I64, start: I64, clearance: int) -> I64:
+    """The rapid between two steps that do not join: up to the clearance plane, across, down.
+
+    here, start : (3,) int64, grid points;  clearance : grid height
+    Returns (k, 3) int64 from ``here`` to ``start``, k <= 4, without repeats; k is 1 where they are equal.
+    """
+    if (here == start).all():
+        return here[None, :]
+    level = max(clearance, int(here[2]), int(start[2]))
+    return without_repeats(np.array([here, [*here[:2], level], [*start[:2], level], start], dtype=np.int64))
+
+
+def check_plan(plan: Workplan) -> None:
+    """Raise OutputError where the plan as a whole cannot be written: no steps, ids used twice, a bad spindle speed."""
+    if not plan.steps:
+        raise OutputError(f"the workplan '{plan.name}' has no workingstep", code="empty_plan")
+    ids = [step.id for step in plan.steps]
+    twice = sorted({i for i in ids if ids.count(i) > 1})
+    if twice:
+        raise OutputError("workingstep ids are used twice: " + ", ".join(twice), code="id_twice", subjects=tuple(twice))
+    bodies: dict[int, ToolBody] = {}
+    for step in plan.steps:
+        if not step.trajectories:
+            raise OutputError(f"{step.id} has no trajectory", code="empty_step", subjects=(step.id,))
+        if not (np.isfinite(step.spindle_rpm) and step.spindle_rpm >= 1.0):
+            raise OutputError(f"{step.id} has no spindle speed", code="bad_spindle", subjects=(step.id,),
+                              measured=step.spindle_rpm, limit=1.0)
+        if bodies.setdefault(step.tool.number, step.tool) != step.tool:
+            raise OutputError(f"tool number {step.tool.number} stands for two different tools",
+                              code="tool_number_twice", subjects=(bodies[step.tool.number].id, step.tool.id))
+
+
+def _check_rapid(points: I64, where: tuple[str, ...]) -> None:
+    move = np.diff(points, axis=0) != 0
+    slanted = np.flatnonzero(move[:, :2].any(axis=1) & move[:, 2])
+    if len(slanted):
+        a, b = (tuple(float(c) * GRID for c in points[slanted[0] + k]) for k in (0, 1))
+        raise OutputError("a rapid moves Z together with X or Y", code="slanted_rapid",
+                          subjects=(*where, f"({a[0]:.4f}, {a[1]:.4f}, {a[2]:.4f})",
+                                    f"({b[0]:.4f}, {b[1]:.4f}, {b[2]:.4f})"))

@@ -1,0 +1,214 @@
+"""LinuxCNC programs: three axes, millimetres, the tool tip in the work offset.
+
+The shape of a program: header comments for the machinist, one safe block, then
+per tool the change and per workingstep a comment and its moves. Nothing is
+added to a planned path and nothing is taken from it but points that are equal
+on the grid of ``output.grid``. Between steps that do not join, the writer goes
+up to the clearance plane, across, and down, one after the other.
+
+Path mode: G64 P, not G61. G61 brakes at every corner of a polyline with
+thousands of short segments and leaves dwell marks; G64 without P would round
+corners as far as the acceleration needs. ``P`` is the largest distance from
+the programmed path, and is kept at or below half the chordal tolerance.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+
+import numpy as np
+
+from geometry.errors import OutputError
+from geometry.toolbody import ToolBody
+from output.grid import GRID, I64, PER_MM, check_plan, grid_path, link, to_grid
+from output.model import Motion, Trajectory, Workingstep, Workplan
+from output.text import ascii_text, decimal, face_words, step_title, tool_name
+
+LINE = 100
+"""Longest line of a program, characters."""
+
+_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+_ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;]", re.IGNORECASE)
+
+
+def write_linuxcnc(plan: Workplan) -> str:
+    """The program of one access direction for LinuxCNC.
+
+    plan : lengths in mm, setup frame; rapids move Z alone or XY alone
+    Returns the text, ASCII, lines of at most 100 characters, newline at the end; every point reads back
+    within 0.00005 mm of the plan on each axis.
+    Raises OutputError for an empty plan, an unknown work offset, a rapid that moves XY and Z together,
+    a path with a gap, a coordinate, feed or speed that is none.
+    """
+    check_plan(plan)
+    if plan.work_offset not in _OFFSETS:
+        raise OutputError(f"LinuxCNC has no work offset '{plan.work_offset}'", code="bad_work_offset",
+                          subjects=(plan.work_offset,), remedy="use one of " + ", ".join(_OFFSETS))
+    tolerance = path_tolerance(plan)
+    program = _Program(plan)
+    program.lines += ["%", *_header(plan, tolerance)]
+    program.lines += [f"G21 G17 G90 G94 G40 G49 G80 G64 P{decimal(tolerance)}", plan.work_offset]
+    for step in plan.steps:
+        program.add_step(step)
+    program.end()
+    return "\n".join(program.lines) + "\n"
+
+
+def path_tolerance(plan: Workplan) -> float:
+    """The P word of G64, mm: 0.001, less where half of the finest chordal tolerance of the plan is less."""
+    chords = [s.chordal_tolerance for s in plan.steps if s.chordal_tolerance > 0.0]
+    return max(GRID, min([0.001, *(0.5 * c for c in chords)]))
+
+
+class _Program:
+    """Lines so far and the modal state they leave the control in."""
+
+    def __init__(self, plan: Workplan) -> None:
+        self.lines: list[str] = []
+        self.clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
+        self.position: I64 | None = None
+        self.tool: ToolBody | None = None
+        self.motion = ""
+        self.feed = ""
+        self.speed = ""
+
+    def add_step(self, step: Workingstep) -> None:
+        path = grid_path(step)
+        start = path[0][1][0]
+        self.lines.append("")
+        if step.tool != self.tool:
+            self._change_tool(step)
+        self.lines += _comment(_step_words(step))
+        self._set_speed(step)
+        self._go_to(start)
+        for trajectory, points in path:
+            self._follow(trajectory, points)
+        self.position = path[-1][1][-1]
+
+    def end(self) -> None:
+        self._retract()
+        self.lines += ["M5", "M9", "M30", "%"]
+
+    def _change_tool(self, step: Workingstep) -> None:
+        if self.tool is not None:
+            self._retract()
+            self.lines += ["M5", "M9"]
+        tool = step.tool
+        self.lines += _comment(tool_name(tool))
+        self.lines += [f"T{tool.number} M6", f"G43 H{tool.number}"]
+        self.tool, self.position, self.motion, self.feed, self.speed = tool, None, "", "", ""
+
+    def _set_speed(self, step: Workingstep) -> None:
+        speed = f"S{decimal(step.spindle_rpm, 0)}"
+        if speed != self.speed:
+            self.lines.append(f"{speed} M3" if self.speed else f"{speed} M3 M8")
+            self.speed = speed
+
+    def _retract(self) -> None:
+        """Up to the clearance plane; never down to it."""
+        if self.position is not None and self.position[2] < self.clearance:
+            self._rapid([None, None, self.clearance])
+            self.position = np.array([*self.position[:2], self.clearance])
+
+    def _go_to(self, start: I64) -> None:
+        """To the first point of a step: Z to the clearance plane, XY, Z."""
+        if self.position is None:  # after a tool change: only the control knows where the tool is
+            level = max(self.clearance, int(start[2]))
+            self._rapid([None, None, level])
+            self._rapid([int(start[0]), int(start[1]), None])
+            self.position = np.array([*start[:2], level])
+        points = link(self.position, start, self.clearance)
+        if len(points) > 1:
+            rows = _rows(points)
+            self.lines += [" ".join([*self._mode("G0"), rows[0]]), *rows[1:]]
+        self.position = start
+
+    def _rapid(self, target: list[int | None]) -> None:
+        words = [a + _number(v) for a, v in zip("XYZ", target, strict=True) if v is not None]
+        self.lines.append(" ".join([*self._mode("G0"), *words]))
+
+    def _mode(self, word: str) -> list[str]:
+        if word == self.motion:
+            return []
+        self.motion = word
+        return [word]
+
+    def _follow(self, trajectory: Trajectory, points: I64) -> None:
+        """One line a point, with the words that change; the first point is where the tool stands."""
+        if len(points) < 2:
+            return
+        rows = _rows(points)
+        if trajectory.motion is Motion.RAPID:
+            rows[0] = " ".join([*self._mode("G0"), rows[0]])
+        else:
+            feed = f"F{decimal(trajectory.feed, 1 if trajectory.feed >= 1.0 else 4)}"
+            tail = [] if feed == self.feed else [feed]
+            rows[0] = " ".join([*self._mode("G1"), rows[0], *tail])
+            self.feed = feed
+        self.lines += rows
+
+
+def _rows(points: I64) -> list[str]:
+    """Coordinate words of points[1:], only those that differ from the point before."""
+    moved = np.diff(points, axis=0) != 0
+    columns = []
+    for axis, letter in enumerate("XYZ"):
+        words = [""] * len(moved)
+        where = np.flatnonzero(moved[:, axis])
+        for i, value in zip(where.tolist(), points[1:, axis][where].tolist(), strict=True):
+            words[i] = letter + _number(value)
+        columns.append(words)
+    return [" ".join(filter(None, row)) for row in zip(*columns, strict=True)]
+
+
+def _number(value: int) -> str:
+    """A grid value in mm with its decimal point: 12.5, -0.01, 3."""
+    whole, rest = divmod(abs(value), PER_MM)
+    sign = "-" if value < 0 else ""
+    return f"{sign}{whole}.{rest:04d}".rstrip("0") if rest else f"{sign}{whole}."
+
+
+def _comment(text: str) -> list[str]:
+    """``text`` as LinuxCNC comments: ASCII, no parentheses inside, never one of the comments that act."""
+    plain = ascii_text(text).replace("(", "[").replace(")", "]")
+    parts = textwrap.wrap(plain, LINE - 4, break_on_hyphens=False) or [""]
+    parts = [f"- {p}" if _ACTIVE.match(p) else p for p in parts]
+    return [f"({p})" for p in parts]
+
+
+def _header(plan: Workplan, tolerance: float) -> list[str]:
+    low, high = plan.stock.lower, plan.stock.upper
+    box = ", ".join(f"{a} {decimal(low[i], 3)} to {decimal(high[i], 3)}" for i, a in enumerate("XYZ"))
+    texts = [
+        f"Program {plan.name}, zonemill {plan.version}, LinuxCNC, 3 axes",
+        f"Part sha256 {plan.part_sha256[:16]}, setup sha256 {plan.setup_sha256[:16]}",
+        *(f"Label {key}: {value}" for key, value in sorted(plan.labels.items())),
+        f"Material {plan.material}",
+        f"Units mm and mm/min. Work offset {plan.work_offset}. Program zero is the origin of the setup frame",
+        "XYZ is the tool tip: set every tool length in the tool table, G43 H is the tool number",
+        f"Stock box {box}",
+        f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free",
+        f"Path mode G64 P{decimal(tolerance)}: the control may leave the written path by that much, in mm",
+        "Tools, all lengths in mm from the tip:",
+        *(tool_name(t) for t in _tools_in_use(plan)),
+        *plan.comments,
+    ]
+    return [line for text in texts for line in _comment(text)]
+
+
+def _tools_in_use(plan: Workplan) -> list[ToolBody]:
+    return sorted({s.tool.number: s.tool for s in plan.steps}.values(), key=lambda t: t.number)
+
+
+def _step_words(step: Workingstep) -> str:
+    zone = step.zone or "several zones"
+    faces = face_words(step) or "no faces"
+    words = [
+        f"{step.id} {zone} {step.operation} {step.strategy} T{step.tool.number}: {faces}",
+        f"Z {decimal(step.top, 3)} down to {decimal(step.bottom, 3)}",
+    ]
+    title = step_title(step)
+    if any(w not in words[0] for w in title.split()):
+        words.append(title)
+    return "; ".join(words)

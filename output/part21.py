@@ -1,0 +1,105 @@
+"""STEP Part 21 text: entity numbers, strings, reals, and many points at once.
+
+Only the plain subset that every reader known to us takes: reals with a decimal
+point and without exponent or minus zero, non-ASCII as ``\\X2\\``, mandatory
+aggregates as ``()``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+
+from geometry.errors import OutputError
+from output.grid import I64, PER_MM
+
+_REFS_A_LINE = 12
+_TEXT_LIMIT = 256  # FILE_DESCRIPTION and FILE_NAME strings, ISO 10303-21 section 8.2
+
+
+class Part21:
+    """The data section being written: every ``add`` returns the number of its instance."""
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._count = 0
+
+    def add(self, record: str) -> int:
+        """Add ``NAME(...)`` or a complex ``(A() B())`` and return its number."""
+        self._count += 1
+        self._lines.append(f"#{self._count}={record};")
+        return self._count
+
+    def reserve(self) -> int:
+        """A number for an instance that is written later with ``fill``."""
+        self._count += 1
+        return self._count
+
+    def fill(self, number: int, record: str) -> None:
+        """Write the instance of a reserved number."""
+        self._lines.append(f"#{number}={record};")
+
+    def points(self, points: I64) -> int:
+        """Add CARTESIAN_POINTs of the (n, 3) grid points; returns the number of the first, the rest follow it."""
+        first = self._count + 1
+        rows = (points / PER_MM + 0.0).tolist()
+        self._lines += [
+            "#%d=CARTESIAN_POINT('',(%.4f,%.4f,%.4f));" % (i, x, y, z)  # noqa: UP031  twice as fast as format here
+            for i, (x, y, z) in enumerate(rows, start=first)
+        ]
+        self._count += len(rows)
+        return first
+
+    def text(self, *, description: Sequence[str], name: str, schema: Sequence[str], system: str) -> str:
+        """The whole exchange file, ASCII, newline at the end."""
+        limited = ",".join(quoted(d[:_TEXT_LIMIT]) for d in description)
+        head = [
+            "ISO-10303-21;", "HEADER;", f"FILE_DESCRIPTION(({limited}),'2;1');",
+            f"FILE_NAME({quoted(name)},'{time_stamp()}',(''),(''),{quoted(system)},{quoted(system)},'');",
+            f"FILE_SCHEMA(({','.join(quoted(s) for s in schema)}));", "ENDSEC;", "DATA;",
+        ]
+        return "\n".join([*head, *self._lines, "ENDSEC;", "END-ISO-10303-21;"]) + "\n"
+
+
+def quoted(text: str) -> str:
+    """A Part 21 string: quotes and backslashes doubled, what is not printable ASCII as \\X2\\ or \\X4\\."""
+    if text.isascii() and text.isprintable():
+        return "'" + text.replace("\\", "\\\\").replace("'", "''") + "'"
+    out: list[str] = []
+    for c in text:
+        if " " <= c <= "~":
+            out.append({"'": "''", "\\": "\\\\"}.get(c, c))
+        elif ord(c) < 0x10000:
+            out.append(f"\\X2\\{ord(c):04X}\\X0\\")
+        else:
+            out.append(f"\\X4\\{ord(c):08X}\\X0\\")
+    return "'" + "".join(out).replace("\\X0\\\\X2\\", "") + "'"
+
+
+def real(value: float, digits: int = 4) -> str:
+    """A Part 21 real with at most ``digits`` decimals: '12.5', '0.', never '-0.', never an exponent."""
+    if not abs(value) < 1.0e12:
+        raise OutputError("a number is not finite", code="bad_number", measured=repr(value))
+    text = f"{value:.{digits}f}".rstrip("0")
+    return "0." if text in ("-0.", "0.") else text
+
+
+def reals(values: Iterable[float], digits: int = 4) -> str:
+    """'(1.,2.,3.)'."""
+    return "(" + ",".join(real(v, digits) for v in values) + ")"
+
+
+def refs(numbers: Iterable[int]) -> str:
+    """'(#4,#5)', broken into lines where it is long."""
+    words = [f"#{n}" for n in numbers]
+    rows = [",".join(words[i:i + _REFS_A_LINE]) for i in range(0, len(words), _REFS_A_LINE)]
+    return "(" + ",\n".join(rows) + ")"
+
+
+def time_stamp() -> str:
+    """1970-01-01T00:00:00, or the time SOURCE_DATE_EPOCH (s) names, so that equal input gives equal bytes."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0").strip() or "0"
+    if not epoch.isdigit():
+        raise OutputError("SOURCE_DATE_EPOCH is no number of seconds", code="bad_epoch", subjects=(epoch,))
+    return datetime.fromtimestamp(int(epoch), tz=UTC).strftime("%Y-%m-%dT%H:%M:%S")

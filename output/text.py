@@ -1,0 +1,55 @@
+"""Words that both NC and STEP-NC headers use: tools, faces and plain ASCII."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from geometry.toolbody import ToolBody
+from output.model import Workingstep
+
+_PLAIN = str.maketrans({
+    "ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "ø": "oe", "Ø": "Oe", "æ": "ae",
+    "Æ": "Ae", "å": "aa", "Å": "Aa", "ł": "l", "Ł": "L", "–": "-", "—": "-", "µ": "u", "μ": "u", "°": " deg",
+    "²": "2", "³": "3", "×": "x", "Ø".lower(): "oe", "’": "'", "‘": "'", "“": '"', "”": '"', "„": '"', "…": "...",
+})
+
+
+def ascii_text(text: str) -> str:
+    """``text`` in one line of printable ASCII: umlauts spelt out, accents dropped, what is left over becomes '?'."""
+    spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))
+    kept = (c for c in spelt if not unicodedata.combining(c))
+    line = "".join(" " if c.isspace() else c if " " <= c <= "~" else "?" for c in kept)
+    return " ".join(line.split())
+
+
+def decimal(value: float, digits: int = 4) -> str:
+    """``value`` for people: at most ``digits`` decimals, no exponent, no trailing zeros, no minus zero."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text
+
+
+def tool_words(tool: ToolBody) -> str:
+    """Every dimension of a tool that can be checked at the presetter, mm."""
+    d = decimal
+    words = [f"{tool.kind} D{d(tool.diameter)}", f"corner R{d(tool.corner_radius)}",
+             f"flute length {d(tool.flute_length)}"]
+    if tool.neck_length > tool.flute_length:
+        words.append(f"neck D{d(tool.neck_diameter)} to {d(tool.neck_length)}")
+    words += [f"shank D{d(tool.shank_diameter)}", f"stickout {d(tool.stickout)}"]
+    return ", ".join(words)
+
+
+def tool_name(tool: ToolBody) -> str:
+    """'T1: ball D3, ...': number, id where it says more, and every dimension."""
+    own = "" if tool.id == f"T{tool.number}" else f" {tool.id}"
+    return f"T{tool.number}{own}: {tool_words(tool)}"
+
+
+def face_words(step: Workingstep) -> str:
+    """'F12 F13', or '' for a step without faces."""
+    return " ".join(f"F{n}" for n in step.faces)
+
+
+def step_title(step: Workingstep) -> str:
+    """The name of a step, opened by its id."""
+    return step.name if step.name.split(" ", 1)[0] == step.id else f"{step.id} {step.name}".strip()

@@ -1,0 +1,94 @@
+"""Workplans made by hand: three tools, five steps, awkward labels; and long ones for timing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.toolbody import HolderSegment, ToolBody
+from output.model import Motion, StockBox, Trajectory, Workingstep, Workplan
+
+HOLDER = (HolderSegment(20.0, 20.0, 30.0),)
+BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
+FLAT = ToolBody("T2", 2, 6.0, 0.0, 18.0, 6.0, 18.0, 6.0, 40.0, HOLDER)
+BULL = ToolBody("rougher Ø8", 7, 8.0, 1.0, 20.0, 7.6, 30.0, 8.0, 50.0, HOLDER)
+CLEAR = 25.0
+
+
+def line(motion: Motion, *points: tuple[float, float, float], feed: float = 0.0) -> Trajectory:
+    return Trajectory(motion, np.array(points, dtype=np.float64), feed)
+
+
+def passes(x: float, z: float, feed: float = 600.0) -> tuple[Trajectory, ...]:
+    """Down, in, a wavy cut, a connection with its own feed, a second cut, out, up."""
+    t = np.linspace(0.0, 20.0, 7)
+    first = np.column_stack([x + 0.5 * np.sin(t), t, np.full_like(t, z)])
+    second = first[::-1] + [1.0, 0.0, 0.0]
+    a, b, c, d = first[0], first[-1], second[0], second[-1]
+    high, low = (a[0], a[1], CLEAR), (a[0], a[1], z + 1.0)
+    return (
+        line(Motion.RAPID, high, low),
+        line(Motion.APPROACH, low, tuple(a), feed=0.4 * feed),
+        Trajectory(Motion.CUT, first, feed),
+        Trajectory(Motion.CONNECT, np.array([b, c]), feed),
+        Trajectory(Motion.CUT, second, feed),
+        line(Motion.LIFT, tuple(d), (d[0], d[1], z + 1.0), feed=feed),
+        line(Motion.RAPID, (d[0], d[1], z + 1.0), (d[0], d[1], CLEAR)),
+    )
+
+
+def step(number: int, tool: ToolBody, strategy: str, *, zone: str | None = "Z3", faces: tuple[int, ...] = (12, 13),
+         x: float = 5.0, z: float = 4.0, trajectories: tuple[Trajectory, ...] | None = None) -> Workingstep:
+    ident = f"S{number:02d}"
+    words = [ident, zone or "", strategy, tool.id, *(f"F{f}" for f in faces)]
+    return Workingstep(
+        id=ident, name=" ".join(filter(None, words)), zone=zone, faces=faces,
+        operation="roughing" if strategy == "layers" else "finishing", strategy=strategy, tool=tool,
+        spindle_rpm=12000.0, feed=600.0, side_step=0.25, scallop_height=0.01, chordal_tolerance=0.002,
+        trajectories=passes(x, z) if trajectories is None else trajectories,
+        outline=np.array([[x, 0.0], [x + 2.0, 0.0], [x + 2.0, 20.0], [x, 20.0], [x, 0.0]]), top=z + 6.0, bottom=z)
+
+
+def plan(*steps: Workingstep, **changes: object) -> Workplan:
+    chosen = steps or (
+        step(1, BULL, "layers", zone=None, faces=(), x=2.0, z=8.0),
+        step(2, FLAT, "floor", zone="Z1", faces=(4,)),
+        step(3, BALL, "zlevel"),
+        step(4, BALL, "zigzag", zone="Z4", faces=(20, 21, 22), x=11.0, z=3.0),
+        step(5, BULL, "layers", zone="Z5", faces=(30,), x=15.0, z=6.0),
+    )
+    values: dict[str, object] = dict(
+        name="demo", steps=chosen, tools=(BALL, FLAT, BULL), clearance_plane=CLEAR, work_offset="G54",
+        stock=StockBox(np.array([0.0, 0.0, 0.0]), np.array([30.0, 20.0, 15.0])), material="Ti-6Al-4V",
+        part_sha256="ab" * 32, setup_sha256="cd" * 32, version="0.1.0",
+        labels={"order": "Müller's \"4711\" (rush) \\ 20 %", "revision": "B → C 漢 😀"},
+        comments=("MSG, not a message to the operator", "clamp at the seat; check runout (0.01)"))
+    return Workplan(**{**values, **changes})  # type: ignore[arg-type]
+
+
+def tiny() -> Workplan:
+    """One tool, one step, a handful of points: small enough to read as a golden file."""
+    cut = (
+        line(Motion.RAPID, (0.0, 0.0, CLEAR), (0.0, 0.0, 6.0)),
+        line(Motion.APPROACH, (0.0, 0.0, 6.0), (0.0, 0.0, 5.0), feed=200.0),
+        line(Motion.CUT, (0.0, 0.0, 5.0), (10.0, 0.0, 5.0), (10.00001, 0.00001, 5.0), (10.0, 2.5, 4.99996),
+             (-0.00001, 2.5, 4.5), feed=600.0),
+        line(Motion.LIFT, (-0.00001, 2.5, 4.5), (0.0, 2.5, 6.0), feed=600.0),
+        line(Motion.RAPID, (0.0, 2.5, 6.0), (0.0, 2.5, CLEAR)),
+    )
+    return plan(step(1, BALL, "zlevel", trajectories=cut), labels={"order": "4711"}, comments=())
+
+
+def long_plan(points: int, rows: int = 300) -> Workplan:
+    """A plan of about ``points`` points in ``rows`` cutting passes."""
+    n = points // rows
+    t = np.linspace(0.0, 60.0, n)
+    out: list[Trajectory] = []
+    end: np.ndarray | None = None
+    for k in range(rows):
+        y = np.full(n, 0.1 * k)
+        row = np.column_stack([t, y, 3.0 + np.sin(0.3 * t + 0.05 * k)])[:: 1 if k % 2 == 0 else -1]
+        if end is not None:
+            out.append(Trajectory(Motion.CONNECT, np.array([end, row[0]]), 600.0))
+        out.append(Trajectory(Motion.CUT, np.ascontiguousarray(row), 600.0))
+        end = row[-1]
+    return plan(step(1, BALL, "zigzag", trajectories=tuple(out)))
