@@ -18,6 +18,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from geometry.kernels.options import KERNEL
+
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
@@ -57,7 +59,7 @@ class TreeArrays(NamedTuple):
     facets: F64
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _half_area(lo: F64, hi: F64) -> float:
     dx, dy, dz = hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]
     if dx < 0.0:
@@ -65,7 +67,7 @@ def _half_area(lo: F64, hi: F64) -> float:
     return dx * dy + dy * dz + dz * dx
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _boxes(triangles: F64, lower: F64, upper: F64) -> None:
     for i in range(triangles.shape[0]):
         for j in range(3):
@@ -73,7 +75,7 @@ def _boxes(triangles: F64, lower: F64, upper: F64) -> None:
             upper[i, j] = max(triangles[i, 0, j], triangles[i, 1, j], triangles[i, 2, j])
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_n, right):
     """Axis and number of bins on the left of the cheapest plane (surface area heuristic), axis -1: none."""
     best_axis, best_bin, best_cost = -1, 0, np.inf
@@ -116,7 +118,7 @@ def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_
     return best_axis, best_bin
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
     """Reorder so that the triangles of the first ``left_bins`` bins come first; the first of the others."""
     i, j = start, stop - 1
@@ -131,7 +133,7 @@ def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
     return i
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def build_nodes(triangles: F64, leaf_size: int):
     """Boxes, topology and leaf order of the hierarchy over (m, 3, 3) corner points, m > 0."""
     m = triangles.shape[0]
@@ -188,7 +190,7 @@ def build_nodes(triangles: F64, leaf_size: int):
             count[:k].copy(), order)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def facet_rows(corners: F64):
     """(m, 5) upward normals, orientation and quality of each triangle."""
     m = corners.shape[0]
@@ -213,7 +215,7 @@ def facet_rows(corners: F64):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def column_rows(node_lo, node_hi, child, parent, first, count, corners):
     """(k, 8) plan box, top z and covering plane of each node; the plane leans as the node does on average."""
     k = node_lo.shape[0]

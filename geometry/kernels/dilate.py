@@ -13,8 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from geometry.kernels.options import KERNEL
 
-@njit(cache=True, nogil=True)
+
+@njit(**KERNEL)
 def _widen(row, spare, times):
     """D^times of a row, in ``row``; ``spare`` is room for one."""
     n = row.shape[0]
@@ -29,13 +31,13 @@ def _widen(row, spare, times):
         row[n - 1] = spare[n - 2]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _raise_to(row, other):
     for i in range(row.shape[0]):
         row[i] = other[i] if other[i] > row[i] else row[i]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def dilate_row(height, half, j, row, spare):
     """Row j of the dilated field; ``half`` (K,) int64 holds w[0 .. K - 1]."""
     ny = height.shape[0]
@@ -49,7 +51,7 @@ def dilate_row(height, half, j, row, spare):
     _widen(row, spare, half[-1])
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def dilate_rows(height, half, out):
     """``dilate_row`` for every row."""
     spare = np.empty(height.shape[1])
@@ -57,7 +59,7 @@ def dilate_rows(height, half, out):
         dilate_row(height, half, j, out[j], spare)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(**KERNEL, parallel=True)
 def dilate_parallel(height, half, out):
     """``dilate_rows`` on the threads numba has."""
     for j in prange(height.shape[0]):

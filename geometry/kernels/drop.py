@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit, prange
 
 from geometry.kernels.bvh import CAREFUL, EDGES_ONLY, SOUND, TreeArrays
+from geometry.kernels.options import KERNEL
 
 BLOCK_TOLERANCE = 1e-9  # mm: a lift below this does not block
 ROOT_STEPS = 60
@@ -30,7 +31,7 @@ RIM = 0.98  # tangent planes of h are taken no farther out than this part of the
 NOTHING = -np.inf
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(**KERNEL, inline="always")
 def _profile(rho: float, r: float, d: float) -> float:
     """h(rho) for rho <= R."""
     t = rho - d
@@ -41,7 +42,7 @@ def _profile(rho: float, r: float, d: float) -> float:
     return r - math.sqrt((r - t) * (r + t))
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _bull_edge(lo, hi, q, m, R, r, d):
     """Place u in [lo, hi] where m u - h(sqrt(q^2 + u^2)) is largest, with the profile's height there.
 
@@ -98,7 +99,7 @@ def _bull_edge(lo, hi, q, m, R, r, d):
     return u, r - r * math.cos(theta)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _edge(a, b, x, y, R, r, d, best):
     """Tip that the edge a-b allows and the place of the contact on it (0 at a, 1 at b); -inf: no lift."""
     if max(a[2], b[2]) <= best:
@@ -145,7 +146,7 @@ def _edge(a, b, x, y, R, r, d, best):
     return a[2] + t * ez - height, t
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _triangle(v, facet, x, y, R, r, d, best):
     """Tip that one triangle allows, and its contact point; at most ``best`` means no lift."""
     p, q, s = v[0], v[1], v[2]
@@ -196,7 +197,7 @@ def _triangle(v, facet, x, y, R, r, d, best):
     return tip, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _bound(node, x, y, R, r, d, best):
     """No point of the node lifts the tip above this; -inf where that is clear to be no higher than best."""
     if node[4] <= best:
@@ -250,7 +251,7 @@ def _bound(node, x, y, R, r, d, best):
     return min(by_top, by_plane)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def descend(tree: TreeArrays, x, y, radius, corner_radius, start, first_only):
     """Highest lift above ``start``: tip, place in leaf order (-1: nothing lifts) and contact point.
 
@@ -258,8 +259,11 @@ def descend(tree: TreeArrays, x, y, radius, corner_radius, start, first_only):
     """
     r = min(corner_radius, radius)
     d = radius - r
+    # Within a millionth of a nanometre for any cutter, and nothing underflows.
     if d <= 1e-12 * radius:
         r, d = radius, 0.0
+    elif r <= 1e-12 * radius:
+        r, d = 0.0, radius
     best, slot, cx, cy, cz = start, -1, np.nan, np.nan, np.nan
     column, child, parent = tree.column, tree.child, tree.parent
     node = 0
@@ -298,46 +302,46 @@ def descend(tree: TreeArrays, x, y, radius, corner_radius, start, first_only):
                 break
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def drop_tip(tree: TreeArrays, x, y, radius, corner_radius):
     """Lowest tip height over (x, y) that leaves the mesh untouched, mm; -inf where nothing is below."""
     return descend(tree, x, y, radius, corner_radius, NOTHING, False)[0]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def drop_tip_below(tree: TreeArrays, x, y, radius, corner_radius, z_start):
     """The larger of z_start and ``drop_tip``: cheap where z_start is close to the answer."""
     return descend(tree, x, y, radius, corner_radius, z_start, False)[0]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def is_blocked(tree: TreeArrays, x, y, z, radius, corner_radius):
     """Whether some triangle would lift the tip from z by more than 1e-9 mm."""
     return descend(tree, x, y, radius, corner_radius, z + BLOCK_TOLERANCE, True)[1] >= 0
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def drop_tip_contact(tree: TreeArrays, x, y, radius, corner_radius):
     """``drop_tip`` with the triangle of the mesh (-1: none) and the contact point (NaN: none)."""
     tip, slot, cx, cy, cz = descend(tree, x, y, radius, corner_radius, NOTHING, False)
     return tip, (tree.order[slot] if slot >= 0 else -1), cx, cy, cz
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def drop_range(tree, xy, radius, corner_radius, lo, hi, out):
     """``drop_tip`` for the points lo .. hi - 1 of xy (n, 2)."""
     for i in range(lo, hi):
         out[i] = drop_tip(tree, xy[i, 0], xy[i, 1], radius, corner_radius)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def blocked_range(tree, tips, radius, corner_radius, lo, hi, out):
     """``is_blocked`` for the tips lo .. hi - 1 of tips (n, 3)."""
     for i in range(lo, hi):
         out[i] = is_blocked(tree, tips[i, 0], tips[i, 1], tips[i, 2], radius, corner_radius)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def contact_range(tree, xy, radius, corner_radius, lo, hi, out, triangle, contact):
     """``drop_tip_contact`` for the points lo .. hi - 1 of xy (n, 2)."""
     for i in range(lo, hi):
@@ -346,7 +350,7 @@ def contact_range(tree, xy, radius, corner_radius, lo, hi, out, triangle, contac
         contact[i, 0], contact[i, 1], contact[i, 2] = cx, cy, cz
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def grid_rows(tree, x0, y0, step, radius, corner_radius, lo, hi, out):
     """``drop_tip`` over (x0 + column * step, y0 + row * step) for the rows lo .. hi - 1 of out (ny, nx)."""
     for j in range(lo, hi):
@@ -354,21 +358,21 @@ def grid_rows(tree, x0, y0, step, radius, corner_radius, lo, hi, out):
             out[j, i] = drop_tip(tree, x0 + i * step, y0 + j * step, radius, corner_radius)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(**KERNEL, parallel=True)
 def drop_many_parallel(tree, xy, radius, corner_radius, out):
     """``drop_range`` over all points, on the threads numba has; the same bytes on any number of them."""
     for i in prange(xy.shape[0]):
         out[i] = drop_tip(tree, xy[i, 0], xy[i, 1], radius, corner_radius)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(**KERNEL, parallel=True)
 def blocked_many_parallel(tree, tips, radius, corner_radius, out):
     """``blocked_range`` over all tips, on the threads numba has."""
     for i in prange(tips.shape[0]):
         out[i] = is_blocked(tree, tips[i, 0], tips[i, 1], tips[i, 2], radius, corner_radius)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(**KERNEL, parallel=True)
 def grid_parallel(tree, x0, y0, step, radius, corner_radius, out):
     """``grid_rows`` over all rows, on the threads numba has."""
     for j in prange(out.shape[0]):

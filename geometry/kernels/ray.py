@@ -13,12 +13,13 @@ import numpy as np
 from numba import njit, prange
 
 from geometry.kernels.bvh import TreeArrays
+from geometry.kernels.options import KERNEL
 
 EDGE = 1e-10
 HUGE = 1e300
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _enter(lo, hi, o0, o1, o2, i0, i1, i2, t_min, t_max):
     """Where the ray enters a box, inf when it misses; i0.. are the reciprocals of the direction."""
     a, b = (lo[0] - o0) * i0, (hi[0] - o0) * i0
@@ -34,7 +35,7 @@ def _enter(lo, hi, o0, o1, o2, i0, i1, i2, t_min, t_max):
     return max(near - slack, t_min)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _meet(v, o0, o1, o2, d0, d1, d2):
     """t of the crossing with one triangle, NaN when there is none."""
     ex, ey, ez = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
@@ -54,12 +55,12 @@ def _meet(v, o0, o1, o2, d0, d1, d2):
     return (fx * qx + fy * qy + fz * qz) / det
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(**KERNEL, inline="always")
 def _reciprocal(d):
     return 1.0 / d if abs(d) > 1.0 / HUGE else HUGE
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def first_hit(tree: TreeArrays, o0, o1, o2, d0, d1, d2, t_min, t_max):
     """Smallest t in [t_min, t_max] at which the ray meets the mesh, and the triangle; (inf, -1): none."""
     i0, i1, i2 = _reciprocal(d0), _reciprocal(d1), _reciprocal(d2)
@@ -98,7 +99,7 @@ def first_hit(tree: TreeArrays, o0, o1, o2, d0, d1, d2, t_min, t_max):
                 break
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def hit_range(tree, origins, directions, t_min, t_max, lo, hi, t, triangle):
     """``first_hit`` for the rays lo .. hi - 1."""
     for i in range(lo, hi):
@@ -106,7 +107,7 @@ def hit_range(tree, origins, directions, t_min, t_max, lo, hi, t, triangle):
         t[i], triangle[i] = first_hit(tree, o[0], o[1], o[2], d[0], d[1], d[2], t_min, t_max)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(**KERNEL, parallel=True)
 def hits_parallel(tree, origins, directions, t_min, t_max, t, triangle):
     """``hit_range`` over all rays, on the threads numba has."""
     for i in prange(origins.shape[0]):
