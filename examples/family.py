@@ -18,6 +18,7 @@ import numpy as np
 
 from examples import linear
 from examples.connections import TRUTH_KIND, ConnectionSpec
+from examples.gaps import Gap
 from examples.impeller import impeller
 from examples.layout import Layout, LayoutError, check
 from examples.setups import suggest_setup
@@ -103,6 +104,8 @@ def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
 def build_solid(layout: Layout) -> Any:
     """Unite base, walls and connections into one cadquery Solid; raises LayoutError unless it is valid."""
     tools = [w.solid() for w in layout.walls] + [c.solid() for c in layout.connections]
+    if not all(t.isValid() and t.Volume() > 0 for t in tools):
+        raise LayoutError(f"a wall or connection of {layout.name} is no valid solid")
     solids = layout.base.solid().fuse(*tools).clean().Solids()
     if len(solids) != 1 or not solids[0].isValid() or solids[0].Volume() <= 0:
         raise LayoutError(f"the union of {layout.name} is no single valid solid")
@@ -133,7 +136,8 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
 
     Returns walls (index, kind, height, thickness, z range, a point on each side), connections (wall indices, kind,
     z range outside the walls, floor contact, a point inside), channels (wall indices, gap_min within 0.5 %,
-    the point where, whether on the border of a side, facing area) and the seat; all lengths mm.
+    the point where, whether on the border of a side, facing area, and primary: at least a quarter of the smaller
+    side faces the other wall, not a glimpse past or over a wall between) and the seat; all lengths mm.
     """
     gaps = layout.gaps()
     return {
@@ -146,10 +150,15 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
         "connections": [_connection_truth(k, c) for k, c in enumerate(layout.connections)],
         "channels": [
             {"walls": list(g.walls), "gap_min": round(g.gap_min, 6), "at": [round(c, 4) for c in g.at],
-             "border": g.border, "facing_area": round(g.area, 3)}
+             "border": g.border, "facing_area": round(g.area, 3), "primary": _primary(layout, g)}
             for g in gaps
         ],
     }
+
+
+def _primary(layout: Layout, gap: Gap) -> bool:
+    smaller = min(layout.walls[k].length * layout.walls[k].height for k in gap.walls)
+    return bool(gap.area >= 2 * 0.25 * smaller)
 
 
 def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:

@@ -38,7 +38,7 @@ class Gap:
     area: float
 
 
-def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 401, n_v: int = 7) -> list[Gap]:
+def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 241, n_v: int = 5) -> list[Gap]:
     """All channels between the walls of a layout.
 
     walls    : the walls
@@ -88,10 +88,11 @@ def _facing(walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n
 
 def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
     """Distance along rays to one side of a wall; inf where the ray misses it or comes from behind."""
-    grid = np.linspace(0.0, 1.0, 241)
+    grid = np.linspace(0.0, 1.0, 81)
     s, u = np.full(len(origin), np.inf), np.zeros(len(origin))
-    for z in np.unique(origin[:, 2]):
-        rows = np.flatnonzero(origin[:, 2] == z)
+    levels = np.round(origin[:, 2], 6)
+    for z in np.unique(levels):
+        rows = np.flatnonzero(levels == z)
         v = np.full(len(grid), np.clip((z - wall.z_floor) / wall.height, 0.0, 1.0))
         s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], wall.side_point(side, grid, v)[:, :2])
     rows = np.flatnonzero(np.isfinite(s))

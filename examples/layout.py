@@ -122,7 +122,7 @@ def connect(
     z     : mm, height of the axis on the first and on the second wall
     width, depth, bend : mm, see ConnectionSpec; the width is reduced until both ends are buried
     Raises LayoutError where the second wall is missed, the ends cannot be buried, there is no void below,
-    or the connection would meet a third wall.
+    the bend is over 0.3 of the length, or the connection would meet a third wall.
     """
     first, second = walls[pair[0]], walls[pair[1]]
     start = first.axis_point(u, z[0])
@@ -137,6 +137,8 @@ def connect(
     tangents = np.array([_tangent(first, u), _tangent(second, u_end)])
     spec = ConnectionSpec(kind, (first, second), pair, np.array([*start, z[0]]), np.array([*end, z[1]]),
                           tangents, width, depth, bend)
+    if abs(bend) > 0.3 * float(np.linalg.norm(end - start)):
+        raise LayoutError("bent too far for its length")
     for _ in range(8):
         if spec.buried(0.12):
             break
