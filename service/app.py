@@ -1,0 +1,65 @@
+"""The HTTP application: routes, errors and the life of the engine."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from asgi_correlation_id import CorrelationIdMiddleware
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from service import problems
+from service.engine import Engine
+from service.metrics import Metrics, MetricsMiddleware
+from service.openapi import document
+from service.principals import PostRate
+from service.routes import events, health, jobs, library, submissions
+from service.settings import Settings
+
+VERSION = "0.1.0"
+DESCRIPTION = """From a STEP part of walls and internal connections to a milling job that a simulator has proved.
+
+POST a part with its setup, follow the events, fetch report and files. Lengths are mm; every number carries its unit
+in its name. Errors are application/problem+json."""
+
+
+def create_app(settings: Settings | None = None, chain: str = "service.chain") -> FastAPI:
+    """The application.
+
+    settings : taken from the environment when None
+    chain    : module a job's child calls; see ``service.work.WorkConfig``
+    """
+    settings = settings or Settings()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        engine: Engine = app.state.engine
+        app.state.stopping = asyncio.Event()
+        await run_in_threadpool(engine.start)
+        try:
+            yield
+        finally:
+            app.state.stopping.set()
+            await run_in_threadpool(engine.close)
+
+    app = FastAPI(title="zonemill", version=VERSION, description=DESCRIPTION, lifespan=lifespan,
+                  max_body_size=settings.max_body_bytes, separate_input_output_schemas=False,
+                  redirect_slashes=False)
+    app.state.settings, app.state.engine, app.state.metrics = settings, Engine(settings, chain), Metrics()
+    app.state.post_rate = PostRate(settings.post_rate)
+    problems.install(app)
+    for module in (submissions, jobs, events, library, health):
+        app.include_router(module.router)
+    app.add_middleware(MetricsMiddleware, metrics=app.state.metrics)
+    app.add_middleware(CorrelationIdMiddleware, header_name="X-Request-ID")
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = document(app)
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+    return app

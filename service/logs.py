@@ -1,0 +1,34 @@
+"""Logging: structlog to stderr, every line with the id of its request."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import MutableMapping
+from typing import Any
+
+import structlog
+from asgi_correlation_id import correlation_id
+
+
+def _request_id(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    if request_id := correlation_id.get():
+        event["request_id"] = request_id
+    return event
+
+
+def configure(level: str, form: str) -> None:
+    """Send the log to stderr. level: 'debug' ... 'error'; form: 'console' or 'json'."""
+    number = getattr(logging, level.upper())
+    logging.basicConfig(stream=sys.stderr, level=max(number, logging.WARNING), format="%(levelname)s %(name)s "
+                                                                                       "%(message)s")
+    for noisy in ("distributed", "dask", "alembic", "asyncio"):
+        logging.getLogger(noisy).setLevel(logging.ERROR)
+    renderer = structlog.processors.JSONRenderer() if form == "json" else structlog.dev.ConsoleRenderer(
+        colors=sys.stderr.isatty())
+    structlog.configure(
+        processors=[structlog.contextvars.merge_contextvars, _request_id, structlog.processors.add_log_level,
+                    structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
+                    renderer],
+        wrapper_class=structlog.make_filtering_bound_logger(number),
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr), cache_logger_on_first_use=False)

@@ -1,0 +1,66 @@
+"""Counters for Prometheus; one registry per application, so that tests do not share them."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from schemas.jobs import FINAL_STATES
+from service.engine import Engine
+
+STATES = ("queued", "running", *FINAL_STATES)
+
+
+class Metrics:
+    """What is counted."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        self.submissions = Counter("zonemill_submissions_total", "Jobs queued by this process.", ["kind"],
+                                   registry=self.registry)
+        self.jobs = Gauge("zonemill_jobs", "Jobs in the database by state.", ["state"], registry=self.registry)
+        self.capacity = Gauge("zonemill_capacity", "Jobs that can run at a time.", registry=self.registry)
+        self.requests = Histogram("zonemill_request_seconds", "Time to the last byte of a response.",
+                                  ["method", "route", "status"], registry=self.registry)
+
+    def submitted(self, kind: str) -> None:
+        """Count one job."""
+        self.submissions.labels(kind).inc()
+
+    def render(self, engine: Engine) -> bytes:
+        """The text format, with the database asked now."""
+        counts = engine.jobs.counts()
+        for state in STATES:
+            self.jobs.labels(state).set(counts.get(state, 0))
+        self.capacity.set(engine.capacity())
+        return generate_latest(self.registry)
+
+
+class MetricsMiddleware:
+    """Times every request under the pattern of its route, never its path: ids would be labels without end."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self.app, self.metrics = app, metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """ASGI."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        started, seen = time.perf_counter(), {"status": 500}
+
+        async def watched(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                seen["status"] = message["status"]
+            await send(message)
+
+        try:
+            await self.app(scope, receive, watched)
+        finally:
+            route: Any = scope.get("route")
+            pattern = getattr(route, "path", "none")
+            self.metrics.requests.labels(scope["method"], pattern, str(seen["status"])).observe(
+                time.perf_counter() - started)

@@ -1,0 +1,278 @@
+"""preview.png: the part as the planner understands it, and what will be cut.
+
+Left the shaded part: every wall its own colour, connections in one strong
+colour, floors light, edges dark, ids at their places. Right the same view with
+the finishing paths in the colours of their tools, rapids dashed, and what no
+tool reaches in red. Below a legend. No clock, no random number, no graphics
+library: the same input gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from PIL.ImageFont import FreeTypeFont
+
+from geometry.mesh import F64
+from geometry.part import EdgeKind, Part
+from output.model import Motion, Trajectory, Workingstep
+from output.text import ascii_text, decimal
+from service.camera import Camera
+from service.raster import F32, Canvas
+from zones.model import Decomposition
+
+SIZE = (1760, 960)
+HEADER, LEGEND, GUTTER = 56, 132, 8
+RGB = tuple[float, float, float]
+
+WHITE: RGB = (1.0, 1.0, 1.0)
+PAPER: RGB = (0.965, 0.972, 0.98)
+INK: RGB = (0.10, 0.12, 0.15)
+CONNECTION: RGB = (1.0, 0.52, 0.0)
+REMAINDER: RGB = (0.88, 0.0, 0.08)
+RAPID: RGB = (0.35, 0.37, 0.42)
+ROLES: dict[str, RGB] = {
+    "floor": (0.90, 0.89, 0.82), "base": (0.66, 0.68, 0.71), "fillet": (0.80, 0.82, 0.85), "free": (0.74, 0.77, 0.81),
+    "wall": (0.55, 0.68, 0.80), "connection": CONNECTION,
+}
+TOOLS: tuple[RGB, ...] = (
+    (0.00, 0.33, 0.80), (0.00, 0.55, 0.25), (0.58, 0.10, 0.68), (0.00, 0.52, 0.60), (0.62, 0.36, 0.00),
+    (0.85, 0.20, 0.55), (0.25, 0.25, 0.30), (0.40, 0.55, 0.00),
+)
+_MOST_LABELS = 40
+
+
+def draw_preview(
+    part: Part, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None, steps: Sequence[Workingstep],
+    remainder_points: F64 | None, out_path: str | Path, title: str, facts: Mapping[str, str] | None = None,
+) -> None:
+    """Draw part, walls, connections, paths and remainder into a PNG of 1760 x 960 pixels.
+
+    part             : Part, setup frame, mm
+    decomposition    : its walls, connections and face roles
+    zone_of_face     : face number -> zone id; faces without one are drawn darker on the right. None: all alike
+    steps            : the plan; paths of the finishing steps are drawn, of all steps where none is finishing
+    remainder_points : (n, 3) float64, mm, points no tool of the setup reaches, or None
+    out_path         : file to write
+    title            : one line of text
+    facts            : more pairs for the legend, for example {'coverage': '97.2 %'}
+    """
+    width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
+    shown = [s for s in steps if s.operation == "finishing"] or list(steps)
+    camera = _camera(part, shown, (2 * width, 2 * height))
+    left = _draw_part(part, _face_colours(part, decomposition), camera)
+    pale = _draw_part(part, _pale_colours(part, decomposition, zone_of_face), camera)
+    tools = _tool_colours(steps)
+    _draw_paths(pale, camera, shown, tools)
+    if remainder_points is not None and len(remainder_points):
+        pale.dots(camera.screen(remainder_points), REMAINDER, width=4, alpha=0.9, hidden=0.25, bias=0.15 * camera.scale)
+
+    sheet = Image.new("RGB", SIZE, _bytes(WHITE))
+    for canvas, x in ((left, 0), (pale, width + GUTTER)):
+        sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
+    pen = ImageDraw.Draw(sheet)
+    pen.text((20, 14), ascii_text(title), font=_font(26), fill=_bytes(INK))
+    _labels(pen, part, decomposition, camera)
+    _captions(pen, width, shown is not steps and len(shown) != len(steps))
+    _triad(pen, camera, (54, SIZE[1] - LEGEND - 54))
+    for x in (width, SIZE[0]):
+        _scale_bar(pen, camera, (x - 24, SIZE[1] - LEGEND - 24))
+    _legend(pen, decomposition, zone_of_face, steps, tools, remainder_points, facts or {})
+    sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
+
+
+def _camera(part: Part, steps: Sequence[Workingstep], size: tuple[int, int]) -> Camera:
+    cuts = [t.points for s in steps for t in s.trajectories if t.motion is Motion.CUT]
+    return Camera.fit(np.concatenate([part.mesh.vertices, *cuts]), size,
+                      azimuth=math.radians(-58.0), elevation=math.radians(38.0))
+
+
+def wall_colour(index: int) -> RGB:
+    """A soft colour for the wall of that index; neighbours differ, none comes near the orange of connections."""
+    hue = (0.40 + 0.381966 * 0.62 * index) % 0.62 + 0.30
+    return colorsys.hsv_to_rgb(hue % 1.0, (0.46, 0.34, 0.56)[index % 3], (0.80, 0.90, 0.72)[index % 3])
+
+
+def _face_colours(part: Part, decomposition: Decomposition) -> F32:
+    """(n + 1, 3): colour of every face number; 0 is a triangle without a face."""
+    colours = np.empty((len(part.faces) + 1, 3), dtype=np.float32)
+    colours[:] = ROLES["free"]
+    for number, role in decomposition.face_role.items():
+        colours[number] = ROLES.get(role, ROLES["free"])
+    for index, wall in enumerate(decomposition.walls):
+        colours[list(wall.faces)] = wall_colour(index)
+    for connection in decomposition.connections:
+        colours[list(connection.faces)] = CONNECTION
+    return colours
+
+
+def _pale_colours(part: Part, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None) -> F32:
+    """The same, faded, so that paths stand out; faces without a zone grey."""
+    colours = np.asarray(0.25 * _face_colours(part, decomposition) + 0.75 * np.float32(0.95), dtype=np.float32)
+    if zone_of_face is not None:
+        out = [f.number for f in part.faces if f.number not in zone_of_face]
+        colours[out] = (0.70, 0.71, 0.73)
+    return colours
+
+
+def _draw_part(part: Part, colours: F32, camera: Camera) -> Canvas:
+    """Shaded triangles that face the viewer, the edges of the B-rep and the silhouette."""
+    canvas = Canvas.blank(*camera.size, PAPER)
+    mesh = part.mesh
+    front = np.flatnonzero(mesh.normals @ camera.basis[2] > 0.0)
+    key = np.array([-0.35, 0.55, 0.75]) @ camera.basis  # over the viewer's left shoulder
+    fill = np.array([0.9, 0.1, 0.4]) @ camera.basis
+    n = mesh.normals[front]
+    light = 0.46 + 0.46 * np.clip(n @ (key / np.linalg.norm(key)), 0, 1) + 0.16 * np.clip(n @ fill, 0, 1)
+    ids = np.where(mesh.face_ids[front] < len(colours), mesh.face_ids[front], 0)
+    canvas.triangles(camera.screen(mesh.triangles[front]), np.clip(colours[ids] * light[:, None], 0, 1).astype("f4"),
+                     np.maximum(mesh.face_ids[front], 1))
+    canvas.outline(INK, jump=0.02 * min(camera.size))
+    for edge in part.edges:
+        if edge.kind is not EdgeKind.SMOOTH and len(edge.points) > 1:
+            canvas.strokes(_segments(camera, edge.points), INK, width=2, alpha=0.75, bias=3.0)
+    return canvas
+
+
+def _segments(camera: Camera, points: F64) -> F64:
+    """(n - 1, 2, 3) screen segments of a polyline of (n, 3) points."""
+    p = camera.screen(points)
+    return np.stack([p[:-1], p[1:]], axis=1)
+
+
+def _tool_colours(steps: Sequence[Workingstep]) -> dict[int, RGB]:
+    numbers = sorted({s.tool.number for s in steps})
+    return {n: TOOLS[i % len(TOOLS)] for i, n in enumerate(numbers)}
+
+
+def _draw_paths(canvas: Canvas, camera: Camera, steps: Sequence[Workingstep], tools: Mapping[int, RGB]) -> None:
+    """Cuts as full lines, feed links thin, rapids dashed on top."""
+    for step in steps:
+        colour = tools[step.tool.number]
+        for motion, alpha in ((Motion.CUT, 0.75), (Motion.CONNECT, 0.45), (Motion.APPROACH, 0.45), (Motion.LIFT, 0.45)):
+            for lines in _of_motion(camera, step.trajectories, motion):
+                canvas.strokes(lines, colour, width=2, alpha=alpha, hidden=0.10, bias=4.0)
+    for step in steps:
+        for lines in _of_motion(camera, step.trajectories, Motion.RAPID):
+            canvas.strokes(lines, RAPID, width=1, alpha=0.7, hidden=0.15, bias=4.0, dash=8.0)
+
+
+def _of_motion(camera: Camera, trajectories: Sequence[Trajectory], motion: Motion) -> list[F64]:
+    return [_segments(camera, t.points) for t in trajectories if t.motion is motion]
+
+
+# --- words and signs -------------------------------------------------------------------------------------------
+
+
+def _font(size: int) -> FreeTypeFont:
+    """Pillow's own font: the same glyphs on every machine."""
+    font = ImageFont.load_default(size)
+    if not isinstance(font, FreeTypeFont):
+        raise RuntimeError("Pillow was built without FreeType")
+    return font
+
+
+def _bytes(colour: RGB) -> tuple[int, int, int]:
+    r, g, b = (int(round(255 * max(0.0, min(1.0, c)))) for c in colour)
+    return (r, g, b)
+
+
+def _labels(pen: ImageDraw.ImageDraw, part: Part, decomposition: Decomposition, camera: Camera) -> None:
+    """Ids of walls at their upper rims and of connections at their tops, on the left picture."""
+    named = [(c.id, c.faces) for c in decomposition.connections] + [(w.id, w.faces) for w in decomposition.walls]
+    if len(named) > _MOST_LABELS:
+        named = named[-_MOST_LABELS:] if len(decomposition.walls) >= _MOST_LABELS else named
+    for name, faces in named[:_MOST_LABELS]:
+        points = part.mesh.triangles[np.isin(part.mesh.face_ids, faces)].reshape(-1, 3)
+        if not len(points):
+            continue
+        rim = points[points[:, 2] >= points[:, 2].max() - 0.05 * max(float(np.ptp(points[:, 2])), 1e-9)]
+        wall = name.startswith("W")
+        at = rim[np.argmax(camera.screen(rim)[:, 1])] if wall else rim.mean(axis=0)
+        x, y, _ = 0.5 * camera.screen(at)
+        pen.text((x, HEADER + y + (6 if wall else 0)), name, font=_font(17), anchor="mt" if wall else "mm",
+                 fill=_bytes(INK), stroke_width=3, stroke_fill=_bytes(WHITE))
+
+
+def _captions(pen: ImageDraw.ImageDraw, width: int, partly: bool) -> None:
+    grey = _bytes((0.35, 0.38, 0.43))
+    pen.text((20, HEADER + 12), "Walls and connections", font=_font(17), fill=grey)
+    text = "Finishing paths and remainder" + (" (roughing not drawn)" if partly else "")
+    pen.text((width + GUTTER + 20, HEADER + 12), text, font=_font(17), fill=grey)
+
+
+def _triad(pen: ImageDraw.ImageDraw, camera: Camera, origin: tuple[float, float]) -> None:
+    for axis, (name, colour) in enumerate((("X", (0.80, 0.10, 0.10)), ("Y", (0.05, 0.55, 0.10)),
+                                           ("Z", (0.10, 0.25, 0.80)))):
+        dx, dy = 36.0 * camera.basis[0, axis], -36.0 * camera.basis[1, axis]
+        pen.line([origin, (origin[0] + dx, origin[1] + dy)], fill=_bytes(colour), width=3)
+        pen.text((origin[0] + 1.32 * dx, origin[1] + 1.32 * dy), name, font=_font(15), anchor="mm", fill=_bytes(colour))
+
+
+def scale_length(scale: float, width: float = 200.0) -> float:
+    """The longest of 1, 2, 5 x 10^k mm that is at most ``width`` pixels at ``scale`` pixels per mm."""
+    longest = width / scale
+    ten = 10.0 ** math.floor(math.log10(longest))
+    return max(k * ten for k in (1.0, 2.0, 5.0) if k * ten <= longest * (1 + 1e-12))
+
+
+def _scale_bar(pen: ImageDraw.ImageDraw, camera: Camera, end: tuple[float, float]) -> None:
+    pixels = 0.5 * camera.scale  # of a mm in the halved picture
+    length = scale_length(pixels)
+    x0, x1, y = end[0] - length * pixels, end[0], end[1]
+    ink = _bytes(INK)
+    pen.line([(x0, y), (x1, y)], fill=ink, width=2)
+    for x in (x0, x1):
+        pen.line([(x, y - 5), (x, y + 5)], fill=ink, width=2)
+    pen.text((0.5 * (x0 + x1), y - 6), f"{decimal(length)} mm", font=_font(15), anchor="mb", fill=ink)
+
+
+def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None,
+            steps: Sequence[Workingstep], tools: Mapping[int, RGB], remainder: F64 | None,
+            facts: Mapping[str, str]) -> None:
+    """Three columns below the pictures: counts and facts, surfaces, tools and lines."""
+    top = SIZE[1] - LEGEND + 12
+    zones = {s.zone for s in steps if s.zone} | set((zone_of_face or {}).values())
+    counts = {"walls": len(decomposition.walls), "connections": len(decomposition.connections),
+              "channels": len(decomposition.channels), "zones": len(zones), "steps": len(steps)}
+    pairs = [(k, str(v)) for k, v in counts.items()] + [(k, str(v)) for k, v in facts.items()]
+    _pairs(pen, pairs, 20, top)
+    surfaces: list[tuple[str, RGB | None]] = [(w.id, wall_colour(i)) for i, w in enumerate(decomposition.walls[:12])]
+    if len(decomposition.walls) > 12:
+        surfaces.append((f"and {len(decomposition.walls) - 12} more walls", None))
+    surfaces += [("connection", CONNECTION), ("floor", ROLES["floor"]), ("fillet", ROLES["fillet"]),
+                 ("base", ROLES["base"])]
+    _swatches(pen, surfaces, 590, top, columns=4, step=140)
+    lines: list[tuple[str, RGB | None]] = []
+    for number, colour in tools.items():
+        body = next(s.tool for s in steps if s.tool.number == number)
+        lines.append((f"T{number} {body.kind} D{decimal(body.diameter)}"
+                      + (f" R{decimal(body.corner_radius)}" if body.kind == "bull" else ""), colour))
+    lines.append(("rapid", RAPID))
+    if remainder is not None and len(remainder):
+        lines.append(("no tool reaches", REMAINDER))
+    if zone_of_face is not None:
+        lines.append(("face without zone", (0.70, 0.71, 0.73)))
+    _swatches(pen, lines, 1180, top, columns=3, step=190)
+
+
+def _pairs(pen: ImageDraw.ImageDraw, pairs: Sequence[tuple[str, str]], x: int, y: int) -> None:
+    grey = _bytes((0.35, 0.38, 0.43))
+    for i, (key, value) in enumerate(pairs[:10]):
+        left, line = x + 270 * (i // 5), y + 21 * (i % 5)
+        pen.text((left, line), ascii_text(key), font=_font(15), fill=grey)
+        pen.text((left + 125, line), ascii_text(value), font=_font(15), fill=_bytes(INK))
+
+
+def _swatches(pen: ImageDraw.ImageDraw, entries: Sequence[tuple[str, RGB | None]], x: int, y: int, *, columns: int,
+              step: int) -> None:
+    for i, (name, colour) in enumerate(entries[:5 * columns]):
+        left, line = x + step * (i // 5), y + 21 * (i % 5)
+        if colour is not None:
+            pen.rectangle([left, line + 2, left + 22, line + 14], fill=_bytes(colour), outline=_bytes((0.5, 0.5, 0.5)))
+        pen.text((left + 30, line), ascii_text(name), font=_font(15), fill=_bytes(INK))

@@ -1,0 +1,96 @@
+"""Every error leaves as application/problem+json: ours, the framework's and the ones nobody expected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import structlog
+from asgi_correlation_id import correlation_id
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from geometry.errors import CamError, InternalError
+from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
+from service.errors import (
+    ERROR_TABLE,
+    MethodError,
+    NotFoundError,
+    RateError,
+    RequestError,
+    ServiceError,
+    TooLargeError,
+    UnauthorizedError,
+    problem_document,
+)
+
+log = structlog.get_logger(__name__)
+
+
+def problem_response(request: Request, error: CamError, headers: dict[str, str] | None = None) -> JSONResponse:
+    """The response that an error becomes."""
+    body = problem_document(error, request.url.path, correlation_id.get())
+    extra = dict(headers or {})
+    if isinstance(error, UnauthorizedError):
+        extra["WWW-Authenticate"] = "Bearer"
+    if isinstance(error, RateError):
+        extra["Retry-After"] = "5"
+    return JSONResponse(body, body["status"], extra, PROBLEM_MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Register the handlers."""
+    app.add_exception_handler(CamError, _ours)
+    app.add_exception_handler(HTTPException, _framework)
+    app.add_exception_handler(RequestValidationError, _validation)
+    app.add_exception_handler(Exception, _unexpected)
+
+
+async def _ours(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, CamError)
+    return problem_response(request, error)
+
+
+async def _framework(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    limit = request.app.state.settings.max_body_bytes
+    text = str(error.detail)
+    named: dict[int, CamError] = {
+        401: UnauthorizedError(text),
+        404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path"),
+        405: MethodError(f"{request.method} is not offered at {request.url.path}"),
+        413: TooLargeError(f"the request body is larger than {limit / 1e6:g} MB", limit=limit,
+                           remedy="send a smaller file or raise ZONEMILL_MAX_BODY_MB"),
+    }
+    fallback = RequestError(text) if error.status_code == 422 else ServiceError(text)
+    headers = dict(error.headers) if error.headers else None
+    return problem_response(request, named.get(error.status_code, fallback), headers)
+
+
+async def _validation(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": e["msg"]} for e in error.errors()]
+    first = problems[0]
+    return problem_response(request, RequestError(f"{first['at']}: {first['problem']}", measured=problems,
+                                                  subjects=tuple(p["at"] for p in problems),
+                                                  remedy="see the schema in /openapi.json"))
+
+
+async def _unexpected(request: Request, error: Exception) -> JSONResponse:
+    log.exception("bug in a route", path=request.url.path, exc_info=error)
+    return problem_response(request, InternalError("a bug in the service; the log has the details under this request "
+                                                   "id", code="bug"))
+
+
+def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:
+    """The ``responses=`` of a route that may raise these errors, for the OpenAPI document."""
+    found: dict[int | str, dict[str, Any]] = {}
+    for kind in kinds:
+        row = ERROR_TABLE[kind]
+        entry = found.setdefault(int(row.status), {
+            "description": row.title,
+            "content": {PROBLEM_MEDIA_TYPE: {"schema": {"$ref": f"#/components/schemas/{Problem.__name__}"}}}})
+        if row.title not in entry["description"]:
+            entry["description"] += f"; {row.title[0].lower()}{row.title[1:]}"
+    return found

@@ -1,0 +1,155 @@
+"""From database rows and result folders to the wire models of jobs and files."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.engine import RowMapping
+
+from geometry.errors import error_from_dict
+from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks
+from schemas.problem import Problem
+from service.artifacts import Artifacts
+from service.errors import NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
+
+MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml"}
+INTERNAL_FILES = frozenset({"state"})
+
+
+def path_of(row: RowMapping) -> str:
+    """Path of a job."""
+    return f"/v1/jobs/{row['id']}"
+
+
+def _time(seconds: float | None) -> str | None:
+    if seconds is None:
+        return None
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def job_resource(row: RowMapping) -> Job:
+    """The job as the interface shows it."""
+    path, kind = path_of(row), row["kind"]
+    links = JobLinks(self=path, events=f"{path}/events", files=f"{path}/files",
+                     zones=f"{path}/zones" if kind != "verify" else None,
+                     report=f"{path}/report" if kind != "zones" else None)
+    error = None
+    if row["error_json"]:
+        error = Problem(**problem_document(error_from_dict(json.loads(row["error_json"])), path))
+    return Job(id=row["id"], kind=kind, state=row["state"], stage=row["stage"], progress=row["progress"],
+               attempt=row["attempt"], content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
+               setup_sha256=row["setup_sha256"], labels=json.loads(row["labels_json"]),
+               created_at=_time(row["created"]) or "", finished_at=_time(row["finished"]), error=error, links=links)
+
+
+def event_data(row: RowMapping) -> str:
+    """Data of one event, JSON."""
+    return json.dumps({"id": row["id"], "state": row["state"], "stage": row["stage"], "progress": row["progress"]})
+
+
+def encode_cursor(job_id: str) -> str:
+    """The cursor after a job."""
+    return base64.urlsafe_b64encode(job_id.encode()).decode().rstrip("=")
+
+
+def decode_cursor(cursor: str) -> str:
+    """The job a cursor stands for.
+
+    Raises
+    ------
+    RequestError
+        It is no cursor of ours.
+    """
+    try:
+        text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
+    except (binascii.Error, ValueError):
+        text = ""
+    if not (text.startswith("j") and text[1:].isalnum() and len(text) <= 40):
+        raise RequestError("the cursor is not one this service gave out", code="bad_cursor", subjects=("cursor",),
+                           remedy="take next_cursor of the page before")
+    return text
+
+
+def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
+    """Folder of a job's result.
+
+    Raises
+    ------
+    NotReadyError
+        The job has not ended, or ended without a result.
+    """
+    if row["state"] not in FINAL_STATES:
+        raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
+                            remedy="follow its events until it ends")
+    if not row["artifact"]:
+        raise NotReadyError(f"job {row['id']} ended as {row['state']} and left no result", code="no_result",
+                            subjects=(row["id"],), remedy="see the error of the job")
+    folder = artifacts.result(row["artifact"])
+    if not folder.is_dir():
+        raise NotFoundError(f"the files of job {row['id']} are gone from the data folder", code="result_gone",
+                            subjects=(row["id"],), remedy="post the same content again")
+    return folder
+
+
+def is_program(name: str) -> bool:
+    """Whether a file drives a machine: NC programs and STEP-NC."""
+    return name.endswith(".stpnc") or name.startswith("program.")
+
+
+def withheld(folder: Path, row: RowMapping) -> WithheldError:
+    """The error that tells why the programs of an unproved job are kept back."""
+    findings: list[Any] = []
+    report = folder / "report.json"
+    if report.exists():
+        findings = json.loads(report.read_bytes()).get("findings") or []
+    first = f"; first finding: {json.dumps(findings[0], sort_keys=True)[:300]}" if findings else ""
+    return WithheldError(f"job {row['id']} is {row['state']}, so neither NC nor STEP-NC is handed out{first}",
+                         subjects=(row["id"],), measured=findings[:20], limit=[],
+                         remedy=f"GET {path_of(row)}/report lists findings and remainder")
+
+
+def list_files(folder: Path, row: RowMapping) -> JobFiles:
+    """The files of a job that may be handed out."""
+    proved = row["state"] == "proved"
+    items = [JobFile(name=p.name, size_bytes=p.stat().st_size, sha256=file_sha256(p), media_type=media_type(p.name),
+                     href=f"{path_of(row)}/files/{p.name}")
+             for p in sorted(folder.iterdir())
+             if p.is_file() and p.name not in INTERNAL_FILES and (proved or not is_program(p.name))]
+    reason = withheld(folder, row).message if row["kind"] == "plan" and not proved else None
+    return JobFiles(items=items, withheld=reason)
+
+
+def find_file(folder: Path, row: RowMapping, name: str) -> Path:
+    """One file of a job.
+
+    Raises
+    ------
+    WithheldError
+        It is a program, and the job is not proved.
+    NotFoundError
+        There is no such file.
+    """
+    if is_program(name) and row["state"] != "proved":
+        raise withheld(folder, row)
+    known = {p.name: p for p in folder.iterdir() if p.is_file() and p.name not in INTERNAL_FILES}
+    if name not in known:
+        raise NotFoundError(f"job {row['id']} has no file '{name}'", code="no_such_file", subjects=(name,),
+                            remedy=f"GET {path_of(row)}/files lists the files")
+    return known[name]
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file, hex."""
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def media_type(name: str) -> str:
+    """Media type by extension; programs are plain text."""
+    return MEDIA_TYPES.get(Path(name).suffix, "text/plain; charset=utf-8")

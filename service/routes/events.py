@@ -1,0 +1,65 @@
+"""GET /v1/jobs/{id}/events: server-sent events, a few a second, ending with the final state.
+
+An event's id is the job's change counter. Whoever connects, or comes back with Last-Event-ID, first gets the job as
+it stands unless that event is what they had last; a client that comes back after the final event gets 204, which
+tells an EventSource to stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Request
+from fastapi.responses import Response, StreamingResponse
+from fastapi.sse import format_sse_event
+from sqlalchemy.engine import RowMapping
+from starlette.concurrency import run_in_threadpool
+
+from schemas.jobs import FINAL_STATES
+from service.errors import NotFoundError, RequestError, UnauthorizedError
+from service.principals import Principal
+from service.problems import responses
+from service.resources import event_data
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+KEEP_ALIVE_S = 10.0
+STREAM: dict[int | str, dict[str, Any]] = {
+    200: {"description": "Events 'progress' and, once, 'end'; data is a JobEvent.",
+          "content": {"text/event-stream": {"schema": {"type": "string"}}}},
+    204: {"description": "Last-Event-ID was the final event."}}
+
+
+@router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,
+            responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError))
+async def follow(request: Request, principal: Principal, job_id: str,
+                 last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=20)] = None) -> Response:
+    """Progress of a job until it ends."""
+    row = await run_in_threadpool(request.app.state.engine.jobs.get, job_id, principal)
+    # isdecimal also holds for other scripts' digits; an id of ours is ASCII
+    seen = int(last) if last is not None and last.isascii() and last.isdecimal() else -1
+    if row["state"] in FINAL_STATES and row["event_seq"] == seen:
+        return Response(status_code=204)
+    return StreamingResponse(_stream(request, row, seen), media_type="text/event-stream",
+                             headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
+
+
+async def _stream(request: Request, row: RowMapping, seen: int) -> AsyncIterator[bytes]:
+    jobs, interval = request.app.state.engine.jobs, max(0.2, request.app.state.settings.poll_s)
+    stopping: asyncio.Event = request.app.state.stopping
+    spoken = time.monotonic()
+    while True:
+        final = row["state"] in FINAL_STATES
+        if final or row["event_seq"] != seen:
+            seen, spoken = row["event_seq"], time.monotonic()
+            yield format_sse_event(data_str=event_data(row), event="end" if final else "progress", id=str(seen))
+        elif time.monotonic() - spoken > KEEP_ALIVE_S:
+            spoken = time.monotonic()
+            yield b": still here\n\n"
+        if final or stopping.is_set():
+            return
+        await asyncio.sleep(interval)
+        row = await run_in_threadpool(jobs.get, row["id"])

@@ -1,0 +1,38 @@
+"""/healthz, /readyz, /metrics: for whoever runs the service."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from schemas.jobs import Health
+from service.errors import UnauthorizedError
+from service.principals import Principal
+from service.problems import responses
+
+router = APIRouter(tags=["operation"])
+
+
+@router.get("/healthz", operation_id="healthz")
+def healthz() -> Health:
+    """The process answers."""
+    return Health(status="ok")
+
+
+@router.get("/readyz", operation_id="readyz", responses={503: {"model": Health, "description": "Not ready."}})
+def readyz(request: Request, response: Response) -> Health:
+    """Database and engine answer too; 503 with the reason when they do not."""
+    checks = request.app.state.engine.ready()
+    if all(text == "ok" for text in checks.values()):
+        return Health(status="ok", checks=checks)
+    response.status_code = 503
+    return Health(status="unready", checks=checks)
+
+
+@router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse,
+            responses=responses(UnauthorizedError))
+def metrics(request: Request, _: Principal) -> Response:
+    """Counters in the Prometheus text format."""
+    text = request.app.state.metrics.render(request.app.state.engine)
+    return Response(text, media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,104 @@
+"""/v1/jobs: one job, pages of jobs, cancel, zones, report and files."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import FileResponse, Response
+
+from schemas.jobs import Job, JobFiles, JobKind, JobPage, JobState
+from schemas.report import Report, Verification
+from schemas.zones import Zones
+from service.errors import NotFoundError, NotReadyError, RequestError, UnauthorizedError, WithheldError
+from service.principals import Principal
+from service.problems import responses
+from service.resources import (
+    decode_cursor,
+    encode_cursor,
+    file_sha256,
+    find_file,
+    job_resource,
+    list_files,
+    media_type,
+    result_folder,
+)
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+ONE = responses(UnauthorizedError, NotFoundError, RequestError)
+RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError)
+
+
+@router.get("", operation_id="listJobs", summary="Your jobs, newest first", responses=responses(UnauthorizedError,
+                                                                                              RequestError))
+def list_jobs(request: Request, principal: Principal, limit: Annotated[int, Query(ge=1, le=200)] = 50,
+              cursor: Annotated[str | None, Query(max_length=100)] = None, state: JobState | None = None,
+              kind: JobKind | None = None) -> JobPage:
+    """A page of jobs; pages do not shift when jobs are added."""
+    before = decode_cursor(cursor) if cursor is not None else None
+    rows = request.app.state.engine.jobs.page(principal, limit=limit + 1, before=before, state=state, kind=kind)
+    following = encode_cursor(rows[limit - 1]["id"]) if len(rows) > limit else None
+    return JobPage(items=[job_resource(r) for r in rows[:limit]], next_cursor=following)
+
+
+@router.get("/{job_id}", operation_id="getJob", summary="One job", responses=ONE)
+def get_job(request: Request, principal: Principal, job_id: str) -> Job:
+    """State, stage, progress and links."""
+    return job_resource(request.app.state.engine.jobs.get(job_id, principal))
+
+
+@router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job", responses=ONE)
+def cancel_job(request: Request, principal: Principal, job_id: str) -> Job:
+    """Cancel a job that has not ended; one that has ended is answered as it is."""
+    jobs = request.app.state.engine.jobs
+    jobs.get(job_id, principal)
+    jobs.cancel(job_id)
+    return job_resource(jobs.get(job_id, principal))
+
+
+@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT,
+            response_model=Zones)
+def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
+    """Walls, connections, channels, zones and remainder."""
+    return _document(request, principal, job_id, "zones.json")
+
+
+@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT,
+            response_model=Report | Verification)
+def get_report(request: Request, principal: Principal, job_id: str) -> Response:
+    """The plan and its proof; of a verification, its findings."""
+    return _document(request, principal, job_id, "report.json")
+
+
+@router.get("/{job_id}/files", operation_id="listFiles", summary="Files of a job", responses=RESULT)
+def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
+    """All files that may be handed out."""
+    row = request.app.state.engine.jobs.get(job_id, principal)
+    return list_files(result_folder(request.app.state.engine.artifacts, row), row)
+
+
+FILE_OK: dict[int | str, dict[str, Any]] = {200: {
+    "description": "The file; ETag is its SHA-256.",
+    "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}}
+
+
+@router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
+            responses=FILE_OK | responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError,
+                                          WithheldError))
+def get_file(request: Request, principal: Principal, job_id: str, name: str) -> FileResponse:
+    """A file. Programs and STEP-NC of a job that is not proved are withheld (409)."""
+    row = request.app.state.engine.jobs.get(job_id, principal)
+    path = find_file(result_folder(request.app.state.engine.artifacts, row), row, name)
+    return FileResponse(path, media_type=media_type(name), filename=name,
+                        headers={"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"})
+
+
+def _document(request: Request, principal: str, job_id: str, name: str) -> Response:
+    """The bytes of a JSON result, as the child wrote them."""
+    engine = request.app.state.engine
+    row = engine.jobs.get(job_id, principal)
+    path = result_folder(engine.artifacts, row) / name
+    if not path.is_file():
+        raise NotFoundError(f"a job of kind {row['kind']} has no {name}", code="no_such_document", subjects=(name,))
+    return Response(path.read_bytes(), media_type="application/json")

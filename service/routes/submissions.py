@@ -1,0 +1,88 @@
+"""POST /v1/jobs, /v1/zones, /v1/verifications: the same chain, whole or cut short; each answers 202 with a job."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Request, Response, status
+from starlette.concurrency import run_in_threadpool
+
+from geometry.errors import ProgramError, SetupError, StepError
+from schemas.jobs import Job
+from service.errors import (
+    KeyConflictError,
+    MethodError,
+    RateError,
+    RequestError,
+    ServiceError,
+    TooLargeError,
+    UnauthorizedError,
+    UnavailableError,
+)
+from service.principals import Principal, submission_rate
+from service.problems import responses
+from service.resources import job_resource, path_of
+from service.uploads import new_job, read_form
+
+router = APIRouter(prefix="/v1", tags=["submissions"], dependencies=[Depends(submission_rate)])
+
+IdempotencyKey = Annotated[str | None, Header(
+    alias="Idempotency-Key", min_length=1, max_length=255,
+    description="Optional. The same key with the same content answers the same job; with other content 422.")]
+ERRORS = responses(ServiceError, StepError, SetupError, ProgramError, RequestError, KeyConflictError, TooLargeError,
+                   UnauthorizedError, RateError, MethodError, UnavailableError)
+ACCEPTED: dict[int | str, dict[str, Any]] = {202: {
+    "description": "The job; its path stands in Location.",
+    "headers": {"Location": {"description": "Path of the job.", "schema": {"type": "string"}}}}}
+
+
+def multipart(with_program: bool) -> dict[str, Any]:
+    """OpenAPI request body of a submission: ``setup`` is typed, so clients build it from classes."""
+    properties: dict[str, Any] = {
+        "part": {"type": "string", "format": "binary", "description": "The STEP file (ISO 10303-21)."},
+        "setup": {"$ref": "#/components/schemas/Setup"},
+    }
+    encoding = {"part": {"contentType": "model/step, application/step, application/octet-stream"},
+                "setup": {"contentType": "application/json"}}
+    if with_program:
+        properties["program"] = {"type": "string", "format": "binary", "description": "The NC program."}
+        encoding["program"] = {"contentType": "text/plain, application/octet-stream"}
+    schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
+              "properties": properties, "required": list(properties), "additionalProperties": False}
+    return {"requestBody": {"required": True, "content": {"multipart/form-data": {
+        "schema": schema, "encoding": encoding}}}}
+
+
+async def _submit(request: Request, response: Response, kind: str, principal: str, key: str | None) -> Job:
+    engine = request.app.state.engine
+    form = await read_form(request, with_program=kind == "verify")
+    new = await run_in_threadpool(new_job, engine, kind, principal, key, form)
+    row, fresh = await run_in_threadpool(engine.jobs.create, new)
+    if fresh:
+        engine.wake()
+        request.app.state.metrics.submitted(kind)
+    response.headers["Location"] = path_of(row)
+    return job_resource(row)
+
+
+@router.post("/jobs", status_code=status.HTTP_202_ACCEPTED, operation_id="createJob", summary="Plan and prove a part",
+             responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
+async def create_job(request: Request, response: Response, principal: Principal, key: IdempotencyKey = None) -> Job:
+    """Queue the whole chain: zones, tool paths, program, proof."""
+    return await _submit(request, response, "plan", principal, key)
+
+
+@router.post("/zones", status_code=status.HTTP_202_ACCEPTED, operation_id="createZones", summary="Dry check of a part",
+             responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
+async def create_zones(request: Request, response: Response, principal: Principal,
+                       key: IdempotencyKey = None) -> Job:
+    """Queue the decomposition alone: reach, remainder, the tool to buy."""
+    return await _submit(request, response, "zones", principal, key)
+
+
+@router.post("/verifications", status_code=status.HTTP_202_ACCEPTED, operation_id="createVerification",
+             summary="Prove a program", responses=ACCEPTED | ERRORS, openapi_extra=multipart(True))
+async def create_verification(request: Request, response: Response, principal: Principal,
+                              key: IdempotencyKey = None) -> Job:
+    """Queue the proof of a program, also a foreign one, against part and setup."""
+    return await _submit(request, response, "verify", principal, key)

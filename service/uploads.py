@@ -1,0 +1,136 @@
+"""Multipart submissions: part, setup and program, checked before anything is queued."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+from fastapi import Request
+from starlette.datastructures import UploadFile
+from starlette.exceptions import HTTPException
+
+from geometry.errors import InputError, ProgramError, SetupError
+from geometry.step_text import check_text
+from schemas.setup import Setup, canonical_json, setup_sha256
+from service.artifacts import Artifacts
+from service.convert import parse_setup
+from service.engine import Engine
+from service.errors import RequestError
+from service.store import NewJob
+
+CHUNK = 1 << 20
+MAX_SETUP_BYTES = 4_000_000
+KEY_LIMIT = 255
+
+
+@dataclass(frozen=True)
+class Form:
+    """The parts of a multipart request, as sent."""
+
+    part: UploadFile
+    setup: bytes
+    program: UploadFile | None
+
+
+async def read_form(request: Request, *, with_program: bool) -> Form:
+    """Read a multipart form, spooling files to disk; the body limit of the app holds.
+
+    Raises
+    ------
+    RequestError
+        A part is missing, or one stands there that is not known.
+    """
+    wanted = {"part", "setup"} | ({"program"} if with_program else set())
+    if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
+        raise RequestError("the body must be multipart/form-data", code="not_multipart",
+                           remedy="curl -F part=@PART.step -F 'setup=@SETUP.json;type=application/json'")
+    try:
+        form = await request.form(max_files=4, max_fields=4, max_part_size=MAX_SETUP_BYTES)
+    except HTTPException as error:
+        if error.status_code == 413:
+            raise
+        raise RequestError(f"the multipart body cannot be read: {error.detail}", code="bad_multipart") from None
+    names = list(form.keys())
+    for name in sorted(set(names) - wanted):
+        raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part")
+    for name in sorted(wanted):
+        if names.count(name) != 1:
+            raise RequestError(f"the form needs exactly one part '{name}'", subjects=(name,), code="missing_part",
+                               remedy=f"send {' and '.join(sorted(wanted))}")
+    part, program = form["part"], form.get("program")
+    if not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile)):
+        raise RequestError("part and program must be sent as files, with a file name", code="not_a_file",
+                           subjects=("part",), remedy="curl -F part=@PART.step")
+    return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None)
+
+
+async def _bytes_of(field: Any) -> bytes:
+    if not isinstance(field, UploadFile):
+        return str(field).encode()
+    data = await field.read(MAX_SETUP_BYTES + 1)
+    if len(data) > MAX_SETUP_BYTES:
+        raise SetupError("the setup is larger than 4 MB", code="setup_too_large", limit=MAX_SETUP_BYTES)
+    return data
+
+
+def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Form) -> NewJob:
+    """Check and store what was sent, and describe the job; runs in a thread, since it reads and writes files.
+
+    Raises
+    ------
+    StepError, SetupError, ProgramError
+        What was sent is wrong by itself; nothing is queued.
+    RequestError
+        The Idempotency-Key is empty or too long.
+    """
+    if key is not None and not 1 <= len(key) <= KEY_LIMIT:
+        raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
+                           measured=len(key), limit=KEY_LIMIT)
+    setup = parse_setup(form.setup, engine.library.all())
+    part_sha = store_part(engine.artifacts, form.part.file)
+    program_sha = _store_program(engine.artifacts, form.program.file) if form.program else None
+    setup_sha = setup_sha256(setup)
+    return NewJob(kind, principal, content_of(part_sha, setup_sha, program_sha), part_sha, setup_sha,
+                  canonical_json(setup).decode(), _labels(setup), program_sha, key)
+
+
+def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
+    """Store a STEP file and return its hash; its text is checked first.
+
+    Raises
+    ------
+    StepError
+        Empty, no STEP file, cut off, or with references that lead nowhere.
+    """
+    sha, _ = artifacts.put_blob(_chunks(file))
+    try:
+        check_text(artifacts.blob(sha))
+    except InputError:
+        artifacts.blob(sha).unlink(missing_ok=True)
+        raise
+    return sha
+
+
+def _store_program(artifacts: Artifacts, file: BinaryIO) -> str:
+    sha, size = artifacts.put_blob(_chunks(file))
+    if size == 0:
+        raise ProgramError("the program is empty", code="empty_program")
+    return sha
+
+
+def _chunks(file: BinaryIO) -> Iterator[bytes]:
+    file.seek(0)
+    while chunk := file.read(CHUNK):
+        yield chunk
+
+
+def content_of(part_sha256: str, setup_sha: str, program_sha256: str | None = None) -> str:
+    """The content hash of ``schemas.setup.content_hash``, from hashes; a program counts too."""
+    text = f"{part_sha256}:{setup_sha}" + (f":{program_sha256}" if program_sha256 else "")
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _labels(setup: Setup) -> dict[str, str]:
+    return dict(setup.labels)

@@ -1,0 +1,90 @@
+"""The service with a chain that does what a label says, served in this process."""
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+
+STEP = (b"ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+        b"FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\n"
+        b"END-ISO-10303-21;\n")
+
+
+@pytest.fixture(scope="module")
+def fake_path():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(Path(__file__).parent / "fakes"))
+        yield
+
+
+@pytest.fixture
+def make_client(fake_path, tmp_path):
+    """Start the service with other settings; clients are closed at the end of the test."""
+    opened = []
+
+    def start(**settings):
+        values = {"data_dir": tmp_path / "data", "workers": 1, "child_threads": 1, "poll_s": 0.05,
+                  "job_time_limit_s": 20, "post_rate": "10000/minute", **settings}
+        client = TestClient(create_app(Settings(**values), chain="fake_chain"), raise_server_exceptions=False)
+        client.__enter__()
+        opened.append(client)
+        return client
+
+    yield start
+    for client in opened:
+        client.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="module")
+def client(fake_path, tmp_path_factory):
+    """One service for all tests of a module that need nothing special."""
+    settings = Settings(data_dir=tmp_path_factory.mktemp("data"), workers=1, child_threads=1, poll_s=0.05,
+                        job_time_limit_s=20, job_memory_limit_mb=400, max_body_mb=2, post_rate="10000/minute")
+    app = create_app(settings, chain="fake_chain")
+    with TestClient(app, raise_server_exceptions=False) as found:
+        yield found
+
+
+@pytest.fixture
+def setup_json():
+    """A setup; the label "do" tells the fake chain what to do."""
+
+    def make(do="", **fields):
+        labels = {"do": do} if do else {}
+        return {"tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3}], "labels": labels, **fields}
+
+    return make
+
+
+@pytest.fixture
+def post(setup_json):
+    """Post a job: (client, do, path, part, key, setup, program) -> response."""
+
+    def send(client, do="", *, path="/v1/jobs", part=STEP, key=None, setup=None, program=None, headers=None):
+        text = json.dumps(setup_json(do)) if setup is None else setup if isinstance(setup, str) else json.dumps(setup)
+        files = {"part": ("part.step", part, "model/step"), "setup": ("setup.json", text, "application/json")}
+        if program is not None:
+            files["program"] = ("x.ngc", program, "text/plain")
+        extra = {"Idempotency-Key": key} if key is not None else {}
+        return client.post(path, files=files, headers={**extra, **(headers or {})})
+
+    return send
+
+
+@pytest.fixture
+def finish():
+    """Wait for a job to end and return it."""
+
+    def wait(client, job, patience=20.0, until=("queued", "running"), headers=None):
+        deadline = time.monotonic() + patience
+        while job["state"] in until and time.monotonic() < deadline:
+            time.sleep(0.02)
+            job = client.get(job["links"]["self"], headers=headers).json()
+        return job
+
+    return wait

@@ -1,0 +1,66 @@
+"""A chain for tests of the service alone: what it does is said by the setup's label "do"."""
+
+import ctypes
+import os
+import time
+
+import geometry.errors as errors
+
+
+def _report(setup, state, findings):
+    files = [{"name": "program.linuxcnc.ngc", "kind": "nc", "access": "A1", "dialect": "linuxcnc", "sha256": "0" * 64}]
+    return {
+        "state": state, "complete": True, "labels": setup.labels, "inputs": {"part_sha256": "0", "setup_sha256": "0"},
+        "part": {"faces": 6, "volume_mm3": 1.0, "bbox_mm": [[0, 0, 0], [1, 1, 1]]}, "walls": [], "connections": [],
+        "channels": [], "zones": [], "steps": [], "remainder": [], "findings": findings, "coverage": 1.0,
+        "reach_coverage": 1.0, "machining_time_s": 1.0, "tools": [{"id": t.id} for t in setup.tools],
+        "files": files if state == "proved" else [], "version": "fake",
+    }
+
+
+def _misbehave(what, progress):
+    if what == "sleep":
+        for i in range(400):
+            progress("asleep", i / 400)
+            time.sleep(0.05)
+    elif what == "segfault":
+        ctypes.string_at(0)
+    elif what == "memory":
+        kept = []
+        while True:
+            kept.append(bytearray(os.urandom(1000) * 20000))
+            time.sleep(0.005)
+    elif what == "killed":
+        os.kill(os.getpid(), 9)
+    elif what == "bug":
+        raise KeyError("a bug")
+    elif what == "open":
+        raise errors.PartError("the part has open shells", code="open_shell", subjects=("F3",))
+
+
+def plan(part_path, setup, out, progress):
+    what = setup.labels.get("do", "")
+    _misbehave(what, progress)
+    for k in range(3):
+        progress(f"stage {k}", k / 3)
+    state = "unproved" if what == "gouge" else "proved"
+    findings = [{"kind": "gouge", "zone": "Z1", "depth_mm": 0.2}] if what == "gouge" else []
+    # also where it should not be: the service itself must withhold it
+    (out / "program.linuxcnc.ngc").write_text("%\nG21\nM2\n%\n")
+    (out / "job.stpnc").write_text("ISO-10303-21;\n")
+    report = _report(setup, state, findings)
+    (out / "zones.json").write_text(__import__("json").dumps(
+        {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}))
+    return report
+
+
+def zones_only(part_path, setup, progress):
+    progress("zones", 0.5)
+    report = _report(setup, "proved", [])
+    return {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}
+
+
+def verify_program(part_path, setup, program_text, progress):
+    progress("verify", 0.5)
+    findings = [{"kind": "gouge"}] if "GOUGE" in program_text else []
+    return {"state": "unproved" if findings else "proved", "findings": findings}

@@ -1,0 +1,134 @@
+"""The life of a job over HTTP."""
+
+import hashlib
+import time
+
+import psutil
+import pytest
+
+
+def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish):
+    answer = post(client, "")
+    assert answer.status_code == 202
+    job = answer.json()
+    assert answer.headers["Location"] == job["links"]["self"] == f"/v1/jobs/{job['id']}"
+    assert job["state"] in ("queued", "running") and job["kind"] == "plan"
+    job = finish(client, job)
+    assert (job["state"], job["progress"], job["error"]) == ("proved", 1.0, None)
+    assert job["finished_at"] >= job["created_at"]
+    assert client.get(job["links"]["report"]).json()["state"] == "proved"
+    assert set(client.get(job["links"]["zones"]).json()) == {"part", "walls", "connections", "channels", "zones",
+                                                            "remainder"}
+    files = client.get(job["links"]["files"]).json()
+    assert [f["name"] for f in files["items"]] == ["job.stpnc", "program.linuxcnc.ngc", "report.json", "zones.json"]
+    assert files["withheld"] is None
+    for item in files["items"]:
+        got = client.get(item["href"])
+        assert got.status_code == 200 and len(got.content) == item["size_bytes"]
+        assert hashlib.sha256(got.content).hexdigest() == item["sha256"]
+
+
+def test_programs_of_an_unproved_job_are_withheld_with_the_finding(client, post, finish):
+    job = finish(client, post(client, "gouge").json())
+    assert job["state"] == "unproved"
+    files = client.get(job["links"]["files"]).json()
+    assert [f["name"] for f in files["items"]] == ["report.json", "zones.json"]
+    assert "gouge" in files["withheld"]
+    for name in ("program.linuxcnc.ngc", "job.stpnc"):
+        answer = client.get(f"{job['links']['files']}/{name}")
+        assert answer.status_code == 409 and answer.json()["code"] == "program_withheld"
+        assert answer.json()["measured"][0]["kind"] == "gouge"
+
+
+def test_zones_and_verifications_are_jobs_too(client, post, finish):
+    zones = finish(client, post(client, path="/v1/zones").json())
+    assert (zones["kind"], zones["state"]) == ("zones", "done")
+    assert zones["links"]["report"] is None
+    assert client.get(zones["links"]["zones"]).json()["part"]["faces"] == 6
+    assert client.get(f"{zones['links']['self']}/report").json()["code"] == "no_such_document"
+    good = finish(client, post(client, path="/v1/verifications", program=b"G21\nM2\n").json())
+    bad = finish(client, post(client, path="/v1/verifications", program=b"(GOUGE)\nM2\n").json())
+    assert (good["state"], bad["state"]) == ("proved", "unproved")
+    assert client.get(bad["links"]["report"]).json()["findings"] == [{"kind": "gouge"}]
+
+
+def test_same_key_and_content_is_the_same_job_and_other_content_is_refused(client, post, setup_json):
+    setup = setup_json("", quality={"scallop_height_mm": 0.02})
+    first = post(client, key="k1", setup=setup)
+    # the meaning counts, not the bytes: defaults written out and another order of keys
+    same = post(client, key="k1", setup={**setup, "stock": {"margin_mm": 1}, "labels": {}})
+    assert first.json()["id"] == same.json()["id"] and same.status_code == 202
+    other = post(client, key="k1", setup=setup_json("", quality={"scallop_height_mm": 0.03}))
+    assert other.status_code == 422 and other.json()["code"] == "idempotency_key_reused"
+    kind = post(client, key="k1", setup=setup, path="/v1/zones")
+    assert kind.status_code == 422
+    assert post(client, setup=setup).json()["id"] != first.json()["id"]
+
+
+def test_same_content_is_computed_once(client, post, finish, setup_json):
+    setup = setup_json("", quality={"scallop_height_mm": 0.04})
+    finish(client, post(client, setup=setup).json())
+    results = client.app.state.engine.artifacts.root / "artifacts"
+    before = {p: p.stat().st_mtime_ns for p in results.rglob("*")}
+    started = time.monotonic()
+    assert finish(client, post(client, setup=setup).json())["state"] == "proved"
+    assert time.monotonic() - started < 0.6
+    assert {p: p.stat().st_mtime_ns for p in results.rglob("*")} == before
+
+
+def test_cancel_frees_the_worker_in_under_a_second(client, post, finish, setup_json):
+    sleeping = post(client, "sleep").json()
+    waiting = post(client, setup=setup_json("", quality={"scallop_height_mm": 0.05})).json()
+    job = finish(client, sleeping, until=("queued",))
+    deadline = time.monotonic() + 10
+    while client.get(job["links"]["self"]).json()["stage"] != "asleep" and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert client.get(waiting["links"]["self"]).json()["state"] == "queued"
+    started = time.monotonic()
+    cancelled = client.delete(job["links"]["self"])
+    assert cancelled.status_code == 200 and cancelled.json()["state"] == "cancelled"
+    finish(client, waiting, until=("queued",))
+    assert time.monotonic() - started < 1.0
+    assert finish(client, waiting)["state"] == "proved"
+    assert client.get(job["links"]["report"]).json()["code"] == "no_result"
+    assert not [p for p in psutil.Process().children(recursive=True) if "service.child" in " ".join(p.cmdline())]
+    assert client.delete(waiting["links"]["self"]).json()["state"] == "proved"  # an end stays
+
+
+def test_a_queued_job_is_cancelled_at_once(client, post, finish):
+    first = post(client, "sleep").json()
+    second = post(client, "sleep").json()
+    assert client.delete(second["links"]["self"]).json()["state"] == "cancelled"
+    assert client.delete(first["links"]["self"]).json()["state"] == "cancelled"
+
+
+@pytest.mark.parametrize(("do", "code", "status"), [
+    ("segfault", "job_crashed", 503), ("memory", "job_memory", 503), ("killed", "job_killed", 503),
+    ("bug", "bug", 500), ("open", "open_shell", 422)])
+def test_a_failing_child_is_a_typed_error_and_harms_nobody(client, post, finish, do, code, status):
+    job = finish(client, post(client, do).json())
+    assert job["state"] == "failed" and job["attempt"] == 1
+    assert (job["error"]["code"], job["error"]["status"]) == (code, status)
+    assert job["error"]["type"].endswith(f":{code}")
+    assert not list(client.app.state.engine.artifacts.tmp.iterdir())
+    assert client.get("/readyz").status_code == 200
+
+
+def test_a_hanging_child_ends_at_the_time_limit(make_client, post, finish):
+    client = make_client(job_time_limit_s=1.5)
+    job = finish(client, post(client, "sleep").json())
+    assert job["error"]["code"] == "job_timeout" and job["error"]["limit"] == 1.5
+
+
+def test_pages_do_not_shift_and_filter_by_state(make_client, post):
+    client = make_client()
+    ids = [post(client, "sleep").json()["id"] for _ in range(3)]
+    first = client.get("/v1/jobs?limit=2").json()
+    ids.append(post(client, "sleep").json()["id"])
+    second = client.get("/v1/jobs", params={"limit": 2, "cursor": first["next_cursor"]}).json()
+    assert [j["id"] for j in first["items"] + second["items"]] == ids[2::-1]
+    assert second["next_cursor"] is None
+    client.delete(f"/v1/jobs/{ids[0]}")
+    assert [j["id"] for j in client.get("/v1/jobs?state=cancelled").json()["items"]] == [ids[0]]
+    assert client.get("/v1/jobs?kind=zones").json()["items"] == []
+    assert client.get("/v1/jobs?cursor=nonsense").json()["code"] == "bad_cursor"
