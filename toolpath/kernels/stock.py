@@ -1,0 +1,73 @@
+"""The planner's stock: the top of the material over a plan lattice, lowered by every pass.
+
+Notation: S (ny, nx) top z at nodes; a cutter with its tip at c reaches down to c_z + h(rho) at distance rho,
+h(rho) = 0 for rho <= R - r, else r - sqrt(r^2 - (rho - R + r)^2).
+This is for deciding (is there something to cut, may the tool come down here); the proof has a model of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _bottom(rho, radius, corner):
+    u = rho - (radius - corner)
+    if u <= 0.0:
+        return 0.0
+    return corner - np.sqrt(max(corner * corner - u * u, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def stamp(top, x0, y0, step, points, radius, corner):
+    """Lower ``top`` along a polyline of tips (n, 3)."""
+    ny, nx = top.shape
+    n_r = int(np.ceil(radius / step))
+    for k in range(max(len(points) - 1, 1)):
+        a = points[k]
+        b = points[min(k + 1, len(points) - 1)]
+        length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+        pieces = max(1, int(np.ceil(length / (0.7 * step))))
+        for s in range(pieces + 1):
+            t = s / pieces
+            x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+            jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+            for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
+                for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+                    if top[i, j] <= z:
+                        continue
+                    rho = np.sqrt((x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2)
+                    if rho <= radius:
+                        h = z + _bottom(rho, radius, corner)
+                        if h < top[i, j]:
+                            top[i, j] = h
+
+
+@njit(cache=True, nogil=True)
+def overlap(top, x0, y0, step, tip, radius, corner):
+    """How far the stock stands above the cutter's bottom at a tip (3,), mm: greatest over the disc; <= 0 is air.
+
+    The outermost ring of 0.8 lattice steps is left out: there a node cannot tell a wall the cutter touches from
+    stock.
+    """
+    ny, nx = top.shape
+    inner = max(radius - 0.8 * step, 0.35 * radius)
+    n_r = int(np.ceil(inner / step))
+    jc, ic = int(np.rint((tip[0] - x0) / step)), int(np.rint((tip[1] - y0) / step))
+    worst = -np.inf
+    for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
+        for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+            rho = np.sqrt((x0 + j * step - tip[0]) ** 2 + (y0 + i * step - tip[1]) ** 2)
+            if rho <= inner:
+                over = top[i, j] - tip[2] - _bottom(rho, radius, corner)
+                if over > worst:
+                    worst = over
+    return worst
+
+
+@njit(cache=True, nogil=True)
+def overlaps(top, x0, y0, step, tips, radius, corner, out):
+    """``overlap`` for tips (n, 3)."""
+    for k in range(len(tips)):
+        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner)

@@ -1,0 +1,206 @@
+"""Contours of the free region of a tool at one height, as the waterlines that walls are finished with.
+
+``contours`` gives the exact boundary of F(z) inside an active area: places where the tool touches.
+``rings`` gives lines at a distance from it, for taking stock off: they come from a distance transform on
+the lattice, so their distance is right to one lattice step, and every move is tested against the exact cutter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from geometry.mesh import F64
+from toolpath.kernels.contour import (
+    SEGMENTS,
+    chords_free,
+    linear_crossings,
+    place_crossings,
+    refine,
+    thin,
+    trace,
+)
+from zones.reach import LEVEL_TOLERANCE, TipField
+
+BISECTIONS = 9  # a crossing is placed to step / 2**9
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line of tip positions, in climb order (free side on the left where it follows a wall).
+
+    points : (n, 3) float64, mm; a closed line repeats its first point
+    closed : bool
+    """
+
+    points: F64
+    closed: bool
+
+    @property
+    def length(self) -> float:
+        """Length, mm."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    def reversed(self) -> Line:
+        """The same line walked the other way."""
+        return Line(np.ascontiguousarray(self.points[::-1]), self.closed)
+
+
+def thinned(points: F64, tolerance: float) -> F64:
+    """A polyline (n, 3) with points left out while the rest stays within ``tolerance`` mm of it."""
+    points = np.ascontiguousarray(points)
+    keep = np.zeros(len(points), np.bool_)
+    thin(points, tolerance, keep)
+    return np.ascontiguousarray(points[keep])
+
+
+def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
+    """A (ny, nx) mask grown by ``cells`` lattice steps, Euclidean."""
+    if not mask.any() or cells <= 0:
+        return mask
+    return np.asarray(ndimage.distance_transform_edt(~mask) <= cells)
+
+
+def _window(active: NDArray[np.bool_], grow: int) -> tuple[slice, slice]:
+    rows, cols = np.flatnonzero(active.any(axis=1)), np.flatnonzero(active.any(axis=0))
+    return (slice(max(int(rows[0]) - grow, 0), int(rows[-1]) + 2 + grow),
+            slice(max(int(cols[0]) - grow, 0), int(cols[-1]) + 2 + grow))
+
+
+def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: float) -> list[Line]:
+    """Boundary of the free region of a tool at tip height z, inside an area.
+
+    field     : TipField
+    z         : mm, tip height in the access frame
+    active    : (ny, nx) bool on ``field.lattice``
+    tolerance : mm, largest distance between the lines and the true boundary
+
+    Returns
+    -------
+    list of Line
+        Every point is free. A line that leaves the area is open.
+    """
+    if not active.any():
+        return []
+    lat, tool = field.lattice, field.tool
+    rows, cols = _window(active, 1)
+    blocked = np.ascontiguousarray(field.height[rows, cols] > z + LEVEL_TOLERANCE)
+    ids, starts, closed = trace(blocked, np.ascontiguousarray(active[rows, cols]), SEGMENTS)
+    if not len(ids):
+        return []
+    x0, y0 = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
+    xy = np.empty((len(ids), 2))
+    where = (field.tree.arrays, field.noncut, field.coarse_row)
+    shape = (z + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner, field.allowance)
+    place_crossings(*where, ids, blocked, x0, y0, lat.step, *shape, BISECTIONS, xy)
+    out = []
+    for k in range(len(starts) - 1):
+        chain = xy[starts[k]:starts[k + 1]]
+        if len(chain) < 2:
+            continue
+        fine = refine(*where, np.ascontiguousarray(chain), bool(closed[k]), *shape, tolerance, lat.step)
+        if closed[k]:
+            fine = np.vstack([fine, fine[:1]])
+        out.append(Line(np.column_stack([fine, np.full(len(fine), z)]), bool(closed[k])))
+    return out
+
+
+def rings(field: TipField, z: float, active: NDArray[np.bool_], distance: float) -> list[Line]:
+    """Lines of tip positions ``distance`` mm inside the boundary of the free region at height z.
+
+    Parameters as in ``contours``. Distances are right to one lattice step. A move that the exact cutter does
+    not allow is left out, which opens the line there.
+    """
+    if not active.any():
+        return []
+    lat = field.lattice
+    rows, cols = _window(active, int(distance / lat.step) + 2)
+    blocked = field.height[rows, cols] > z + LEVEL_TOLERANCE
+    far = ndimage.distance_transform_edt(~blocked) * lat.step if blocked.any() else np.full(blocked.shape, 1e6)
+    ids, starts, closed = trace(np.ascontiguousarray(far < distance), np.ascontiguousarray(active[rows, cols]),
+                                SEGMENTS)
+    if not len(ids):
+        return []
+    xy = np.empty((len(ids), 2))
+    linear_crossings(ids, np.ascontiguousarray(far), distance, lat.x0 + cols.start * lat.step,
+                     lat.y0 + rows.start * lat.step, lat.step, xy)
+    out: list[Line] = []
+    for k in range(len(starts) - 1):
+        chain = xy[starts[k]:starts[k + 1]]
+        if len(chain) < 2:
+            continue
+        pts = np.column_stack([chain, np.full(len(chain), z)])
+        if closed[k]:
+            pts = np.vstack([pts, pts[:1]])
+        out.extend(free_pieces(field, pts, bool(closed[k])))
+    return out
+
+
+def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
+    """(n-1,) bool: each straight level move of a line of tips (n, 3) stays free, tested every third of a step."""
+    ok = np.ones(max(len(points) - 1, 0), np.bool_)
+    if len(points) > 1:
+        chords_free(field.tree.arrays, field.noncut, field.coarse_row, np.ascontiguousarray(points[:, :2]),
+                    float(points[:, 2].max()) + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner,
+                    field.allowance, field.lattice.step / 3, ok)
+    return ok
+
+
+def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
+    """The pieces of a level line (n, 3) whose points and moves are free."""
+    ok = moves_free(field, points)
+    at = points.copy()
+    at[:, 2] += LEVEL_TOLERANCE
+    stands = ~(field.blocked_by_cutter(at) | field.blocked_by_body(at))
+    ok &= stands[:-1] & stands[1:]
+    if ok.all():
+        return [Line(points, closed)]
+    return [Line(points[a:b + 1], False) for a, b in true_runs(ok)]
+
+
+def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Half-open ranges [a, b) of consecutive True values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: float) -> list[Line]:
+    """Cut a line to the points that are wanted, each piece made longer and near pieces joined.
+
+    wanted : (n,) bool for the points of the line
+    extend : mm added along the line at both ends of a piece
+    join   : mm, pieces nearer than this along the line become one
+    """
+    if not wanted.any():
+        return []
+    points = line.points
+    if line.closed:
+        unwanted = np.flatnonzero(~wanted[:-1])
+        if not len(unwanted):
+            return [line]
+        # begin in the longest unwanted stretch, so that no piece is cut at the arbitrary start of the loop
+        n = len(points) - 1
+        gaps = np.diff(np.concatenate([unwanted, [unwanted[0] + n]]))
+        shift = int(unwanted[int(np.argmin(gaps))])
+        order = np.concatenate([np.arange(shift, n), np.arange(0, shift + 1)])
+        points, wanted = points[order], wanted[order]
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    spans: list[list[float]] = []
+    for a, b in true_runs(wanted):
+        lo, hi = s[a] - extend, s[b - 1] + extend
+        if spans and lo - spans[-1][1] < join:
+            spans[-1][1] = hi
+        else:
+            spans.append([lo, hi])
+    if line.closed and len(spans) == 1 and spans[0][1] - spans[0][0] >= s[-1] - join:
+        return [line]
+    return [Line(_between(points, s, max(lo, 0.0), min(hi, s[-1])), False) for lo, hi in spans]
+
+
+def _between(points: F64, s: F64, lo: float, hi: float) -> F64:
+    inner = points[(s > lo) & (s < hi)]
+    ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (lo, hi)])
+    return np.vstack([ends[:1], inner, ends[1:]])

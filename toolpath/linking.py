@@ -1,0 +1,281 @@
+"""Passes joined to one safe motion: how the tool comes in, gets across and gets out.
+
+Rules, in this order of trying
+1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
+   more stock than a layer; down to a deeper level along the pass itself, never steeper than the ramp angle.
+2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
+3. Down a ramp along the pass, to and fro, from above the stock.
+Anything else goes up to the clearance plane. Rapids move Z alone there and back to the top of the stock, or XY
+alone at the clearance plane; below the top of the stock every move is a feed move, because no rapid keeps its
+clearance beside a wall.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from geometry.mesh import F64
+from toolpath.levels import Line, thinned
+from toolpath.motion import Motion, Trajectory
+from toolpath.stock import StockMap
+from zones.reach import LEVEL_TOLERANCE, TipField
+
+RAMP_SHARE = 0.9  # of the steepest ramp allowed
+IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
+MOST_LEGS = 400
+
+
+@dataclass
+class Motions:
+    """Feeds and heights of a step, mm and mm/min."""
+
+    feed: float
+    plunge_feed: float
+    link_feed: float
+    clearance: float
+    rapid_floor: float
+    ramp_angle: float
+    step_down: float
+    tolerance: float
+
+
+@dataclass
+class Linker:
+    """Grows the trajectories of one step pass by pass and keeps the stock up to date.
+
+    field   : TipField of the tool
+    stock   : StockMap, lowered as passes are added
+    motions : Motions
+    skipped : lines that found no safe way in
+    """
+
+    field: TipField
+    stock: StockMap
+    motions: Motions
+    trajectories: list[Trajectory] = field(default_factory=list)
+    at: F64 | None = None
+    passes: int = 0
+    skipped: list[Line] = field(default_factory=list)
+
+    def add(self, line: Line, tolerance: float | None = None) -> bool:
+        """Append one line as a cutting pass; False where no safe way in was found."""
+        points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
+        if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
+            return True
+        way = self._straight_on(points, line.closed) or self._from_air(points) or self._ramped(points, line.closed)
+        if way is None:
+            self.skipped.append(line)
+            return False
+        entry, cut, joined = way
+        if joined:
+            self._feed(Motion.CONNECT, np.vstack([self._here(), entry]), self.motions.feed)
+        else:
+            self._come_down(entry[0])
+            if len(entry) > 1:
+                self._feed(Motion.APPROACH, entry, self.motions.plunge_feed)
+        if np.linalg.norm(self._here() - cut[0]) > 1e-9:
+            self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
+        self._feed(Motion.CUT, cut, self.motions.feed)
+        self.passes += 1
+        return True
+
+    def finish(self) -> tuple[Trajectory, ...]:
+        """Lift to the clearance plane and return all trajectories."""
+        self._lift()
+        return tuple(self.trajectories)
+
+    # -- ways in ----------------------------------------------------------------------------------------------
+
+    Way = tuple[F64, F64, bool]
+
+    def _straight_on(self, points: F64, closed: bool) -> Way | None:
+        if self.at is None:
+            return None
+        here, start = self._here(), points[0]
+        run = float(np.hypot(*(start - here)[:2]))
+        if run > 4.0 * self.field.tool.radius + 1.0 or abs(start[2] - here[2]) > 2.0 * self.motions.step_down:
+            return None
+        z = max(here[2], start[2])
+        if not self._free_move(here[:2], start[:2], z):
+            return None
+        n = max(2, int(run / 0.2) + 1)
+        t = np.linspace(0.0, 1.0, n)[:, None]
+        level = np.column_stack([here[:2] + t * (start[:2] - here[:2]), np.full(n, z)])
+        if float(self.stock.overlap(level, self.field.tool).max()) > self.motions.step_down:
+            return None
+        over = z - start[2]
+        if here[2] < z and not bool(self.stock.in_air(np.vstack([here, [*here[:2], z]]), self.field.tool).all()):
+            return None
+        entry = np.array([[*here[:2], z], [*start[:2], z]])
+        entry = entry[np.r_[True, np.linalg.norm(np.diff(entry, axis=0), axis=1) > 1e-9]]
+        if over <= 1e-9:
+            return entry, points, True
+        if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
+            return np.vstack([entry, start]), points, True
+        ramp = self._ramp(points, closed, over)
+        return None if ramp is None else (entry, ramp, True)
+
+    def _from_air(self, points: F64) -> Way | None:
+        start, tool = points[0], self.field.tool
+        if bool(self.stock.in_air(start[None, :], tool)[0]):
+            return start[None, :], points, False
+        ahead = points[1, :2] - start[:2]
+        ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
+        left = np.array([-ahead[1], ahead[0]])
+        ways = [left, -ahead, (left - ahead) / math.sqrt(2), -left, (left + ahead) / math.sqrt(2)]
+        for far in np.array([0.5, 1.0, 1.5, 2.0, 3.0]) * tool.diameter:
+            for side in ways:
+                q = np.array([*(start[:2] + far * side), start[2]])
+                if bool(self.stock.in_air(q[None, :], tool)[0]) and self._free_move(q[:2], start[:2], start[2]):
+                    if self._limit(q) <= q[2] + LEVEL_TOLERANCE:
+                        n = max(2, int(far / 0.2) + 1)
+                        t = np.linspace(0.0, 1.0, n)[:, None]
+                        lane = q + t * (start - q)
+                        if float(self.stock.overlap(lane, tool).max()) <= 1.5 * self.motions.step_down:
+                            return np.vstack([q, start]), points, False
+        return None
+
+    def _ramped(self, points: F64, closed: bool) -> Way | None:
+        over = float(self.stock.overlap(points, self.field.tool).max()) + 0.1
+        if not math.isfinite(over):
+            over = 0.1
+        ramp = self._ramp(points, closed, max(over, 0.1))
+        return None if ramp is None else (ramp[:1], ramp, False)
+
+    def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
+        """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning."""
+        slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
+        need = over / slope
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
+        total = float(s[-1])
+        if total < 1e-3:
+            return None
+        if closed:
+            laps = math.ceil(need / total)
+            if laps > MOST_LEGS:
+                return None
+            walked = np.concatenate([points] + [points[1:]] * laps)
+            t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
+            down = _with_knot(walked, t, need)
+            lift = np.maximum(over * (1.0 - down[1] / need), 0.0)
+            path = down[0].copy()
+            path[:, 2] += lift
+            last = int(np.searchsorted(down[1], need + total - 1e-9))
+            return np.ascontiguousarray(path[: last + 1])
+        leg = min(total, max(need / 2.0, 1e-9))
+        legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
+        if legs > MOST_LEGS:
+            return None
+        leg = min(leg, total)
+        head, hs = _with_knot(points, s, leg)
+        head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
+        pieces = []
+        for k in range(legs):
+            xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
+            piece = xy.copy()
+            piece[:, 2] += over * (1.0 - (k * leg + along) / (legs * leg))
+            pieces.append(piece if k == 0 else piece[1:])
+        return np.ascontiguousarray(np.vstack([*pieces, points[1:]]))
+
+    # -- moves ------------------------------------------------------------------------------------------------
+
+    def _here(self) -> F64:
+        assert self.at is not None
+        return self.at
+
+    def _free_move(self, a: F64, b: F64, z: float) -> bool:
+        n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
+        t = np.linspace(0.0, 1.0, n)[:, None]
+        tips = np.column_stack([a + t * (b - a), np.full(n, z + LEVEL_TOLERANCE)])
+        return not bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any())
+
+    def _limit(self, tip: F64) -> float:
+        return float(self.field.tips(tip[None, :2])[0])
+
+    def _feed(self, motion: Motion, points: F64, feed: float) -> None:
+        self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
+        self.stock.cut(points, self.field.tool)
+        self.at = points[-1]
+
+    def _rapid(self, points: F64) -> None:
+        self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
+        self.at = points[-1]
+
+    def _lift(self) -> None:
+        if self.at is None or self.at[2] >= self.motions.clearance - 1e-9:
+            return
+        x, y, z = self.at
+        free = max(z, self.motions.rapid_floor)
+        if free > z + 1e-9:
+            self._feed(Motion.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
+        if self.motions.clearance > free + 1e-9:
+            self._rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
+
+    def _come_down(self, start: F64) -> None:
+        x, y, z = start
+        top = self.motions.clearance
+        if self.at is None:
+            self.at = np.array([x, y, top])
+            self._rapid(np.array([[x, y, top], [x, y, top]]))
+        else:
+            self._lift()
+            if np.hypot(*(self._here()[:2] - start[:2])) > 1e-9:
+                self._rapid(np.array([self._here(), [x, y, top]]))
+        free = min(max(z, self.motions.rapid_floor), top)
+        if top > free + 1e-9:
+            self._rapid(np.array([[x, y, top], [x, y, free]]))
+        slow = min(z + IN_FRONT, free)
+        if free > slow + 1e-9:
+            self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
+        if slow > z + 1e-9:
+            self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
+
+
+def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:
+    """A polyline and its arc lengths with one more point at arc length ``at`` where it lies inside."""
+    if at <= s[0] or at >= s[-1]:
+        return points, s
+    k = int(np.searchsorted(s, at))
+    if abs(s[k] - at) < 1e-12:
+        return points, s
+    t = (at - s[k - 1]) / (s[k] - s[k - 1])
+    new = points[k - 1] + t * (points[k] - points[k - 1])
+    return np.insert(points, k, new, axis=0), np.insert(s, k, at)
+
+
+def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:
+    """Lines in the order a tool meets them going each time to the nearest start.
+
+    either : open lines may be walked both ways; closed ones begin at their nearest point in any case
+    """
+    left = list(lines)
+    out: list[Line] = []
+    here = at
+    while left:
+        if here is None:
+            best, flip, start = 0, False, 0
+        else:
+            best, flip, start, least = 0, False, 0, math.inf
+            for k, line in enumerate(left):
+                if line.closed:
+                    d2 = ((line.points[:, :2] - here[:2]) ** 2).sum(axis=1)
+                    j = int(np.argmin(d2))
+                    if d2[j] < least:
+                        best, flip, start, least = k, False, j, float(d2[j])
+                    continue
+                for back in (False, True) if either else (False,):
+                    d = float(((line.points[-1 if back else 0, :2] - here[:2]) ** 2).sum())
+                    if d < least:
+                        best, flip, start, least = k, back, 0, d
+        line = left.pop(best)
+        if flip:
+            line = line.reversed()
+        if line.closed and start:
+            loop = line.points[:-1]
+            line = Line(np.vstack([loop[start:], loop[:start + 1]]), True)
+        out.append(line)
+        here = line.points[-1]
+    return out

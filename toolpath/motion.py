@@ -1,0 +1,70 @@
+"""What the planner hands on: trajectories of the tool tip and the workingsteps made of them.
+
+Plain values, tool tip, setup frame, mm. Rapids move Z alone, or XY alone at the clearance height; the planner
+guarantees it and nothing downstream reorders.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+
+
+class Motion(StrEnum):
+    """What a trajectory is for; the STEP-NC trajectory types follow from it."""
+
+    RAPID = "rapid"
+    APPROACH = "approach"
+    CUT = "cut"
+    CONNECT = "connect"
+    LIFT = "lift"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One polyline of the tool tip.
+
+    motion : what it is for; RAPID is a G0, everything else a G1 at ``feed``
+    points : (n, 3) float64, mm, n >= 2; the first point equals the last of the trajectory before it
+    feed   : mm/min; ignored for a rapid
+    """
+
+    motion: Motion
+    points: F64
+    feed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Workingstep:
+    """One operation with one tool: one zone finished, or the layers above zones taken off.
+
+    id        : 'S07'
+    name      : for people and for STEP-NC, for example 'S07 Z3 zlevel T1 F12 F13'
+    zone      : 'Z3', or None for a step that serves several zones
+    faces     : face numbers of the feature
+    operation : 'roughing' or 'finishing'
+    strategy  : 'layers', 'zlevel', 'zigzag', 'floor'
+    outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
+    top, bottom : mm, z of the feature
+    """
+
+    id: str
+    name: str
+    zone: str | None
+    faces: tuple[int, ...]
+    operation: str
+    strategy: str
+    tool: ToolBody
+    spindle_rpm: float
+    feed: float
+    side_step: float
+    scallop_height: float
+    chordal_tolerance: float
+    trajectories: tuple[Trajectory, ...]
+    outline: F64
+    top: float
+    bottom: float
+    climb: bool = True

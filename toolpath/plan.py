@@ -1,0 +1,258 @@
+"""From zones to workingsteps: layers, then the finish of every zone, tool by tool, measured as it goes.
+
+The passes of a zone are laid out by formula and then measured at the zone's samples; where more is left than
+the budget allows, passes are put in between, only there, each time half as far apart. So the narrowest spot
+never sets the step for a whole zone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.sampling import SurfaceSamples
+from geometry.toolbody import ToolBody
+from toolpath.levels import Line, dilated
+from toolpath.linking import Linker, Motions, nearest_order
+from toolpath.motion import Motion, Workingstep
+from toolpath.residual import ResidualMap
+from toolpath.stock import StockMap
+from toolpath.strategies import floor, layers, zigzag, zlevel
+from zones.reach import TipField
+from zones.zoning import Form, ZoneArea
+
+CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
+PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
+REFINEMENTS = 4
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class CutData:
+    """How fast one tool cuts: 1/min and mm/min; step_down in mm, the deepest layer it takes."""
+
+    spindle_rpm: float
+    feed: float
+    plunge_feed: float
+    link_feed: float
+    step_down: float
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Tolerances and heights of a plan; mm and rad.
+
+    lift            : distance along the normal within which a touch counts as reach
+    clearance       : height of rapid moves across
+    rapid_floor     : height down to which a rapid may go
+    either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
+    """
+
+    scallop_height: float
+    chordal_tolerance: float
+    stock_allowance: float
+    lift: float
+    clearance: float
+    rapid_floor: float
+    ramp_angle: float
+    roughing: bool = True
+    finishing: bool = True
+    climb: bool = True
+    either_way: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ZonePlan:
+    """What was planned for a zone.
+
+    step     : id of its finishing workingstep, None where nothing could be planned
+    side_step: mm between passes as laid out
+    passes   : cutting passes between links
+    left     : (k,) indices into ``zone.samples`` the planner's own measure finds above the budget
+    """
+
+    zone: ZoneArea
+    step: str | None
+    strategy: str
+    side_step: float
+    passes: int
+    left: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Workingsteps in machining order and what became of each zone."""
+
+    steps: tuple[Workingstep, ...]
+    zones: tuple[ZonePlan, ...]
+
+
+def plan_job(zones: Sequence[ZoneArea], samples: SurfaceSamples, fields: dict[str, TipField],
+             cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
+             progress: Progress | None = None) -> Plan:
+    """Plan all zones.
+
+    zones    : in machining order
+    samples  : of the machinable area, what the zones index
+    fields   : TipField by tool id
+    cut_data : CutData by tool id
+    stock    : StockMap, lowered as the plan grows
+    progress : called with the share done, 0 to 1
+
+    Returns
+    -------
+    Plan
+    """
+    steps: list[Workingstep] = []
+    plans: list[ZonePlan] = []
+    order = list(dict.fromkeys(z.tool.id for z in zones))
+    done = 0
+    for tid in order:
+        mine = [z for z in zones if z.tool.id == tid]
+        field, cut = fields[tid], cut_data[tid]
+        if settings.roughing:
+            step = _layers(mine, field, cut, stock, settings, f"S{len(steps) + 1:02d}")
+            if step is not None:
+                steps.append(step)
+        for zone in mine:
+            if settings.finishing:
+                step, plan = _finish(zone, samples, field, cut, stock, settings, f"S{len(steps) + 1:02d}")
+                if step is not None:
+                    steps.append(step)
+                plans.append(plan)
+            done += 1
+            if progress is not None:
+                progress(done / max(len(zones), 1))
+    return Plan(tuple(steps), tuple(plans))
+
+
+def _motions(cut: CutData, settings: PlanSettings) -> Motions:
+    return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.clearance, settings.rapid_floor,
+                   settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance)
+
+
+def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap, settings: PlanSettings,
+            step_id: str) -> Workingstep | None:
+    """One workingstep that takes the stock above all zones of a tool off in depth layers."""
+    lat, tool = field.lattice, field.tool
+    tips = np.vstack([z.tips for z in zones])
+    area = dilated(lat.mask(tips[:, :2]), max(0.5 * tool.radius / lat.step, 1.5))
+    allowance = 0.1 * cut.step_down
+    linker = Linker(field, stock, _motions(cut, settings))
+    bottom = float(tips[:, 2].min()) + allowance
+    top = _stock_top(stock, lat, area, tool)
+    if top <= bottom:
+        return None
+    for z in layers.layer_heights(top, bottom, 0.85 * cut.step_down):
+        below = dilated(lat.mask(tips[tips[:, 2] <= z + 1e-6, :2]), max(0.5 * tool.radius / lat.step, 1.5))
+        for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
+            for line in nearest_order(lines, linker.at, False):
+                linker.add(line, 0.25 * lat.step)
+    if not linker.passes:
+        return None
+    ids = " ".join(z.id for z in zones)
+    return _step(step_id, f"{step_id} layers {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
+                 0.8 * tool.radius, linker, settings)
+
+
+def _stock_top(stock: StockMap, lat: object, area: NDArray[np.bool_], tool: ToolBody) -> float:
+    del lat, area, tool
+    return stock.highest
+
+
+def _finish(zone: ZoneArea, samples: SurfaceSamples, field: TipField, cut: CutData, stock: StockMap,
+            settings: PlanSettings, step_id: str) -> tuple[Workingstep | None, ZonePlan]:
+    """The finishing workingstep of one zone."""
+    points, normals = samples.points[zone.samples], samples.normals[zone.samples]
+    residual = ResidualMap(points + settings.stock_allowance * normals)
+    linker = Linker(field, stock, _motions(cut, settings))
+    name, spacing, rounds = _strategy(zone, normals, field, cut, settings)
+    budget = PASS_SHARE * settings.scallop_height
+    failing = np.arange(len(points))
+    for k in range(REFINEMENTS + 1):
+        for lines in rounds(k, zone.tips[failing]):
+            either = settings.either_way or name == "zigzag"
+            if name != "zigzag":
+                lines = nearest_order(lines, linker.at, either)
+            for line in lines:
+                if not settings.climb and name == "zlevel" and not settings.either_way:
+                    line = line.reversed()
+                before = len(linker.trajectories)
+                linker.add(line)
+                for t in linker.trajectories[before:]:
+                    if t.motion is Motion.CUT:
+                        residual.cut(t.points, field.tool)
+        failing = np.flatnonzero(residual.residual > budget)
+        if not len(failing):
+            break
+    failing = np.flatnonzero(residual.residual > settings.scallop_height)
+    if not linker.passes:
+        return None, ZonePlan(zone, None, name, spacing, 0, failing)
+    faces = " ".join(f"F{f}" for f in zone.faces[:12])
+    step = _step(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing", name,
+                 field.tool, cut, spacing, linker, settings)
+    return step, ZonePlan(zone, step_id, name, spacing, linker.passes, failing)
+
+
+Rounds = Callable[[int, F64], list[list[Line]]]
+
+
+def _strategy(zone: ZoneArea, normals: F64, field: TipField, cut: CutData,
+              settings: PlanSettings) -> tuple[str, float, Rounds]:
+    """Name, distance between passes, and the passes of round k for the tips that still need some."""
+    tool, chord = field.tool, 0.5 * settings.chordal_tolerance
+    cusp = CUSP_SHARE * settings.scallop_height
+    if zone.form is Form.STEEP:
+        step = zlevel.level_step(tool, normals, cusp, cut.step_down)
+
+        def waterlines(k: int, tips: F64) -> list[list[Line]]:
+            if k == 0:
+                levels, window = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
+            else:
+                window = step / 2.0 ** k
+                top = float(zone.tips[:, 2].max())
+                levels = np.unique(np.round((top - tips[:, 2]) / window)) * -window + top
+                levels = levels[::1]
+            return zlevel.waterlines(field, tips, np.sort(levels)[::-1], 1.001 * window, chord)
+
+        return "zlevel", step, waterlines
+    flat = tool.radius - tool.corner_radius
+    if zone.form is Form.LEVEL and flat > 0:
+
+        def planes(k: int, tips: F64) -> list[list[Line]]:
+            if k == 0:
+                return floor.planes(field, tips, chord)
+            return [zigzag.passes(field, tips, 0.8 * flat / 2.0 ** (k - 1), 0.5, chord, k % 2 == 1, 0.1 * flat)]
+
+        return "floor", 1.6 * flat, planes
+    side = zigzag.side_step(tool.corner_radius, normals, cusp)
+    x_first = zigzag.along_x(dilated(field.lattice.mask(zone.tips[:, :2]), 3.0))
+
+    def parallel(k: int, tips: F64) -> list[list[Line]]:
+        if k == 0:
+            return [zigzag.passes(field, tips, side, 0.0, chord, x_first, min(side, 0.3 * tool.radius))]
+        width = side / 2.0 ** k
+        return [zigzag.passes(field, tips, 2.0 * width, 0.5, chord, x_first, width)]
+
+    return "zigzag", side, parallel
+
+
+def _step(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,
+          tool: ToolBody, cut: CutData, side_step: float, linker: Linker, settings: PlanSettings) -> Workingstep:
+    faces = tuple(sorted({f for z in zones for f in z.faces}))
+    tips = np.vstack([z.tips for z in zones])
+    lo, hi = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
+    outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
+    return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
+                       settings.scallop_height, settings.chordal_tolerance, linker.finish(), outline,
+                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb)
+
+
+def renumbered(plan: Plan, steps: Sequence[Workingstep]) -> Plan:
+    """The plan with other workingsteps, ids unchanged."""
+    return replace(plan, steps=tuple(steps))

@@ -1,0 +1,39 @@
+"""What passes leave at samples of a zone, so that the planner can put passes in where it is too much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.kernels.residual import lower
+
+UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
+
+
+class ResidualMap:
+    """Residual material at samples, lowered pass by pass.
+
+    points   : (n, 3) float64, mm, moved out by nothing: on the surface
+    residual : (n,) float64, mm, distance to the nearest swept cutting part so far
+    """
+
+    def __init__(self, points: F64, cell: float = 0.6) -> None:
+        self.points = np.ascontiguousarray(points)
+        self.residual = np.full(len(points), UNTOUCHED)
+        self.cell = cell
+        lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
+        hi = points[:, :2].max(axis=0) if len(points) else np.zeros(2)
+        self.origin = lo
+        self.ncx, self.ncy = (np.floor((hi - lo) / cell).astype(int) + 1).tolist()
+        key = np.zeros(0, np.int64)
+        if len(points):
+            c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
+            key = c[:, 1] * self.ncx + c[:, 0]
+        self.items = np.argsort(key, kind="stable")
+        self.starts = np.searchsorted(key[self.items], np.arange(self.ncx * self.ncy + 1))
+
+    def cut(self, path: F64, tool: ToolBody) -> None:
+        """Lower the residual by one polyline of tips (m, 3), mm."""
+        lower(self.points, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx, self.ncy,
+              np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.residual)

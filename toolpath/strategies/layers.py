@@ -1,0 +1,61 @@
+"""Stock taken off in depth layers: at each level, lines round what stands, only where stock is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath.levels import Line, dilated, pieces_where, rings
+from toolpath.stock import StockMap
+from zones.reach import TipField
+
+STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
+
+
+def layer_heights(top: float, bottom: float, step: float) -> list[float]:
+    """Levels below the top of the stock, ``step`` mm apart, the last one at ``bottom``; descending."""
+    out = []
+    z = top - step
+    while z > bottom + 0.25 * step:
+        out.append(z)
+        z -= step
+    return [*out, bottom]
+
+
+def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], allowance: float,
+          side_step: float) -> Iterator[list[Line]]:
+    """Lines of one layer, ring by ring from the outside of the stock to ``allowance`` from the walls.
+
+    field     : TipField
+    stock     : StockMap as it stands; lines appear only where the cutter would meet stock
+    z         : mm, tip height of the layer
+    area      : (ny, nx) bool on the lattice, where this tool has something to finish below
+    allowance : mm left beside walls
+    side_step : mm between rings
+
+    Yields
+    ------
+    list of Line
+        The rings farthest from the walls first, so that the cutter comes from air where there is any.
+    """
+    tool = field.tool
+    active = dilated(area, tool.radius / field.lattice.step)
+    found: list[list[Line]] = []
+    k = 0
+    while True:
+        lines = rings(field, z, active, allowance + k * side_step)
+        kept: list[Line] = []
+        for line in lines:
+            wanted = stock.overlap(line.points, tool) > STOCK_WORTH
+            kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
+        if not lines or (k > 0 and not kept and found and not found[-1]):
+            break
+        found.append(kept)
+        k += 1
+        if k > 400:
+            break
+    for kept in reversed(found):
+        if kept:
+            yield kept

@@ -1,0 +1,93 @@
+"""Parallel passes dragged over shallow area, to and fro."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from toolpath.kernels.follow import follow
+from toolpath.levels import Line, dilated, thinned, true_runs
+from zones.reach import TipField
+
+SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
+STEEPEST = 4.0
+SIDE_STEP_FLOOR = 0.02
+
+
+def side_step(corner_radius: float, normals: F64, cusp: float) -> float:
+    """Distance between parallel passes in plan that leaves a given cusp.
+
+    corner_radius : mm; normals : (n, 3) float64 of the area; cusp : mm, along the normal
+    Returns mm: sqrt(8 h r) along the surface, times the cosine of the steepest slope across (95 % quantile).
+    Second order in h/r; tighter convex places are found by measuring.
+    """
+    if not len(normals):
+        return math.sqrt(8.0 * cusp * corner_radius)
+    cosine = float(np.quantile(normals[:, 2], 0.05))
+    return max(SIDE_STEP_FLOOR, math.sqrt(8.0 * cusp * corner_radius) * max(cosine, 0.2))
+
+
+def along_x(mask: NDArray[np.bool_]) -> bool:
+    """Whether passes along x are fewer than passes along y over a mask (ny, nx)."""
+    rows = np.count_nonzero(np.diff(mask.astype(np.int8), axis=1) == 1)
+    cols = np.count_nonzero(np.diff(mask.astype(np.int8), axis=0) == 1)
+    return rows <= cols
+
+
+def passes(field: TipField, tips: F64, step: float, shift: float, tolerance: float, x_first: bool,
+           overrun: float) -> list[Line]:
+    """Parallel passes over the places where the tool touches an area.
+
+    field     : TipField
+    tips      : (n, 3) float64, mm, tips that touch the samples of the area
+    step      : mm between passes in plan
+    shift     : passes lie at (k + shift) * step, so that two sets interleave
+    tolerance : mm, chordal
+    x_first   : passes run along x, else along y
+    overrun   : mm the passes run past the area
+
+    Returns
+    -------
+    list of Line
+        In order across, every second one reversed.
+    """
+    lat = field.lattice
+    if not len(tips):
+        return []
+    mask = dilated(lat.mask(tips[:, :2]), max(1.5, overrun / lat.step))
+    across = 1 if x_first else 0
+    where = (field.tree.arrays, field.noncut, field.coarse_row)
+    shape = (field.grown_radius, field.grown_corner, field.allowance)
+    origin, count = (lat.y0, lat.ny) if x_first else (lat.x0, lat.nx)
+    lo, hi = tips[:, across].min() - overrun, tips[:, across].max() + overrun
+    out: list[Line] = []
+    flip = False
+    for k in range(math.floor(lo / step - shift), math.ceil(hi / step - shift) + 1):
+        at = (k + shift) * step
+        row = round((at - origin) / lat.step)
+        if not 0 <= row < count:
+            continue
+        cells = mask[row, :] if x_first else mask[:, row]
+        found: list[Line] = []
+        for a, b in _joined(true_runs(cells), field.tool.radius / lat.step):
+            p = (lat.x0 + lat.step * a, at) if x_first else (at, lat.y0 + lat.step * a)
+            q = (lat.x0 + lat.step * (b - 1), at) if x_first else (at, lat.y0 + lat.step * (b - 1))
+            points, broken = follow(*where, *p, *q, *shape, min(lat.step, 0.15), 0.5 * tolerance, SMALLEST, STEEPEST)
+            for i, j in true_runs(~broken[:-1]):
+                found.append(Line(thinned(points[i:j + 1], 0.5 * tolerance), False))
+        out.extend([line.reversed() for line in reversed(found)] if flip else found)
+        flip ^= bool(found)
+    return out
+
+
+def _joined(runs: list[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
+    out: list[tuple[int, int]] = []
+    for a, b in runs:
+        if out and a - out[-1][1] < gap:
+            out[-1] = (out[-1][0], b)
+        else:
+            out.append((a, b))
+    return out

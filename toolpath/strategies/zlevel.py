@@ -1,0 +1,78 @@
+"""Waterlines: steep area finished by level lines that touch it, from the top down."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.levels import Line, contours, dilated, pieces_where
+from zones.reach import TipField
+
+LEAST_STEP = 0.02  # mm, levels are never closer
+
+
+def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> float:
+    """Height between waterlines that leaves a given cusp on a steep area.
+
+    tool      : ToolBody
+    normals   : (n, 3) float64 unit normals of the area
+    cusp      : mm, along the normal
+    step_down : mm, upper limit
+
+    Returns
+    -------
+    float, mm
+        On a wall that leans by n_z a corner r leaves s^2/(8 r) between lines s apart along the wall, s = dz/sin;
+        the flank above the corner leaves no more than dz n_z. The greater dz of the two holds for each sample;
+        the 5 % quantile over the area is taken, the rest is found by measuring.
+    """
+    nz = np.abs(normals[:, 2])
+    by_corner = math.sqrt(8.0 * cusp * tool.corner_radius) * np.sqrt(np.maximum(1.0 - nz * nz, 0.0))
+    by_flank = cusp / np.maximum(nz, 1e-6)
+    wanted = float(np.quantile(np.maximum(by_corner, by_flank), 0.05)) if len(nz) else step_down
+    return max(LEAST_STEP, min(wanted, step_down))
+
+
+def heights(top: float, bottom: float, step: float) -> F64:
+    """Levels from top to bottom, both included, at most ``step`` mm apart, descending."""
+    n = max(1, math.ceil((top - bottom) / step - 1e-9)) if top > bottom else 0
+    return np.linspace(top, bottom, n + 1)
+
+
+def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance: float) -> list[list[Line]]:
+    """Level lines that touch an area, level by level.
+
+    field     : TipField
+    tips      : (n, 3) float64, mm, tips that touch the samples of the area
+    levels    : (m,) float64, mm, descending
+    window    : mm, a level serves the samples whose tip lies within this of it
+    tolerance : mm, of the lines against the true boundary
+
+    Returns
+    -------
+    list of lists of Line, one list a level
+    """
+    lat = field.lattice
+    out = []
+    reach = max(2.5, 0.5 * field.tool.radius / lat.step)
+    for z in levels.tolist():
+        near = np.abs(tips[:, 2] - z) <= window
+        if not near.any():
+            out.append([])
+            continue
+        wanted = dilated(lat.mask(tips[near, :2]), reach)
+        active = dilated(wanted, 2.0 * field.tool.radius / lat.step + 3)
+        lines: list[Line] = []
+        for line in contours(field, z, active, tolerance):
+            lines.extend(pieces_where(line, _on(field, wanted, line.points), 0.5 * field.tool.radius,
+                                      2.0 * field.tool.radius))
+        out.append(lines)
+    return out
+
+
+def _on(field: TipField, mask: NDArray[np.bool_], points: F64) -> NDArray[np.bool_]:
+    return np.asarray(mask[field.lattice.cells(points[:, :2])])

@@ -1,0 +1,261 @@
+"""Where a tool assembly can stand, and which surface samples it can touch.
+
+One quantity carries everything in three axes: the *tip limit* H(x, y), the lowest
+height of the tool tip over (x, y) at which nothing of the assembly enters the part
+or a fixture. A tip at or above H is safe; the free region of a height z is
+F(z) = {H <= z}, and F grows with z.
+
+The cutting part is exact (``geometry.kernels.drop`` on the mesh). Shank and holder
+need no such care: they are looked up on a coarse grid, grown by their clearance and
+by half a cell diagonal, so the look-up is never lower than the truth.
+
+A neck thinner than the cutter never decides: the cutter has passed everywhere the
+neck goes. Source: ALGORITHMS 1, "reach is computed, not guessed".
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.drop import blocked_many, drop_grid, drop_tips
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from zones.kernels.lattice import noncut_blocked, noncut_lookup
+
+LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
+LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
+FRUSTUM_SLICES = 6
+PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
+
+
+def lattice_step(tool: ToolBody) -> float:
+    """Spacing of the planning lattice of a tool, mm.
+
+    A free strip as wide as ``PLAY_STEPS`` of these is connected on the lattice whatever its direction: the
+    diagonal of a cell. Narrower strips are not planned; ``touchable`` says so.
+    """
+    return float(np.clip(tool.radius / 10.0, 0.05, 0.15))
+
+
+@dataclass(frozen=True)
+class Clearances:
+    """Radial distances kept around the assembly, mm."""
+
+    neck: float = 0.05
+    shank: float = 0.2
+    holder: float = 1.0
+    rapid: float = 1.0
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A square grid over the plan view; node (i, j) is at (x0 + j*step, y0 + i*step), mm."""
+
+    x0: float
+    y0: float
+    step: float
+    nx: int
+    ny: int
+
+    @classmethod
+    def over(cls, bounds: F64, margin: float, step: float) -> Lattice:
+        """A lattice that covers ``bounds`` (2, >=2) mm and ``margin`` mm around it."""
+        x0, y0 = bounds[0, 0] - margin, bounds[0, 1] - margin
+        nx = int(math.ceil((bounds[1, 0] + margin - x0) / step)) + 1
+        ny = int(math.ceil((bounds[1, 1] + margin - y0) / step)) + 1
+        return cls(float(x0), float(y0), float(step), nx, ny)
+
+    def cells(self, xy: F64) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Row and column of the node nearest to each of xy (n, 2) mm, clipped to the lattice."""
+        j = np.clip(np.rint((xy[:, 0] - self.x0) / self.step).astype(np.int64), 0, self.nx - 1)
+        i = np.clip(np.rint((xy[:, 1] - self.y0) / self.step).astype(np.int64), 0, self.ny - 1)
+        return i, j
+
+    def mask(self, xy: F64) -> NDArray[np.bool_]:
+        """(ny, nx) bool: nodes that are nearest to one of xy (n, 2) mm."""
+        out = np.zeros((self.ny, self.nx), dtype=np.bool_)
+        if len(xy):
+            out[self.cells(xy)] = True
+        return out
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A flat-bottomed cylinder of the assembly that is wider than the cutter: radius with clearance, height, mm."""
+
+    name: str
+    radius: float
+    height: float
+
+
+def discs_of(tool: ToolBody, clear: Clearances) -> tuple[Disc, ...]:
+    """Shank and holder as stacked cylinders that enclose them, clearance included.
+
+    Frusta are cut into slices, each as wide as its widest end. Bodies no wider than the cutter are left out.
+    """
+    out: list[Disc] = []
+    if tool.shank_diameter > tool.diameter + 1e-9:
+        out.append(Disc("shank", tool.shank_diameter / 2 + clear.shank, tool.neck_length))
+    z = tool.stickout
+    for seg in tool.holder:
+        n = 1 if abs(seg.diameter - seg.diameter_top) < 1e-9 else FRUSTUM_SLICES
+        for k in range(n):
+            a = seg.diameter + (seg.diameter_top - seg.diameter) * k / n
+            b = seg.diameter + (seg.diameter_top - seg.diameter) * (k + 1) / n
+            out.append(Disc("holder", max(a, b) / 2 + clear.holder, z + seg.length * k / n))
+        z += seg.length
+    return tuple(d for d in out if d.radius > tool.radius + 1e-9)
+
+
+class TipField:
+    """The tip limit of one tool over one set of obstacles.
+
+    tree   : TriangleTree of the obstacles (part and fixture boxes) in the access frame
+    tool   : ToolBody
+    clear  : Clearances
+    bounds : (2, 3) float64, mm, region of interest in plan
+    step   : mm, spacing of the planning lattice
+    allowance : mm, material to leave on the part: the cutting part is grown by it all round
+    """
+
+    def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
+                 step: float, allowance: float = 0.0) -> None:
+        self.tree, self.tool, self.allowance = tree, tool, allowance
+        self.lattice = Lattice.over(bounds, margin, step)
+        self.coarse = Lattice.over(bounds, margin + LOOKUP_STEP, LOOKUP_STEP)
+        self.noncut, self.owner = self._noncut(discs_of(tool, clear))
+        self._cut: F64 | None = None
+        self._height: F64 | None = None
+
+    def _grid(self, lattice: Lattice, radius: float, corner: float) -> F64:
+        return drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, corner)
+
+    def _noncut(self, discs: tuple[Disc, ...]) -> tuple[F64, NDArray[np.int8]]:
+        grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
+        owner = np.zeros(grid.shape, np.int8)
+        for d in discs:
+            limit = self._grid(self.coarse, d.radius + LOOKUP_STEP * math.sqrt(0.5), 0.0) - d.height
+            owner[limit > grid] = 1 if d.name == "shank" else 2
+            grid = np.maximum(grid, limit)
+        return grid, owner
+
+    @property
+    def grown_radius(self) -> float:
+        """Radius of the cutting part with the allowance, mm."""
+        return self.tool.radius + self.allowance
+
+    @property
+    def grown_corner(self) -> float:
+        """Corner radius of the cutting part with the allowance, mm."""
+        return self.tool.corner_radius + self.allowance
+
+    @property
+    def cut_height(self) -> F64:
+        """(ny, nx) float64, mm: tip limit of the cutting part alone at the lattice nodes."""
+        if self._cut is None:
+            self._cut = self._grid(self.lattice, self.grown_radius, self.grown_corner) + self.allowance
+        return self._cut
+
+    @property
+    def height(self) -> F64:
+        """(ny, nx) float64, mm: tip limit of the whole assembly at the lattice nodes."""
+        if self._height is None:
+            lat = self.lattice
+            xs = lat.x0 + lat.step * np.arange(lat.nx)
+            ys = lat.y0 + lat.step * np.arange(lat.ny)
+            _, j = self.coarse.cells(np.column_stack([xs, np.zeros_like(xs)]))
+            i, _ = self.coarse.cells(np.column_stack([np.zeros_like(ys), ys]))
+            self._height = np.maximum(self.cut_height, self.noncut[np.ix_(i, j)])
+        return self._height
+
+    def tips(self, xy: F64) -> F64:
+        """Tip limit (n,) mm of the whole assembly at xy (n, 2) mm; exact for the cutting part."""
+        xy = np.ascontiguousarray(xy, dtype=np.float64)
+        out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
+        return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse_row, xy)))
+
+    @property
+    def coarse_row(self) -> tuple[float, float, float]:
+        """(x0, y0, step) of the shank and holder grid, for kernels."""
+        return (self.coarse.x0, self.coarse.y0, self.coarse.step)
+
+    def blocked_by_cutter(self, tips: F64) -> NDArray[np.bool_]:
+        """(n,) bool: the cutting part would enter the obstacles at tips (n, 3) mm."""
+        lowered = np.array(tips, dtype=np.float64)
+        lowered[:, 2] -= self.allowance
+        return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
+
+    def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
+        """(n,) bool: shank or holder would come nearer than their clearance at tips (n, 3) mm."""
+        return np.asarray(noncut_blocked(self.noncut, self.coarse_row, np.ascontiguousarray(tips)))
+
+    def blocker(self, tips: F64) -> NDArray[np.int8]:
+        """(n,) int8: 1 shank, 2 holder is what limits most at tips (n, 3) mm."""
+        return self.owner[self.coarse.cells(tips[:, :2])]
+
+
+FLAT_RING = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
+
+
+def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
+    """Highest tip at which the cutting profile touches each point moved out along its normal.
+
+    points, normals : (n, 3) float64, mm and unit, out of the material
+    lift            : mm, distance along the normal at which contact is asked for
+    Returns (n, 3) float64 tips, mm. The contact lies on the torus of the corner: axis at
+    p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. Under a flat or bull end a level
+    facet is touched by the whole bottom; there the axis is put over the point.
+    """
+    r, flat = tool.corner_radius, tool.radius - tool.corner_radius
+    out = points + normals * (lift + r)
+    level = np.linalg.norm(normals[:, :2], axis=1)
+    side = np.where(level > 1e-3, 1.0 / np.maximum(level, 1e-12), 0.0)[:, None] * normals[:, :2]
+    out[:, :2] += flat * side
+    out[:, 2] -= r
+    return np.ascontiguousarray(out)
+
+
+def touchable(field: TipField, points: F64, normals: F64, lift: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+    """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
+
+    Beside a wall the tool must also have room to move away from it by ``PLAY_STEPS`` lattice steps: a channel that
+    fits it like a gauge is for the next thinner tool.
+
+    Returns
+    -------
+    by_cutter  : (n,) bool, the cutting part alone gets there
+    by_tool    : (n,) bool, shank and holder stay clear as well
+    tips       : (n, 3) float64, mm, the admissible tip (the first tried where none is)
+    """
+    tool = field.tool
+    tips = contact_tips(tool, points, normals, lift + field.allowance)
+    tips[:, 2] += LEVEL_TOLERANCE
+    cutter = ~field.blocked_by_cutter(tips)
+    upright = np.flatnonzero(cutter & (np.abs(normals[:, 2]) < 0.5))
+    aside = tips[upright]
+    side = normals[upright, :2] / np.linalg.norm(normals[upright, :2], axis=1, keepdims=True)
+    aside[:, :2] += PLAY_STEPS * field.lattice.step * side
+    cutter[upright] = ~field.blocked_by_cutter(aside)
+    whole = cutter & ~field.blocked_by_body(tips)
+    flat = tool.radius - tool.corner_radius
+    if flat > 0:
+        level = normals[:, 2] > 1.0 - 1e-6
+        for reach in (0.5 * flat, 0.999 * flat):
+            for side in FLAT_RING:
+                todo = np.flatnonzero(level & ~whole)
+                if not len(todo):
+                    break
+                trial = tips[todo].copy()
+                trial[:, :2] = points[todo, :2] + reach * side
+                free = ~field.blocked_by_cutter(trial)
+                ok = free & ~field.blocked_by_body(trial)
+                cutter[todo] |= free
+                whole[todo[ok]] = True
+                tips[todo[ok]] = trial[ok]
+    seen = normals[:, 2] > -0.02
+    return cutter & seen, whole & seen, tips
