@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from PIL.ImageFont import FreeTypeFont
 
@@ -45,6 +46,7 @@ TOOLS: tuple[RGB, ...] = (
     (0.85, 0.20, 0.55), (0.25, 0.25, 0.30), (0.40, 0.55, 0.00),
 )
 _MOST_LABELS = 40
+_TRIAL = (240, 180)  # pixels of the pictures that views are chosen with
 
 
 def draw_preview(
@@ -64,13 +66,14 @@ def draw_preview(
     """
     width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
     shown = [s for s in steps if s.operation == "finishing"] or list(steps)
-    camera = _camera(part, shown, (2 * width, 2 * height))
+    camera = _camera(part, decomposition, shown, (2 * width, 2 * height))
     left = _draw_part(part, _face_colours(part, decomposition), camera)
+    _draw_hidden_connections(left, part, decomposition, camera)
     pale = _draw_part(part, _pale_colours(part, decomposition, zone_of_face), camera)
     tools = _tool_colours(steps)
     _draw_paths(pale, camera, shown, tools)
     if remainder_points is not None and len(remainder_points):
-        pale.dots(camera.screen(remainder_points), REMAINDER, width=4, alpha=0.9, hidden=0.25, bias=0.15 * camera.scale)
+        pale.dots(camera.screen(remainder_points), REMAINDER, width=5, alpha=0.9, hidden=0.35, bias=0.15 * camera.scale)
 
     sheet = Image.new("RGB", SIZE, _bytes(WHITE))
     for canvas, x in ((left, 0), (pale, width + GUTTER)):
@@ -86,10 +89,42 @@ def draw_preview(
     sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
 
 
-def _camera(part: Part, steps: Sequence[Workingstep], size: tuple[int, int]) -> Camera:
+def _camera(part: Part, decomposition: Decomposition, steps: Sequence[Workingstep], size: tuple[int, int]) -> Camera:
+    """Where the viewer stands: of twelve slanting azimuths and two heights, where the connections fill most pixels.
+
+    Ties, and parts without connections, go to the first, the usual isometric view.
+    """
     cuts = [t.points for s in steps for t in s.trajectories if t.motion is Motion.CUT]
-    return Camera.fit(np.concatenate([part.mesh.vertices, *cuts]), size,
-                      azimuth=math.radians(-58.0), elevation=math.radians(38.0))
+    points = np.concatenate([part.mesh.vertices, *cuts])
+    wanted = [f for c in decomposition.connections for f in c.faces]
+    views = [(quarter + turn, up) for up in (38.0, 50.0) for turn in (-58.0, -25.0, -65.0)
+             for quarter in (0, 90, 180, 270)]
+    best, most = views[0], -1.0
+    for view in views if wanted else ():
+        camera = Camera.fit(points, _TRIAL, azimuth=math.radians(view[0]), elevation=math.radians(view[1]))
+        seen = _owners(part, camera)
+        area = float(np.isin(seen, wanted).sum())
+        if area > 1.05 * most:
+            best, most = view, area
+    return Camera.fit(points, size, azimuth=math.radians(best[0]), elevation=math.radians(best[1]))
+
+
+def _owners(part: Part, camera: Camera) -> NDArray[np.int32]:
+    """(h, w): the face number seen in every pixel."""
+    canvas = Canvas.blank(*camera.size, PAPER)
+    front = np.flatnonzero(part.mesh.normals @ camera.basis[2] > 0.0)
+    canvas.triangles(camera.screen(part.mesh.triangles[front]), np.zeros((len(front), 3), np.float32),
+                     part.mesh.face_ids[front])
+    return canvas.owner
+
+
+def _draw_hidden_connections(canvas: Canvas, part: Part, decomposition: Decomposition, camera: Camera) -> None:
+    """Edges of connections shine through what stands before them."""
+    faces = {f for c in decomposition.connections for f in c.faces}
+    for edge in part.edges:
+        if faces & set(edge.faces) and len(edge.points) > 1:
+            canvas.strokes(_segments(camera, edge.points), CONNECTION, width=3, alpha=0.0, hidden=0.8, bias=4.0,
+                           dash=7.0)
 
 
 def wall_colour(index: int) -> RGB:
@@ -128,7 +163,7 @@ def _draw_part(part: Part, colours: F32, camera: Camera) -> Canvas:
     key = np.array([-0.35, 0.55, 0.75]) @ camera.basis  # over the viewer's left shoulder
     fill = np.array([0.9, 0.1, 0.4]) @ camera.basis
     n = mesh.normals[front]
-    light = 0.46 + 0.46 * np.clip(n @ (key / np.linalg.norm(key)), 0, 1) + 0.16 * np.clip(n @ fill, 0, 1)
+    light = 0.56 + 0.40 * np.clip(n @ (key / np.linalg.norm(key)), 0, 1) + 0.16 * np.clip(n @ fill, 0, 1)
     ids = np.where(mesh.face_ids[front] < len(colours), mesh.face_ids[front], 0)
     canvas.triangles(camera.screen(mesh.triangles[front]), np.clip(colours[ids] * light[:, None], 0, 1).astype("f4"),
                      np.maximum(mesh.face_ids[front], 1))
