@@ -98,14 +98,14 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
         radius, corner, length = cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2]
         reach = radius + pad
-        x0 = max(cx0, int(math.floor((min(ax, ax + dx) - reach - origin[0]) / size)))
-        x1 = min(cx1 - 1, int(math.floor((max(ax, ax + dx) + reach - origin[0]) / size)))
-        y0 = max(cy0, int(math.floor((min(ay, ay + dy) - reach - origin[1]) / size)))
-        y1 = min(cy1 - 1, int(math.floor((max(ay, ay + dy) + reach - origin[1]) / size)))
+        x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))
+        x1 = min(cx1 - 1, math.floor((max(ax, ax + dx) + reach - origin[0]) / size))
+        y0 = max(cy0, math.floor((min(ay, ay + dy) - reach - origin[1]) / size))
+        y1 = min(cy1 - 1, math.floor((max(ay, ay + dy) + reach - origin[1]) / size))
         if x0 > x1 or y0 > y1:
             continue
-        z0 = max(0, int(math.floor((min(az, az + dz) - pad - origin[2]) / size)))
-        z1 = min(shape[2] - 1, int(math.floor((max(az, az + dz) + length + pad - origin[2]) / size)))
+        z0 = max(0, math.floor((min(az, az + dz) - pad - origin[2]) / size))
+        z1 = min(shape[2] - 1, math.floor((max(az, az + dz) + length + pad - origin[2]) / size))
         plan2 = dx * dx + dy * dy
         for cx in range(x0, x1 + 1):
             for cy in range(y0, y1 + 1):

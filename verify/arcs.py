@@ -1,0 +1,73 @@
+"""Arcs and helices of a program as polylines.
+
+Plane axes by G17/G18/G19: (X, Y), (Z, X), (Y, Z); G2 runs clockwise seen from the positive third axis.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geometry.mesh import F64
+
+CHORD = 1e-3
+PLANE_AXES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+
+class ArcError(ValueError):
+    """An arc whose words contradict each other; the reader adds the line."""
+
+
+def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axes: tuple[int, int, int]) -> F64:
+    """Centre (2,) in plane axes of an arc given by R; a negative radius asks for the longer way.
+
+    Raises ArcError where both ends coincide or lie further apart than 2 R (more than 0.01 mm).
+    """
+    a, b = start[list(axes[:2])], end[list(axes[:2])]
+    chord = b - a
+    d = float(np.hypot(*chord))
+    if d < 1e-9:
+        raise ArcError("an arc given by R needs two different ends")
+    if d > 2 * abs(radius) + 0.01:
+        raise ArcError(f"radius {abs(radius):g} mm cannot span {d:g} mm")
+    height = math.sqrt(max(radius * radius - d * d / 4, 0.0))
+    side = 1.0 if clockwise == (radius < 0) else -1.0
+    return np.asarray(0.5 * (a + b) + side * height * np.array([-chord[1], chord[0]]) / d)
+
+
+def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1,
+               chord: float = CHORD) -> F64:
+    """Points of an arc or helix after its start.
+
+    start, end : (3,) float64, mm; centre : (2,) float64, mm, in plane axes
+    turns      : as the P word: full turns begun
+    chord      : mm, largest distance of the polyline from the arc; the points lie on it
+
+    Returns (k, 3) float64, mm, the last row equal to ``end``. Equal ends in the plane make a full circle.
+    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %.
+    """
+    i, j, k = axes
+    u, v = start[[i, j]] - centre, end[[i, j]] - centre
+    r0, r1 = float(np.hypot(*u)), float(np.hypot(*v))
+    if r0 < 1e-9:
+        raise ArcError("the centre of the arc lies on its start")
+    if abs(r0 - r1) > max(0.01, 1e-3 * r0):
+        raise ArcError(f"start and end lie {abs(r0 - r1):.4g} mm off one circle (radii {r0:g} and {r1:g})")
+    a0 = math.atan2(u[1], u[0])
+    sweep = math.atan2(v[1], v[0]) - a0
+    sweep = -((-sweep) % math.tau) if clockwise else sweep % math.tau
+    if abs(sweep) < 1e-9 or abs(abs(sweep) - math.tau) < 1e-9:
+        same = float(np.hypot(*(end[[i, j]] - start[[i, j]]))) < 1e-6
+        sweep = (-math.tau if clockwise else math.tau) if same else sweep
+    sweep += (turns - 1) * (-math.tau if clockwise else math.tau)
+    step = 2 * math.acos(max(1 - chord / max(r0, r1), 0.5))
+    n = max(1, math.ceil(abs(sweep) / step))
+    f = np.arange(1, n + 1) / n
+    radius = r0 + (r1 - r0) * f
+    out = np.empty((n, 3))
+    out[:, i] = centre[0] + radius * np.cos(a0 + sweep * f)
+    out[:, j] = centre[1] + radius * np.sin(a0 + sweep * f)
+    out[:, k] = start[k] + (end[k] - start[k]) * f
+    out[-1] = end
+    return out

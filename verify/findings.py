@@ -1,0 +1,142 @@
+"""From single contacts to findings a person can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32
+from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
+from verify.model import Finding, FindingKind
+
+MOST = 200
+NEAR = 5.0
+LINES_APART = 5
+BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "holder"}
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Where each move comes from: program names, (m,) program number, (m,) 1-based line, (m,) T number."""
+
+    names: tuple[str, ...]
+    program: I32
+    line: I32
+    tool: I32
+
+
+def chains(program: I32, line: I32, points: F64, key: I32) -> NDArray[np.int64]:
+    """(n,) int64 group of each row: one key, one program, lines at most 5 and places at most 5 mm apart."""
+    if len(line) == 0:
+        return np.zeros(0, np.int64)
+    order = np.lexsort((points[:, 1], points[:, 0], line, program, key))
+    k, p, n, x = key[order], program[order], line[order], points[order]
+    new = (k[1:] != k[:-1]) | (p[1:] != p[:-1]) | (n[1:] - n[:-1] > LINES_APART)
+    new |= (np.linalg.norm(x[1:] - x[:-1], axis=1) > NEAR) & (n[1:] != n[:-1])
+    out = np.empty(len(line), np.int64)
+    out[order] = np.concatenate([[0], np.cumsum(new)])
+    return out
+
+
+def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
+    """Rows of each group, deepest first (first row first among equals)."""
+    order = np.lexsort((np.arange(len(groups)), -depth, groups))
+    cuts = np.flatnonzero(np.diff(groups[order])) + 1
+    return [rows for rows in np.split(order, cuts) if len(rows)]
+
+
+def contact_findings(events: F64, feed: NDArray[np.bool_], source: Source, rapid_clearance: float,
+                     skins: F64) -> list[Finding]:
+    """Findings of the events of ``verify.stock``; skins (m,) float64 is the plunge limit of each move, mm."""
+    if len(events) == 0:
+        return []
+    move, code = events[:, 0].astype(np.int64), events[:, 1].astype(np.int32)
+    touching = events[:, 2] > events[:, 3] + 1e-9
+    key = code + 16 * touching.astype(np.int32) * feed[move] + 32 * (~feed[move]).astype(np.int32)
+    groups = chains(source.program[move], source.line[move], events[:, 4:7], key)
+    out = []
+    for rows in worst_of(groups, events[:, 2]):
+        r = rows[0]
+        m = move[r]
+        depth, clearance = float(events[r, 2]), float(events[r, 3])
+        kind, text, limit = _contact(int(code[r]), bool(feed[m]), depth, clearance, rapid_clearance, float(skins[m]))
+        lines = source.line[move[rows]]
+        out.append(Finding(kind, source.names[source.program[m]], int(source.line[m]), None, None,
+                           _point(events[r, 4:7]), depth if kind == FindingKind.PLUNGE else max(depth - clearance, 0.0)
+                           if depth > clearance else clearance - depth, limit,
+                           f"T{source.tool[m]}: {text}{_span(lines)}", len(rows)))
+    return out
+
+
+def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_clearance: float,
+             skin: float) -> tuple[FindingKind, str, float]:
+    if code == PLUNGE:
+        return (FindingKind.PLUNGE, f"a descent steeper than the ramp angle takes {depth:.3f} mm of stock with the "
+                f"end of the tool (skin allowed {skin:.3f} mm)", skin)
+    body, what = BODY_NAMES[code % FIXTURE], "a fixture" if code >= FIXTURE else "stock or part"
+    gap = clearance - depth
+    if not feed:
+        text = f"a rapid takes the {body} into {what}" if gap < 0 else \
+            f"a rapid brings the {body} to {gap:.3f} mm of {what} (clearance {rapid_clearance:g} mm)"
+        return FindingKind.RAPID, text, rapid_clearance
+    if gap < 0:
+        return FindingKind.COLLISION, f"the {body} enters {what} by {-gap:.3f} mm", 0.0
+    text = f"the {body} comes to {gap:.3f} mm of {what} (clearance {clearance:.3f} mm)"
+    return FindingKind.RUBBING, text, clearance
+
+
+def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, source: Source,
+                   tolerance: float) -> list[Finding]:
+    """Findings of gouges deeper than the tolerance: (n, 3) places, faces, depths in mm, areas and moves."""
+    out = []
+    groups = chains(source.program[mover], source.line[mover], points, face)
+    for rows in worst_of(groups, depth):
+        r = rows[0]
+        m = mover[r]
+        out.append(Finding(FindingKind.GOUGE, source.names[source.program[m]], int(source.line[m]), None,
+                           f"F{face[r]}", _point(points[r]), float(depth[r]), tolerance,
+                           f"T{source.tool[m]} cuts {depth[r]:.4f} mm into the part{_span(source.line[mover[rows]])}",
+                           len(rows), float(area[rows].sum())))
+    return out
+
+
+def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64, zone_ids: Sequence[str],
+                      scallop: float) -> list[Finding]:
+    """Findings of claimed samples outside the budget, by zone, face and 5 mm cell; ``excess`` is mm left over
+    the allowance (negative where the part is cut too deep)."""
+    if len(points) == 0:
+        return []
+    cell = np.floor(points / NEAR).astype(np.int64)
+    _, groups = np.unique(np.column_stack([zone, face, cell]), axis=0, return_inverse=True)
+    out = []
+    for rows in worst_of(groups.reshape(-1), np.abs(excess)):
+        r = rows[0]
+        name = zone_ids[zone[r] - 1]
+        total = float(area[rows].sum())
+        text = f"{excess[r]:.4f} mm stays where {scallop:g} mm is allowed" if excess[r] > 0 else \
+            f"{-excess[r]:.4f} mm too deep"
+        out.append(Finding(FindingKind.RESIDUAL, "", 0, name, f"F{face[r]}", _point(points[r]), float(excess[r]),
+                           scallop, f"{name}: {text} ({total:.3g} mm² round here)", len(rows), total))
+    return out
+
+
+def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str, int]]:
+    """The gravest 200 findings and how many there are of each kind."""
+    rank = {kind: i for i, kind in enumerate(FindingKind)}
+    counts: dict[str, int] = {}
+    for f in findings:
+        counts[str(f.kind)] = counts.get(str(f.kind), 0) + 1
+    by_grade = sorted(findings, key=lambda f: (rank[f.kind], -abs(f.depth), f.program, f.line, f.face or ""))
+    return tuple(by_grade[:MOST]), dict(sorted(counts.items()))
+
+
+def _point(p: F64) -> tuple[float, float, float]:
+    return round(float(p[0]), 6), round(float(p[1]), 6), round(float(p[2]), 6)
+
+
+def _span(lines: I32) -> str:
+    first, last = int(lines.min()), int(lines.max())
+    return "" if first == last else f", lines {first} to {last}"

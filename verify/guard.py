@@ -1,0 +1,90 @@
+"""Points of the part that are watched besides the scored samples, and true depths of gouges."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, I32, TriangleMesh
+from geometry.rays import first_hits
+from geometry.sampling import SurfaceSamples, sample_surface
+from verify.kernels.nearest import nearest_distances
+
+GUARD_DENSITY = 25.0
+GUARD_MOST = 1_000_000
+GUARD_SEED = 20_011
+EDGE_SPACING = 0.1
+SHARP = math.radians(20.0)
+DEPTH_STEPS = 64
+
+
+def guard_samples(mesh: TriangleMesh, density: float = GUARD_DENSITY) -> SurfaceSamples:
+    """Samples of the whole part, ``density`` a mm², fewer on parts that would need over a million."""
+    area = float(mesh.areas.sum())
+    return sample_surface(mesh, min(density, GUARD_MOST / max(area, 1e-9)), seed=GUARD_SEED)
+
+
+def sparse_faces(mesh: TriangleMesh, scored: SurfaceSamples, density: float = GUARD_DENSITY) -> NDArray[np.bool_]:
+    """(m,) bool: triangles of faces on which the scored samples lie thinner than ``density`` a mm²."""
+    most = int(max(mesh.face_ids.max(initial=0), scored.face.max(initial=0))) + 1
+    area = np.bincount(mesh.face_ids, weights=mesh.areas, minlength=most)
+    count = np.bincount(scored.face, minlength=most)
+    return np.asarray((count < 0.9 * density * area)[mesh.face_ids])
+
+
+def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:
+    """Points along the sharp convex edges of a mesh, for gouges that slip between surface samples.
+
+    Returns points (n, 3) float64 mm, unit bisectors of the two normals (n, 3), and a face number (n,) int32.
+    Sharp means more than 20 degrees between the normals.
+    """
+    _, same = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
+    corners = same.reshape(-1)[mesh.faces]
+    sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    owner = np.repeat(np.arange(len(mesh.faces)), 3)
+    key = np.sort(sides, axis=1)
+    order = np.lexsort((owner, key[:, 1], key[:, 0]))
+    key, owner, ends = key[order], owner[order], mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)[order]
+    pair = np.flatnonzero((key[:-1] == key[1:]).all(axis=1))
+    a, b = owner[pair], owner[pair + 1]
+    n1, n2 = mesh.normals[a], mesh.normals[b]
+    p, q = mesh.vertices[ends[pair, 0]], mesh.vertices[ends[pair, 1]]
+    below = np.einsum("ij,ij->i", n1, mesh.triangles[b].mean(axis=1) - p)
+    sharp = (np.einsum("ij,ij->i", n1, n2) < math.cos(SHARP)) & (below < 0)
+    p, q, n1, n2, a = p[sharp], q[sharp], n1[sharp], n2[sharp], a[sharp]
+    middle = n1 + n2
+    length = np.linalg.norm(middle, axis=1)
+    keep = length > 1e-6
+    p, q, middle, a = p[keep], q[keep], middle[keep] / length[keep, None], a[keep]
+    count = np.maximum(np.ceil(np.linalg.norm(q - p, axis=1) / spacing).astype(int), 1)
+    row = np.repeat(np.arange(len(p)), count)
+    f = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+    return p[row] + f[:, None] * (q - p)[row], middle[row], mesh.face_ids[a[row]]
+
+
+def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
+    """How far the removed stretch of each inward ray gets from the surface.
+
+    points, normals : (n, 3) float64, mm and outward unit
+    along           : (n,) float64, mm removed along the inward normal, > 0
+
+    Returns (n,) float64, mm: the largest distance to the mesh on the stretch, up to where the ray leaves the part.
+
+    Notes
+    -----
+    A cut grazing the top of a wall swallows whole rays of samples just below the top edge; the depth of a
+    gouge is how deep it goes under the surface. Read at 64 places: at most along / 128 too small.
+    """
+    n = len(points)
+    if n == 0:
+        return np.zeros(0)
+    through, _ = first_hits(tree, points, -normals, t_min=1e-4)
+    stretch = np.minimum(along, through)
+    share = np.arange(1, DEPTH_STEPS + 1) / DEPTH_STEPS
+    where = points[:, None, :] - (stretch[:, None] * share)[:, :, None] * normals[:, None, :]
+    out, t = np.empty(n * DEPTH_STEPS), tree.arrays
+    nearest_distances(t.lower, t.upper, t.child, t.first, t.size, t.corners, where.reshape(-1, 3), out)
+    return np.minimum(out.reshape(n, DEPTH_STEPS).max(axis=1), along)

@@ -1,0 +1,65 @@
+"""Neck, shank and holder against points of the part itself (exact, without the spacing of the stock lines).
+
+Notation as in ``heights``; body and event rows as in ``stock``; the grid of points as in ``rays``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from verify.kernels.heights import overlap
+from verify.kernels.rays import plan_distance
+from verify.kernels.stock import _note, _worse
+
+
+@njit(cache=True, nogil=True)
+def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, body, slack, best):
+    """Find the points that one body takes in by more than ``slack`` along one move."""
+    z0, z1, r0, r1 = body[0], body[1], body[2], body[3]
+    wide = max(r0, r1)
+    x0 = max(cx0, math.floor((min(a[0], a[0] + d[0]) - wide - origin[0]) / size))
+    x1 = min(cx1 - 1, math.floor((max(a[0], a[0] + d[0]) + wide - origin[0]) / size))
+    y0 = max(cy0, math.floor((min(a[1], a[1] + d[1]) - wide - origin[1]) / size))
+    y1 = min(cy1 - 1, math.floor((max(a[1], a[1] + d[1]) + wide - origin[1]) / size))
+    low = max(0, math.floor((min(a[2], a[2] + d[2]) + z0 - origin[2]) / size))
+    high = min(shape[2] - 1, math.floor((max(a[2], a[2] + d[2]) + z1 - origin[2]) / size))
+    plan2 = d[0] * d[0] + d[1] * d[1]
+    half = 0.5 * math.sqrt(2.0) * size
+    for cx in range(x0, x1 + 1):
+        for cy in range(y0, y1 + 1):
+            row = (cx * shape[1] + cy) * shape[2]
+            if first[row + low] == first[row + high + 1]:
+                continue
+            if plan_distance(origin[0] + (cx + 0.5) * size, origin[1] + (cy + 0.5) * size, a[0], a[1], d[0], d[1],
+                             plan2) > wide + half:
+                continue
+            for i in range(first[row + low], first[row + high + 1]):
+                depth = overlap(points[i, 0], points[i, 1], points[i, 2], a[0], a[1], a[2], d[0], d[1], d[2],
+                                z0, z1, r0, r1, False)
+                if depth > slack:
+                    _worse(best, int(body[5]), depth, body[4], points[i, 0], points[i, 1], points[i, 2])
+
+
+@njit(cache=True, nogil=True)
+def body_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, starts, ends, feeds, tool, radii, bodies,
+              body_first, slack, events):
+    """Events of all feed moves with the points in cell columns cx0..cx1-1, cy0..cy1-1; returns their number."""
+    best = np.zeros((16, 5))
+    count = 0
+    top = origin[2] + shape[2] * size
+    for m in range(len(starts)):
+        if not feeds[m]:
+            continue
+        k = tool[m]
+        for b in range(body_first[k], body_first[k + 1]):
+            if min(starts[m, 2], ends[m, 2]) + bodies[b, 0] >= top:
+                continue
+            a = (starts[m, 0], starts[m, 1], starts[m, 2])
+            d = (ends[m, 0] - a[0], ends[m, 1] - a[1], ends[m, 2] - a[2])
+            loose = slack if max(bodies[b, 2], bodies[b, 3]) <= radii[k] + 1e-9 else 1e-3
+            _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bodies[b], loose, best)
+        count = _note(events, count, m, best)
+    return count

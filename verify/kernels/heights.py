@@ -1,0 +1,189 @@
+"""Vertical lines through stock: raising them to the blank, lowering them by a cutter, meeting them with bodies.
+
+Notation
+    (x, y), top : one line and the height up to which it is solid
+    A, D        : tip at the start of the move and its displacement, tip(s) = A + s D
+    rho(s)      : distance in plan from the line to the tool axis
+    R, r, a     : radius, corner radius, R - r; ``grow`` widens the profile radially
+Heights on the lines are exact; what stands wholly between two lines is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+INF = np.inf
+
+
+@njit(cache=True, nogil=True)
+def bottom(rho, a, r):
+    """Height of the cutting profile over the tip at distance rho from the axis."""
+    over = max(rho - a, 0.0)
+    return r - math.sqrt(max(r * r - over * over, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def _rho(s, wx, wy, dx, dy):
+    ux, uy = wx - s * dx, wy - s * dy
+    return math.sqrt(ux * ux + uy * uy)
+
+
+@njit(cache=True, nogil=True)
+def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, radius, a, r):
+    """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
+    if dz == 0.0:
+        return min(max(s0, s1), s2)
+    if r <= 0.0:
+        return s1 if dz > 0.0 else s2
+    if a <= 1e-12:
+        w = math.sqrt(max(radius * radius - miss2, 0.0))
+        return min(max(s0 - w * dz / math.sqrt(plan * plan + dz * dz) / plan, s1), s2)
+    lo, hi = s1, s2
+    for _ in range(40):
+        s = 0.5 * (lo + hi)
+        rho = _rho(s, wx, wy, dx, dy)
+        slope = dz
+        if rho > a:
+            over = min(rho - a, r * (1.0 - 1e-12))
+            slope -= over / math.sqrt(r * r - over * over) * ((wx - s * dx) * dx + (wy - s * dy) * dy) / rho
+        if slope > 0.0:
+            hi = s
+        else:
+            lo = s
+    return 0.5 * (lo + hi)
+
+
+@njit(cache=True, nogil=True)
+def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
+    """Least height over (x, y) of a cutting profile carried along the move, and the s of its first touch.
+
+    Returns (inf, 0) where the move passes by.
+    """
+    r, a, wide = corner, radius - corner + grow, radius + grow
+    wx, wy = x - ax, y - ay
+    plan2 = dx * dx + dy * dy
+    if plan2 < 1e-18:
+        rho = math.sqrt(wx * wx + wy * wy)
+        return (min(az, az + dz) + bottom(rho, a, r), 0.0) if rho <= wide else (INF, 0.0)
+    s0 = (wx * dx + wy * dy) / plan2
+    miss2 = wx * wx + wy * wy - s0 * s0 * plan2
+    if miss2 > wide * wide:
+        return INF, 0.0
+    plan = math.sqrt(plan2)
+    half = math.sqrt(wide * wide - max(miss2, 0.0)) / plan
+    s1, s2 = max(0.0, s0 - half), min(1.0, s0 + half)
+    if s1 > s2:
+        return INF, 0.0
+    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, wide, a, r)
+    return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r), s1
+
+
+@njit(cache=True, nogil=True)
+def _cone_gap(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+    """Radius of the frustum minus rho at s, at the height that suits a point or a solid column below it."""
+    h = wz - s * dz
+    if column:
+        h = min(h, z1) if r1 > r0 else z0
+    return r0 + (r1 - r0) * (h - z0) / max(z1 - z0, 1e-12) - _rho(s, wx, wy, dx, dy)
+
+
+@njit(cache=True, nogil=True)
+def overlap(x, y, z, ax, ay, az, dx, dy, dz, z0, z1, r0, r1, column):
+    """How deep (radially, mm) a frustum z0..z1 over the tip takes in a point, or the column below it.
+
+    Positive inside; -inf where the heights never meet.
+    """
+    wx, wy, wz = x - ax, y - ay, z - az
+    s1, s2 = 0.0, 1.0
+    high = INF if column else z1
+    if abs(dz) < 1e-15:
+        if wz <= z0 or wz >= high:
+            return -INF
+    else:
+        u, v = (wz - z0) / dz, (wz - high) / dz
+        s1, s2 = max(s1, min(u, v)), min(s2, max(u, v))
+        if s1 > s2:
+            return -INF
+    plan2 = dx * dx + dy * dy
+    if r0 == r1:
+        s = s1 if plan2 < 1e-18 else min(max((wx * dx + wy * dy) / plan2, s1), s2)
+        return r0 - _rho(s, wx, wy, dx, dy)
+    for _ in range(60):
+        u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
+        if _cone_gap(u, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column) \
+                > _cone_gap(v, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+            s2 = v
+        else:
+            s1 = u
+    return _cone_gap(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column)
+
+
+@njit(cache=True, nogil=True)
+def _cells(lo, hi, origin, step, first, stop):
+    """Lines whose coordinate lies in [lo, hi], cut to first..stop-1."""
+    return (max(first, math.ceil((lo - origin) / step - 0.5)), min(stop - 1, math.floor((hi - origin) / step - 0.5)))
+
+
+@njit(cache=True, nogil=True)
+def _raise_facet(height, i0, i1, origin, step, p, q, s, reach):
+    """Raise lines to the upper side of one triangle shifted by ``reach`` along its normal."""
+    ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    vx, vy, vz = s[0] - p[0], s[1] - p[1], s[2] - p[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if nz <= 1e-9 * length or length == 0.0:
+        return
+    ox, oy, oz = p[0] + reach * nx / length, p[1] + reach * ny / length, p[2] + reach * nz / length
+    a0, a1 = _cells(ox + min(0.0, ux, vx), ox + max(0.0, ux, vx), origin[0], step, i0, i1)
+    b0, b1 = _cells(oy + min(0.0, uy, vy), oy + max(0.0, uy, vy), origin[1], step, 0, height.shape[1])
+    for i in range(a0, a1 + 1):
+        x = origin[0] + (i + 0.5) * step - ox
+        for j in range(b0, b1 + 1):
+            y = origin[1] + (j + 0.5) * step - oy
+            f, g = (x * vy - y * vx) / nz, (ux * y - uy * x) / nz
+            if f >= -1e-9 and g >= -1e-9 and f + g <= 1.0 + 1e-9:
+                height[i, j] = max(height[i, j], oz + f * uz + g * vz)
+
+
+@njit(cache=True, nogil=True)
+def _raise_edge(height, i0, i1, origin, step, p, q, reach):
+    """Raise lines to the upper side of a sphere of radius ``reach`` carried along one edge."""
+    dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    plan2 = dx * dx + dy * dy
+    top = max(p[2], q[2]) + reach
+    a0, a1 = _cells(min(p[0], q[0]) - reach, max(p[0], q[0]) + reach, origin[0], step, i0, i1)
+    b0, b1 = _cells(min(p[1], q[1]) - reach, max(p[1], q[1]) + reach, origin[1], step, 0, height.shape[1])
+    for i in range(a0, a1 + 1):
+        wx = origin[0] + (i + 0.5) * step - p[0]
+        for j in range(b0, b1 + 1):
+            if height[i, j] >= top:
+                continue
+            wy = origin[1] + (j + 0.5) * step - p[1]
+            s = 0.0 if dz < 0.0 else 1.0
+            if plan2 > 1e-18:
+                s0 = (wx * dx + wy * dy) / plan2
+                w2 = reach * reach - (wx * wx + wy * wy - s0 * s0 * plan2)
+                if w2 < 0.0:
+                    continue
+                s = s0 + math.sqrt(w2) * dz / math.sqrt(plan2 * (plan2 + dz * dz))
+                s = min(max(s, 0.0), 1.0)
+            rho = _rho(s, wx, wy, dx, dy)
+            if rho <= reach:
+                height[i, j] = max(height[i, j], p[2] + s * dz + math.sqrt(reach * reach - rho * rho))
+
+
+@njit(cache=True, nogil=True)
+def raise_offset(height, i0, i1, origin, step, vertices, faces, edges, reach):
+    """Raise the lines of rows i0..i1-1 to the top of a mesh grown by ``reach``: exact on every line.
+
+    height (nx, ny) float64 in place; line (i, j) stands at origin + ((i, j) + 0.5) step.
+    """
+    for k in range(len(faces)):
+        _raise_facet(height, i0, i1, origin, step, vertices[faces[k, 0]], vertices[faces[k, 1]],
+                     vertices[faces[k, 2]], reach)
+    if reach > 0.0:
+        for k in range(len(edges)):
+            _raise_edge(height, i0, i1, origin, step, vertices[edges[k, 0]], vertices[edges[k, 1]], reach)

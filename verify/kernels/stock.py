@@ -1,0 +1,182 @@
+"""One pass of all moves over a block of stock lines: lower, and look for what must not touch.
+
+Notation as in ``heights``. A body row is (z0, z1, r0, r1, clearance, part): heights over the tip, radii that
+already hold the clearance, ``part`` 1 neck, 2 shank, 3 holder. An event row is
+(move, code, depth, clearance, x, y, z); depth counts from the grown body, so depth > clearance is contact.
+Blocks are independent, and within one every line sees the moves in order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from verify.kernels.heights import INF, _cells, lowest, overlap
+
+CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
+REFRESH = 64
+
+
+@njit(cache=True, nogil=True)
+def _top(height, fixed, i0, i1, j0, j1):
+    most = -INF
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            most = max(most, height[i, j], fixed[i, j])
+    return most
+
+
+@njit(cache=True, nogil=True)
+def _note(events, count, m, best):
+    """Append the events of one move; rows beyond the table are counted only."""
+    for code in range(len(best)):
+        if best[code, 0] > 0.0:
+            if count < len(events):
+                events[count, 0], events[count, 1] = m, code
+                events[count, 2:7] = best[code]
+            count += 1
+            best[code, 0] = 0.0
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _worse(best, code, depth, clearance, x, y, z):
+    if depth > best[code, 0]:
+        best[code, 0], best[code, 1], best[code, 2], best[code, 3], best[code, 4] = depth, clearance, x, y, z
+
+
+@njit(cache=True, nogil=True)
+def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, run, stamp, dug, best):
+    """Lower the lines under one feed move; returns whether any stock went."""
+    i0, i1, j0, j1 = box
+    radius, corner, length = cutter
+    cut = False
+    a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
+    b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
+    floor = min(a[2], a[2] + d[2])
+    for i in range(a0, a1 + 1):
+        x = origin[0] + (i + 0.5) * step
+        for j in range(b0, b1 + 1):
+            if height[i, j] <= floor and fixed[i, j] <= floor:
+                continue
+            y = origin[1] + (j + 0.5) * step
+            low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
+            if fixed[i, j] > low + 1e-3:
+                _worse(best, CUTTER + FIXTURE, fixed[i, j] - low, 0.0, x, y, low)
+            gone = height[i, j] - low
+            if gone <= 1e-9 or height[i, j] > a[2] + s * d[2] + length + 1e-9:
+                continue
+            height[i, j] = low
+            cut = cut or gone > 1e-6
+            if run == 0:
+                continue
+            if lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, 0.0, 0.0)[0] < INF:
+                if stamp[i - i0, j - j0] != run:
+                    stamp[i - i0, j - j0], dug[i - i0, j - j0] = run, 0.0
+                dug[i - i0, j - j0] += gone
+                if dug[i - i0, j - j0] > skin:
+                    _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
+    return cut
+
+
+@njit(cache=True, nogil=True)
+def _meet_body(height, fixed, box, origin, step, a, d, body, grow, slack, best):
+    """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
+    z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
+    wide = max(r0, r1)
+    i0, i1, j0, j1 = box
+    a0, a1 = _cells(min(a[0], a[0] + d[0]) - wide, max(a[0], a[0] + d[0]) + wide, origin[0], step, i0, i1)
+    b0, b1 = _cells(min(a[1], a[1] + d[1]) - wide, max(a[1], a[1] + d[1]) + wide, origin[1], step, j0, j1)
+    under = min(a[2], a[2] + d[2]) + z0
+    code = int(body[5])
+    for i in range(a0, a1 + 1):
+        x = origin[0] + (i + 0.5) * step
+        for j in range(b0, b1 + 1):
+            y = origin[1] + (j + 0.5) * step
+            for k in range(2):
+                top = height[i, j] if k == 0 else fixed[i, j]
+                if top <= under:
+                    continue
+                depth = overlap(x, y, top, a[0], a[1], a[2], d[0], d[1], d[2], z0, z1, r0, r1, True)
+                if depth > slack:
+                    _worse(best, code + k * FIXTURE, depth, body[4] + grow, x, y, top)
+
+
+@njit(cache=True, nogil=True)
+def _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best):
+    """Find the lines that the cutting part, grown radially, enters in a rapid."""
+    radius, corner, _ = cutter
+    wide = radius + grow
+    i0, i1, j0, j1 = box
+    a0, a1 = _cells(min(a[0], a[0] + d[0]) - wide, max(a[0], a[0] + d[0]) + wide, origin[0], step, i0, i1)
+    b0, b1 = _cells(min(a[1], a[1] + d[1]) - wide, max(a[1], a[1] + d[1]) + wide, origin[1], step, j0, j1)
+    floor = min(a[2], a[2] + d[2])
+    for i in range(a0, a1 + 1):
+        x = origin[0] + (i + 0.5) * step
+        for j in range(b0, b1 + 1):
+            if height[i, j] <= floor and fixed[i, j] <= floor:
+                continue
+            y = origin[1] + (j + 0.5) * step
+            low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow)
+            for k in range(2):
+                top = height[i, j] if k == 0 else fixed[i, j]
+                if top > low + 1e-3:
+                    bare, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
+                    touching = top > bare + 1e-3
+                    _worse(best, CUTTER + k * FIXTURE, grow + top - bare if touching else min(top - low, grow) + 1e-9,
+                           grow, x, y, min(top, low))
+
+
+@njit(cache=True, nogil=True)
+def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds, runs, tool, cutters, ends_radius,
+               skins, bodies, body_first, rapid_grow, slack, cut, events):
+    """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
+
+    runs : (m,) int32, number of the steep descent a feed move belongs to, 0 for none
+    rapid_grow : mm around everything in a rapid, none in a straight lift
+    slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
+
+    Returns the number of events found, which may exceed the table.
+    """
+    box = (i0, i1, j0, j1)
+    stamp = np.zeros((i1 - i0, j1 - j0), np.int32)
+    dug = np.zeros((i1 - i0, j1 - j0))
+    best = np.zeros((16, 5))
+    top = _top(height, fixed, i0, i1, j0, j1)
+    x0, x1 = origin[0] + i0 * step, origin[0] + i1 * step
+    y0, y1 = origin[1] + j0 * step, origin[1] + j1 * step
+    count, lowered = 0, 0
+    for m in range(len(starts)):
+        a = (starts[m, 0], starts[m, 1], starts[m, 2])
+        if min(a[2], ends[m, 2]) >= top:
+            continue
+        d = (ends[m, 0] - a[0], ends[m, 1] - a[1], ends[m, 2] - a[2])
+        k = tool[m]
+        lift = d[0] == 0.0 and d[1] == 0.0 and d[2] > 0.0
+        grow = 0.0 if feeds[m] or lift else rapid_grow
+        wide = cutters[k, 0]
+        for b in range(body_first[k], body_first[k + 1]):
+            wide = max(wide, bodies[b, 2], bodies[b, 3])
+        wide += grow
+        if min(a[0], ends[m, 0]) - wide > x1 or max(a[0], ends[m, 0]) + wide < x0 \
+                or min(a[1], ends[m, 1]) - wide > y1 or max(a[1], ends[m, 1]) + wide < y0:
+            continue
+        cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        if feeds[m]:
+            if _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], runs[m], stamp, dug,
+                      best):
+                cut[m] = 1
+                lowered += 1
+                if lowered % REFRESH == 0:
+                    top = _top(height, fixed, i0, i1, j0, j1)
+        else:
+            _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best)
+        for b in range(body_first[k], body_first[k + 1]):
+            if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
+                # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
+                loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter[0] + 1e-9 else 1e-3
+                extra = grow - min(grow, bodies[b, 4]) if not lift else -bodies[b, 4]
+                _meet_body(height, fixed, box, origin, step, a, d, bodies[b], extra if not feeds[m] else 0.0, loose,
+                           best)
+        count = _note(events, count, m, best)
+    return count

@@ -1,0 +1,170 @@
+"""What a proof is asked and what it answers: plain values, mm, rad, s, setup frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from geometry.mesh import F64, I32
+from geometry.sampling import SurfaceSamples
+
+
+class StockKind(StrEnum):
+    """Shape of the blank."""
+
+    PART_OFFSET = "part_offset"
+    BOX = "box"
+    CYLINDER = "cylinder"
+
+
+class FindingKind(StrEnum):
+    """What a proof can find, gravest first."""
+
+    COLLISION = "collision"
+    GOUGE = "gouge"
+    RAPID = "rapid"
+    PLUNGE = "plunge"
+    RUBBING = "rubbing"
+    LIMIT = "limit"
+    PROGRAM = "program"
+    RESIDUAL = "residual"
+
+
+@dataclass(frozen=True, eq=False)
+class ProofSetup:
+    """Stock, surroundings and tolerances of a proof.
+
+    stock_kind, margin, uncertainty : the part grown by margin + uncertainty, or a box or cylinder (axis Z)
+                    round it by as much (not below the part)
+    stock_box     : (2, 3) float64 corners of a box blank, or None; stock_cylinder : (x, y, z_bottom, radius, height)
+    fixtures      : boxes as (2, 3) float64 corners; each stands down to the table
+    clearance_*   : radial; the part, its stock and fixtures nearer than this are rubbing, in a rapid a finding
+    scallop_height, gouge_tolerance, stock_allowance : the budget -gouge <= residual - allowance <= scallop
+    ramp_angle    : rad, steepest descent into stock
+    plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.stock``)
+    rapid_feed    : mm/min
+    travel        : (3, 2) float64 least and greatest tip coordinate, or None
+    work_offset   : the only one whose coordinates are those of the setup frame
+    seat_z        : nothing goes below it, or None
+    line_spacing  : mm between the vertical lines of the stock model
+    """
+
+    stock_kind: StockKind | str = StockKind.PART_OFFSET
+    margin: float = 1.0
+    uncertainty: float = 0.5
+    stock_box: F64 | None = None
+    stock_cylinder: tuple[float, float, float, float, float] | None = None
+    fixtures: tuple[F64, ...] = ()
+    clearance_neck: float = 0.05
+    clearance_shank: float = 0.2
+    clearance_holder: float = 1.0
+    clearance_rapid: float = 1.0
+    scallop_height: float = 0.01
+    gouge_tolerance: float = 0.01
+    stock_allowance: float = 0.0
+    ramp_angle: float = 0.0523598775598
+    plunge_skin: float = 0.1
+    rapid_feed: float = 5000.0
+    travel: F64 | None = None
+    work_offset: str = "G54"
+    seat_z: float | None = None
+    line_spacing: float = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredSamples:
+    """The samples that coverage is counted on.
+
+    samples : SurfaceSamples
+    zone    : (n,) int32, 0 where no zone claims the sample, else k for the k-th entry (1-based) of the zone ids
+    """
+
+    samples: SurfaceSamples
+    zone: I32
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found, with everything near it of the same kind folded in.
+
+    line  : 1-based line of the program, 0 where no line is to blame (material that stayed)
+    zone, face : ids, or None
+    point : mm, where it is worst
+    depth : mm (rad for a plunge angle is in the message), how bad; limit : what would have been allowed
+    count : places folded in; area : mm² of samples folded in, 0 where none
+    """
+
+    kind: FindingKind
+    program: str
+    line: int
+    zone: str | None
+    face: str | None
+    point: tuple[float, float, float] | None
+    depth: float
+    limit: float
+    message: str
+    count: int = 1
+    area: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None}
+
+
+@dataclass(frozen=True)
+class ZoneProof:
+    """The proof of one zone: scallops of its claimed samples in mm, areas in mm², coverage 0..1."""
+
+    scallop_p50: float
+    scallop_p99: float
+    scallop_max: float
+    gouge: float
+    claimed_area: float
+    proved_area: float
+    coverage: float
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """The answer.
+
+    findings : gravest first, at most 200; counts : how many there are of each kind, all of them
+    residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
+    line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
+    proved   : (n,) bool, inside the budget
+    machining_time : s, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
+    minutes  : minutes in cut by tool number
+    error_bound : mm, largest error of a residual against the mesh the samples lie on
+    """
+
+    findings: tuple[Finding, ...]
+    counts: Mapping[str, int]
+    residual: F64
+    line: I32
+    program: I32
+    proved: Any
+    zones: Mapping[str, ZoneProof]
+    gouge_max: float
+    machining_time: float
+    cutting_length: float
+    minutes: Mapping[int, float]
+    error_bound: float
+    reach: float
+    line_spacing: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def clean(self) -> bool:
+        """Whether nothing was found."""
+        return not self.counts
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for a report; lengths in mm, time in s and minutes."""
+        return {
+            "findings": [f.as_dict() for f in self.findings], "finding_counts": dict(self.counts),
+            "zones": {k: asdict(v) for k, v in self.zones.items()}, "gouge_max_mm": self.gouge_max,
+            "machining_time_s": self.machining_time, "cutting_length_mm": self.cutting_length,
+            "tools": {str(k): v for k, v in self.minutes.items()}, "error_bound_mm": self.error_bound,
+            "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),
+        }

@@ -1,0 +1,251 @@
+"""The door of the witness: programs, part, tools and setup in, a proof out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.errors import VerificationError
+from geometry.mesh import F64, I32
+from geometry.part import Part
+from geometry.toolbody import ToolBody
+from verify.arcs import CHORD
+from verify.findings import (
+    Source,
+    contact_findings,
+    gouge_findings,
+    ordered,
+    residual_findings,
+)
+from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
+from verify.model import Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
+from verify.reader import FEED, Program, read_program
+from verify.removal import Moves, residual_on_normals
+from verify.stock import StockPass, blank, run_bodies, run_stock, stock_on_normals
+
+RAY_ERROR = 1e-6
+LEAST_REACH = 1.0
+Report = Callable[[float], None]
+
+
+def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+          scored: ScoredSamples, zone_ids: Sequence[str], progress: Report | None = None, *,
+          threads: int | None = None) -> Proof:
+    """Prove finished NC programs against the part.
+
+    programs : (name, text) in the order they run, stock carried over
+    part     : Part in the setup frame, mm; tools : by T number
+    setup    : ProofSetup
+    scored   : ScoredSamples; zones may all be 0, then only gouges, contacts and limits are looked for
+    zone_ids : names of the zones 1, 2, ... of ``scored.zone``
+    progress : called with 0..1; an exception from it ends the proof
+    threads  : 2 where None, at most the cores; the answer has the same bytes for any number
+
+    Returns
+    -------
+    Proof
+
+    Raises
+    ------
+    ProgramError
+        A program cannot be read; the subjects name the lines.
+    VerificationError
+        Two tools share a number, a cutting part is impossible, or samples and zones do not fit each other.
+
+    Notes
+    -----
+    A sample is proved where -gouge_tolerance <= residual - stock_allowance <= scallop_height. Residuals are
+    exact on the normal of each sample (error_bound); stock that is not part is seen on vertical lines.
+    """
+    _check(tools, scored, zone_ids)
+    threads = threads or min(2, os.cpu_count() or 1)
+    tell = progress or (lambda _share: None)
+    read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset)
+            for name, text in programs]
+    moves, source = _moves(read, tools)
+    tell(0.1)
+    cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
+    run = run_stock(blank(part.mesh, setup, threads=threads), moves, tools, setup, threads=threads,
+                    progress=lambda f: tell(0.6 + 0.25 * f))
+    body_points = np.concatenate([cuts.guard, cuts.edge])
+    touched, lost = run_bodies(body_points, moves, tools, setup, threads=threads,
+                               progress=lambda f: tell(0.85 + 0.15 * f))
+    skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    findings = [*contact_findings(_merge(run.events, touched), moves.feed, source, setup.clearance_rapid, skins),
+                *cuts.gouges, *_program_findings(read), *_limit_findings(moves, source, setup),
+                *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
+    notes = (f"{run.lost + lost} contacts more than the tables hold",) if run.lost + lost else ()
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, notes)
+
+
+def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
+    numbers = [t.number for t in tools]
+    if len(set(numbers)) != len(numbers):
+        raise VerificationError("two tools share a T number", code="tool_number_twice",
+                                subjects=tuple(t.id for t in tools if numbers.count(t.number) > 1),
+                                remedy="give every tool its own number")
+    if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
+        raise VerificationError("samples and zones do not fit each other", code="bad_samples",
+                                measured=len(scored.zone), limit=len(scored.samples))
+
+
+def _moves(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
+    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them."""
+    row = {t.number: i for i, t in enumerate(tools)}
+    number = np.concatenate([p.tool for p in read]) if read else np.zeros(0, np.int32)
+    known = np.isin(number, list(row))
+    start = np.concatenate([p.start for p in read])[known] if read else np.zeros((0, 3))
+    end = np.concatenate([p.end for p in read])[known] if read else np.zeros((0, 3))
+    kind = np.concatenate([p.kind for p in read])[known] if read else np.zeros(0, np.int8)
+    line = np.concatenate([p.line for p in read])[known] if read else np.zeros(0, np.int32)
+    program = np.repeat(np.arange(len(read), dtype=np.int32), [len(p) for p in read])[known]
+    number = number[known]
+    tool = np.array([row[int(n)] for n in np.unique(number)], np.int32)[np.searchsorted(np.unique(number), number)] \
+        if len(number) else np.zeros(0, np.int32)
+    moves = Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool)
+    return moves, Source(tuple(p.name for p in read), program, line, number)
+
+
+class _Cuts:
+    """Residuals of the scored samples, and gouges anywhere."""
+
+    residual: F64
+    mover: I32
+    gouges: list[Finding]
+    gouge_max: float
+    guard: F64
+    edge: F64
+    reach: float
+
+
+def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, moves: Moves,
+          source: Source, threads: int, tell: Report) -> _Cuts:
+    s, guard = scored.samples, guard_samples(part.mesh)
+    edge, bisector, edge_face = convex_edges(part.mesh)
+    thin = guard.subset(sparse_faces(part.mesh, s)[guard.triangle])
+    points = np.concatenate([s.points, thin.points, edge])
+    normals = np.concatenate([s.normals, thin.normals, bisector])
+    face = np.concatenate([s.face, thin.face, edge_face])
+    area = np.concatenate([s.area, thin.area, np.zeros(len(edge))])
+    reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
+    initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
+    residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads, progress=tell)
+    deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))
+    if len(deep):
+        residual[deep] = -gouge_depths(TriangleTree(part.mesh), points[deep], normals[deep], -residual[deep])
+    deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
+    out = _Cuts()
+    out.residual, out.mover = residual[:len(s)], mover[:len(s)]
+    out.guard, out.edge, out.reach = guard.points, edge, reach
+    out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
+    out.gouges = gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
+                                setup.gouge_tolerance)
+    return out
+
+
+def _merge(a: F64, b: F64) -> F64:
+    """Events of both passes, the deeper first where both saw the same body in the same move."""
+    events = np.concatenate([a, b])
+    order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
+    return events[order]
+
+
+def _program_findings(read: Sequence[Program]) -> list[Finding]:
+    return [Finding(FindingKind.PROGRAM, p.name, r.line, None, None, None, 0.0, 0.0, r.message)
+            for p in read for r in p.remarks]
+
+
+def _limit_findings(moves: Moves, source: Source, setup: ProofSetup) -> list[Finding]:
+    """Tips outside the travel, one finding per program, axis and side; tips below the table."""
+    out = []
+    sides: list[tuple[str, int, float, FindingKind, bool]] = []
+    if setup.travel is not None:
+        travel = np.asarray(setup.travel, dtype=np.float64)
+        for axis in range(3):
+            sides.append((f"{'XYZ'[axis]} below its travel", axis, float(travel[axis, 0]), FindingKind.LIMIT, False))
+            sides.append((f"{'XYZ'[axis]} above its travel", axis, float(travel[axis, 1]), FindingKind.LIMIT, True))
+    if setup.seat_z is not None:
+        sides.append(("the tip goes below the table", 2, setup.seat_z, FindingKind.COLLISION, False))
+    for text, axis, limit, kind, upper in sides:
+        over = (moves.end[:, axis] - limit) if upper else (limit - moves.end[:, axis])
+        for number, name in enumerate(source.names):
+            bad = np.flatnonzero((over > 1e-6) & (source.program == number))
+            if len(bad):
+                m = int(bad[np.argmax(over[bad])])
+                first = int(source.line[bad[0]])
+                x, y, z = (round(float(v), 6) for v in moves.end[m])
+                out.append(Finding(kind, name, first, None, None, (x, y, z), float(over[m]), limit,
+                                   f"{text}: {moves.end[m, axis]:.3f} mm at line {source.line[m]}, limit {limit:g} mm",
+                                   len(bad)))
+    return out
+
+
+def _idle_findings(read: Sequence[Program], run: StockPass, moves: Moves, source: Source) -> list[Finding]:
+    """A program whose feed moves never meet the stock: another zero, or inch for mm."""
+    out = []
+    for number, p in enumerate(read):
+        own = (source.program == number) & moves.feed
+        if own.any() and not run.cut[own].any():
+            m = int(np.flatnonzero(own)[0])
+            out.append(Finding(FindingKind.PROGRAM, p.name, int(source.line[m]), None, None, None, 0.0, 0.0,
+                               "no feed move meets the stock: is the unit, the zero or the tool another one?"))
+    return out
+
+
+def _proved(residual: F64, setup: ProofSetup) -> NDArray[np.bool_]:
+    left = residual - setup.stock_allowance
+    return np.asarray((left >= -setup.gouge_tolerance - RAY_ERROR) & (left <= setup.scallop_height + RAY_ERROR))
+
+
+def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
+    bad = np.flatnonzero((scored.zone > 0) & ~_proved(residual, setup))
+    s = scored.samples
+    return residual_findings(s.points[bad], scored.zone[bad], s.face[bad], residual[bad] - setup.stock_allowance,
+                             s.area[bad], zone_ids, setup.scallop_height)
+
+
+def _zones(scored: ScoredSamples, residual: F64, proved: NDArray[np.bool_], setup: ProofSetup,
+           zone_ids: Sequence[str]) -> dict[str, ZoneProof]:
+    out = {}
+    for k, name in enumerate(zone_ids, 1):
+        own = np.flatnonzero(scored.zone == k)
+        if len(own) == 0:
+            out[name] = ZoneProof(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            continue
+        scallop = np.maximum(residual[own] - setup.stock_allowance, 0.0)
+        p50, p99 = np.percentile(scallop, [50, 99])
+        area = scored.samples.area[own]
+        good = float(area[proved[own]].sum())
+        out[name] = ZoneProof(float(p50), float(p99), float(scallop.max()), max(float(-residual[own].min()), 0.0),
+                              float(area.sum()), good, good / float(area.sum()))
+    return out
+
+
+def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[Program], moves: Moves,
+           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
+           notes: tuple[str, ...]) -> Proof:
+    length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
+    feed = np.concatenate([np.where(p.kind == FEED, p.feed, setup.rapid_feed) for p in read]) if read else length
+    took = np.divide(length, feed, out=np.zeros(len(length)), where=length > 0)
+    seconds = float(took.sum() * 60.0) + sum(p.dwell for p in read)
+    cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
+    known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, bool)
+    minutes = took[known][run.cut]
+    used = source.tool[run.cut]
+    proved = _proved(cuts.residual, setup)
+    top, counts = ordered(findings)
+    mover = cuts.mover
+    has = mover >= 0
+    line, program = np.zeros(len(mover), np.int32), np.full(len(mover), -1, np.int32)
+    line[has], program[has] = source.line[mover[has]], source.program[mover[has]]
+    return Proof(top, counts, cuts.residual, line, program, proved,
+                 _zones(scored, cuts.residual, proved, setup, zone_ids), cuts.gouge_max, seconds,
+                 float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
+                 RAY_ERROR + CHORD, cuts.reach, setup.line_spacing, notes)
+
+
+__all__ = ["Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

@@ -1,0 +1,263 @@
+"""The stock in process, and everything that must not touch it.
+
+Stock is a field of vertical lines, ``line_spacing`` apart, each solid up to one height. Blank and cuts are
+exact on every line (closed forms, no cell is ever rounded up or down), so nothing is flagged that does not
+happen; what stands wholly between two lines, thinner than the spacing, is not seen. A flank beside a wall is
+left to the normal rays, and necks, shanks and holders beside the part are checked on points of the part
+itself, so the spacing only matters for stock that is not part.
+
+- A line is lowered only where the flutes reach its top when the cutter first touches it: what stands higher
+  stays and meets the neck.
+- A body no wider than the cutting part runs where the cutting part has been; its clearance never reaches
+  beyond the cutting radius, and it may overlap by the gouge tolerance.
+- In a rapid the whole assembly is grown radially by the rapid clearance, heights are not; a straight lift
+  leaves the place it stands in with no clearance asked.
+- Plunge: consecutive feed moves that descend steeper than the ramp angle form one descent. It is a plunge
+  where the end-cutting region takes more than ``plunge_skin`` tool diameters off a line. The region is the
+  whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball (to
+  30 degrees of its sphere); so a ball that finishes downhill through a thin skin does not plunge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32, TriangleMesh
+from geometry.toolbody import ToolBody
+from verify.kernels.bodies import body_tile
+from verify.kernels.heights import raise_offset
+from verify.kernels.stock import HOLDER, NECK, SHANK, stock_tile
+from verify.model import ProofSetup, StockKind
+from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
+
+MAX_LINES = 6_000_000
+BLOCK = 32
+EVENTS = 4096
+NEVER = -1e30
+
+
+@dataclass(frozen=True, eq=False)
+class StockField:
+    """Vertical lines: line (i, j) stands at origin + ((i, j) + 0.5) step.
+
+    origin : (2,) float64, mm; height, fixed : (nx, ny) float64, mm, top of the stock and of the fixtures
+    """
+
+    origin: F64
+    step: float
+    height: F64
+    fixed: F64
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Neck, shank and holder rows of all tools; rows first[k]:first[k+1] belong to tool k (see kernels.stock)."""
+
+    rows: F64
+    first: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, tools: Sequence[ToolBody], setup: ProofSetup) -> Bodies:
+        """Rows (z0, z1, r0, r1, clearance, part) with the clearance in the radii."""
+        rows: list[tuple[float, ...]] = []
+        first = [0]
+        for tool in tools:
+            for z0, z1, r0, r1, clearance, part in _frusta(tool, setup):
+                if z1 <= z0:
+                    continue
+                if max(r0, r1) <= tool.radius + 1e-6:
+                    clearance = min(clearance, max(tool.radius - max(r0, r1), 0.0))
+                rows.append((z0, z1, r0 + clearance, r1 + clearance, clearance, part))
+            first.append(len(rows))
+        return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
+
+
+def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float, float, float, int]]:
+    neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
+    top = max(tool.neck_length, tool.flute_length)
+    out = [(tool.flute_length, top, neck, neck, tool.neck_clearance(setup.clearance_neck), NECK),
+           (top, max(tool.stickout, top), shank, shank, setup.clearance_shank, SHANK)]
+    z = tool.stickout
+    for part in tool.holder:
+        out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
+        z += part.length
+    return out
+
+
+def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
+    """(2, 3) float64, mm: bounding box of the blank round a part with these bounds."""
+    grow = setup.margin + setup.uncertainty
+    if setup.stock_kind == StockKind.BOX and setup.stock_box is not None:
+        return np.asarray(setup.stock_box, dtype=np.float64)
+    if setup.stock_kind == StockKind.CYLINDER:
+        x, y, z, radius, height = blank_cylinder(bounds, setup)
+        return np.array([[x - radius, y - radius, z], [x + radius, y + radius, z + height]])
+    lower = bounds[0] - grow
+    if setup.stock_kind == StockKind.BOX:
+        lower[2] = bounds[0, 2]
+    return np.array([lower, bounds[1] + grow])
+
+
+def blank_cylinder(bounds: F64, setup: ProofSetup) -> tuple[float, float, float, float, float]:
+    """x, y, z_bottom, radius, height of a cylinder blank, mm; round the part where the setup gives none."""
+    if setup.stock_cylinder is not None:
+        return setup.stock_cylinder
+    grow = setup.margin + setup.uncertainty
+    centre = 0.5 * (bounds[0] + bounds[1])
+    radius = 0.5 * float(np.hypot(*(bounds[1, :2] - bounds[0, :2]))) + grow
+    return float(centre[0]), float(centre[1]), float(bounds[0, 2]), radius, float(bounds[1, 2] - bounds[0, 2]) + grow
+
+
+def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, reach: float) -> F64:
+    """Stock on each outward normal before the first cut, not above ``reach``.
+
+    points, normals : (n, 3) float64, mm and unit; bounds : (2, 3) of the part
+
+    Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the way out of the box or cylinder.
+    """
+    if setup.stock_kind == StockKind.PART_OFFSET:
+        return np.full(len(points), min(setup.margin + setup.uncertainty, reach))
+    box = stock_bounds(bounds, setup)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out = np.where(normals > 0, (box[1] - points) / normals, np.where(normals < 0, (box[0] - points) / normals,
+                                                                        np.inf))
+    if setup.stock_kind == StockKind.CYLINDER:
+        x, y, _, radius, _ = blank_cylinder(bounds, setup)
+        w, n = points[:, :2] - (x, y), normals[:, :2]
+        a, b, c = (n * n).sum(1), (w * n).sum(1), (w * w).sum(1) - radius**2
+        side = np.where(a > 1e-12, (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / np.maximum(a, 1e-12), np.inf)
+        out = np.column_stack([side, out[:, 2]])
+    return np.clip(out.min(axis=1), 0.0, reach)
+
+
+def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2) -> StockField:
+    """The stock before the first cut, never below the part.
+
+    Exact on every line: an offset blank is the union of spheres on the surface, by facets, edges and corners.
+    """
+    box = stock_bounds(mesh.bounds, setup)
+    corners = [box, mesh.bounds, *(np.asarray(f, dtype=np.float64) for f in setup.fixtures)]
+    lower = np.min([c[0, :2] for c in corners], axis=0)
+    extent = np.max([c[1, :2] for c in corners], axis=0) - lower
+    step = max(setup.line_spacing, math.sqrt(float(extent.prod()) / MAX_LINES))
+    nx, ny = (np.ceil(extent / step).astype(int) + 1).tolist()
+    origin = lower - 0.5 * step
+    height, fixed = np.full((nx, ny), NEVER), np.full((nx, ny), NEVER)
+    x, y = origin[0] + (np.arange(nx) + 0.5) * step, origin[1] + (np.arange(ny) + 0.5) * step
+    for f in corners[2:]:
+        inside = np.ix_((x >= f[0, 0]) & (x <= f[1, 0]), (y >= f[0, 1]) & (y <= f[1, 1]))
+        fixed[inside] = np.maximum(fixed[inside], f[1, 2])
+    if setup.stock_kind == StockKind.BOX:
+        height[np.ix_((x >= box[0, 0]) & (x <= box[1, 0]), (y >= box[0, 1]) & (y <= box[1, 1]))] = box[1, 2]
+    elif setup.stock_kind == StockKind.CYLINDER:
+        cx, cy, _, radius, _ = blank_cylinder(mesh.bounds, setup)
+        height[np.hypot(x[:, None] - cx, y[None, :] - cy) <= radius] = box[1, 2]
+    reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
+    _raise(height, origin, step, mesh, reach, threads)
+    return StockField(origin, step, height, fixed)
+
+
+def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int) -> None:
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.unique(edges, axis=0)
+    by_height = np.argsort(-mesh.triangles[:, :, 2].max(axis=1), kind="stable")
+    faces = np.ascontiguousarray(mesh.faces[by_height])
+
+    def job(i0: int, i1: int) -> Callable[[], object]:
+        return lambda: raise_offset(height, i0, i1, origin, step, mesh.vertices, faces, edges, reach)
+
+    cuts = np.linspace(0, len(height), 4 * max(threads, 1) + 1).astype(int)
+    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads)
+
+
+def descents(moves: Moves, ramp_angle: float) -> I32:
+    """(m,) int32: number (1, 2, ...) of the descent each feed move steeper than ``ramp_angle`` (rad) is part of,
+    0 for every other move. Consecutive steep moves are one descent."""
+    d = moves.end - moves.start
+    steep = moves.feed & (-d[:, 2] > np.hypot(d[:, 0], d[:, 1]) * math.tan(ramp_angle) + 1e-9)
+    begins = steep & ~np.concatenate([[False], steep[:-1]])
+    return np.where(steep, np.cumsum(begins), 0).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class StockPass:
+    """What one pass over the stock found.
+
+    events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
+    cut    : (m,) bool, moves that took stock
+    """
+
+    events: F64
+    lost: int
+    cut: NDArray[np.bool_]
+
+
+def end_radii(tools: Sequence[ToolBody]) -> F64:
+    """(k,) float64, mm: radius of the region that cuts when the tool goes straight down (see the module)."""
+    share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
+             "bull": lambda t: t.radius - 0.5 * t.corner_radius}
+    return np.array([share[t.kind](t) for t in tools])
+
+
+def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
+              progress: Progress | None = None) -> StockPass:
+    """Run all moves through the stock, in place, and collect what touches.
+
+    Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
+    """
+    cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
+    runs, cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
+    skins = setup.plunge_skin * 2.0 * cutters[:, 0]
+    nx, ny = field.height.shape
+
+    def job(i: int, j: int) -> Callable[[], object]:
+        def work() -> object:
+            events = np.empty((EVENTS, 7))
+            n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
+                           field.fixed, moves.start, moves.end, moves.feed, runs, moves.tool, cutters,
+                           end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
+                           setup.gouge_tolerance, cut, events)
+            return events[:min(n, EVENTS)].copy(), n
+        return work
+
+    blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
+    events, lost = _gather(run_tiles([job(*b) for b in blocks], threads, progress))
+    return StockPass(events, lost, cut.astype(bool))
+
+
+def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
+               progress: Progress | None = None) -> tuple[F64, int]:
+    """Necks, shanks and holders of all feed moves against (n, 3) float64 points of the part, mm.
+
+    Returns the events (e, 7) sorted by move and the number beyond the table.
+    """
+    if len(points) == 0 or len(moves) == 0:
+        return np.zeros((0, 7)), 0
+    grid = CellGrid.build(points)
+    pts, bodies = np.ascontiguousarray(points[grid.order]), Bodies.of(tools, setup)
+    radii = np.array([t.radius for t in tools])
+
+    def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
+        def work() -> object:
+            events = np.empty((EVENTS, 7))
+            n = body_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, moves.start, moves.end,
+                          moves.feed, moves.tool, radii, bodies.rows, bodies.first, setup.gouge_tolerance, events)
+            return events[:min(n, EVENTS)].copy(), n
+        return work
+
+    return _gather(run_tiles([job(t) for t in grid.tiles()], threads, progress))
+
+
+def _gather(results: list[object]) -> tuple[F64, int]:
+    parts = [r for r in results if isinstance(r, tuple)]
+    if not parts:
+        return np.zeros((0, 7)), 0
+    events = np.concatenate([p[0] for p in parts])
+    lost = sum(p[1] - len(p[0]) for p in parts)
+    order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
+    return events[order], int(lost)
