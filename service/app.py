@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -11,8 +11,10 @@ from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
+from geometry.errors import CamError
 from service import problems
 from service.engine import Engine
+from service.limits import BodyLimitMiddleware
 from service.metrics import Metrics, MetricsMiddleware
 from service.openapi import document
 from service.principals import PostRate
@@ -37,8 +39,11 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         engine: Engine = app.state.engine
-        app.state.stopping = asyncio.Event()
-        await run_in_threadpool(engine.start)
+        try:
+            await run_in_threadpool(engine.start)
+        except CamError as error:
+            app.state.startup_error = error
+            raise
         try:
             yield
         finally:
@@ -46,13 +51,14 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
             await run_in_threadpool(engine.close)
 
     app = FastAPI(title="zonemill", version=VERSION, description=DESCRIPTION, lifespan=lifespan,
-                  max_body_size=settings.max_body_bytes, separate_input_output_schemas=False,
-                  redirect_slashes=False)
+                  separate_input_output_schemas=False, redirect_slashes=False)
     app.state.settings, app.state.engine, app.state.metrics = settings, Engine(settings, chain), Metrics()
+    app.state.stopping, app.state.startup_error = threading.Event(), None
     app.state.post_rate = PostRate(settings.post_rate)
     problems.install(app)
     for module in (submissions, jobs, events, library, health):
         app.include_router(module.router)
+    app.add_middleware(BodyLimitMiddleware, limit=settings.max_body_bytes)
     app.add_middleware(MetricsMiddleware, metrics=app.state.metrics)
     app.add_middleware(CorrelationIdMiddleware, header_name="X-Request-ID")
 

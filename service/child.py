@@ -28,15 +28,16 @@ def reporter(send, interval=0.2):
     """The ``progress(stage, fraction)`` callback: sends every change of stage, and fractions a few times a second."""
     import time
 
-    last = {"stage": "", "at": 0.0, "progress": 0.0}
+    sent_stage, sent_at, reached = "", 0.0, 0.0
 
     def progress(stage, fraction):
+        nonlocal sent_stage, sent_at, reached
         now = time.monotonic()
-        last["progress"] = max(last["progress"], float(fraction))
-        if stage == last["stage"] and now - last["at"] < interval:
+        reached = max(reached, float(fraction))
+        if stage == sent_stage and now - sent_at < interval:
             return
-        last["stage"], last["at"] = stage, now
-        send({"stage": str(stage), "progress": last["progress"]})
+        sent_stage, sent_at = stage, now
+        send({"stage": str(stage), "progress": reached})
 
     return progress
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import MutableMapping
-from typing import Any
+from contextlib import suppress
+from typing import Any, TextIO, cast
 
 import structlog
 from asgi_correlation_id import correlation_id
@@ -17,12 +18,28 @@ def _request_id(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> Mu
     return event
 
 
+class _Stderr:
+    """Whatever stderr is now; a stderr that is closed or full must not stop the one who logs."""
+
+    def write(self, text: str) -> int:
+        with suppress(OSError, ValueError):
+            sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError, ValueError):
+            sys.stderr.flush()
+
+
+STDERR = cast(TextIO, _Stderr())
+
+
 def configure(level: str, form: str) -> None:
     """Send the log to stderr. level: 'debug' ... 'error'; form: 'console' or 'json'."""
     number = getattr(logging, level.upper())
-    logging.basicConfig(stream=sys.stderr, level=max(number, logging.WARNING), format="%(levelname)s %(name)s "
+    logging.basicConfig(stream=STDERR, level=max(number, logging.WARNING), format="%(levelname)s %(name)s "
                                                                                        "%(message)s")
-    for noisy in ("distributed", "dask", "alembic", "asyncio"):
+    for noisy in ("distributed", "dask", "alembic", "asyncio", "uvicorn"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
     renderer = structlog.processors.JSONRenderer() if form == "json" else structlog.dev.ConsoleRenderer(
         colors=sys.stderr.isatty())
@@ -31,4 +48,4 @@ def configure(level: str, form: str) -> None:
                     structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
                     renderer],
         wrapper_class=structlog.make_filtering_bound_logger(number),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr), cache_logger_on_first_use=False)
+        logger_factory=structlog.PrintLoggerFactory(STDERR), cache_logger_on_first_use=False)

@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
@@ -26,6 +27,12 @@ from service.errors import (
 )
 
 log = structlog.get_logger(__name__)
+
+
+def too_large(limit: int) -> TooLargeError:
+    """The error for a body over the limit, bytes."""
+    return TooLargeError(f"the request body is larger than {limit / 1e6:g} MB", limit=limit,
+                         remedy="send a smaller file or raise ZONEMILL_MAX_BODY_MB")
 
 
 def problem_response(request: Request, error: CamError, headers: dict[str, str] | None = None) -> JSONResponse:
@@ -60,12 +67,20 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
         401: UnauthorizedError(text),
         404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path"),
         405: MethodError(f"{request.method} is not offered at {request.url.path}"),
-        413: TooLargeError(f"the request body is larger than {limit / 1e6:g} MB", limit=limit,
-                           remedy="send a smaller file or raise ZONEMILL_MAX_BODY_MB"),
+        413: too_large(limit),
     }
     fallback = RequestError(text) if error.status_code == 422 else ServiceError(text)
-    headers = dict(error.headers) if error.headers else None
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_offered(request))
     return problem_response(request, named.get(error.status_code, fallback), headers)
+
+
+def _offered(request: Request) -> list[str]:
+    """Methods that some route offers at this path; the router itself names only those of the first that matches."""
+    paths = request.app.openapi()["paths"]
+    return sorted({method.upper() for template, item in paths.items() for method in item
+                   if compile_path(template)[0].match(request.url.path)})
 
 
 async def _validation(request: Request, error: Exception) -> JSONResponse:

@@ -8,6 +8,7 @@ tells an EventSource to stop.
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
@@ -49,7 +50,7 @@ async def follow(request: Request, principal: Principal, job_id: str,
 
 async def _stream(request: Request, row: RowMapping, seen: int) -> AsyncIterator[bytes]:
     jobs, interval = request.app.state.engine.jobs, max(0.2, request.app.state.settings.poll_s)
-    stopping: asyncio.Event = request.app.state.stopping
+    stopping: threading.Event = request.app.state.stopping
     spoken = time.monotonic()
     while True:
         final = row["state"] in FINAL_STATES

@@ -1,0 +1,200 @@
+"""``zonemill``: plan, zones, verify, serve, demo, openapi.
+
+Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
+stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from schemas.setup import Setup
+    from service.console import Progress
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+                  help="From a STEP part of walls and internal connections to a proved milling job.")
+
+Part = Annotated[Path, typer.Argument(metavar="PART.step", help="The part, a STEP file.", show_default=False)]
+SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
+AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
+
+
+@app.command()
+def plan(part: Part, setup: SetupPath,
+         out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
+         as_json: AsJson = False) -> None:
+    """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
+
+    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+        make_folder(out)
+        from service import chain
+        from service.errors import EXIT_PROVED, EXIT_UNPROVED
+
+        report = chain.plan(part, given, out, progress)
+        return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
+
+    _exit(part, setup, run, as_json)
+
+
+@app.command()
+def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
+    """Print zones.json: walls, connections, channels, zones, remainder."""
+
+    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+        from service import chain
+
+        return chain.zones_only(part, given, progress), 0
+
+    _exit(part, setup, run, as_json)
+
+
+@app.command()
+def verify(part: Part, setup: SetupPath,
+           program: Annotated[Path, typer.Option("--program", metavar="FILE.ngc", help="The NC program.")],
+           as_json: AsJson = False) -> None:
+    """Prove any program, also a foreign one; prints the findings."""
+
+    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+        from service import chain
+        from service.errors import EXIT_PROVED, EXIT_UNPROVED
+
+        result = chain.verify_program(part, given, read_program(program), progress)
+        return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
+
+    _exit(part, setup, run, as_json)
+
+
+@app.command()
+def serve(host: Annotated[str | None, typer.Option(help="Address; default 127.0.0.1.")] = None,
+          port: Annotated[int | None, typer.Option(help="Port; default 8000, 0 takes a free one.")] = None,
+          data: Annotated[Path | None, typer.Option(help="Data folder; default ./data.")] = None,
+          insecure: Annotated[bool, typer.Option(help="Listen beyond loopback without tokens.")] = False,
+          as_json: AsJson = False) -> None:
+    """Serve the HTTP interface, engine included; every other setting comes from ZONEMILL_* variables."""
+    from service.server import settings_with
+
+    given = {"host": host, "port": port, "data_dir": data, "insecure": insecure or None}
+    with _errors(as_json):
+        from service.server import run_server
+
+        run_server(settings_with(given))
+
+
+@app.command()
+def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files.")] = Path("out"),
+         keep: Annotated[bool, typer.Option("--keep", help="Keep serving until Ctrl-C.")] = False,
+         as_json: AsJson = False) -> None:
+    """Make a sample part, post it to an embedded service, and fetch its files."""
+    with _errors(as_json):
+        from service.demo import run_demo
+
+        code = run_demo(out, keep=keep)
+        raise typer.Exit(code)
+
+
+@app.command()
+def openapi() -> None:
+    """Print openapi.yaml."""
+    from service.app import create_app
+    from service.openapi import as_yaml
+
+    sys.stdout.write(as_yaml(create_app().openapi()))
+
+
+def make_folder(out: Path) -> None:
+    """Make the folder for the files.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written to.
+    """
+    from geometry.errors import InputError
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
+                         remedy="give another --out") from None
+
+
+def read_program(path: Path) -> str:
+    """Text of a program.
+
+    Raises
+    ------
+    ProgramError
+        The file cannot be read, or is empty.
+    """
+    from geometry.errors import ProgramError
+
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
+                           code="program_unreadable") from None
+    if not text.strip():
+        raise ProgramError(f"the program {path.name} is empty", code="empty_program")
+    return text
+
+
+def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress], tuple[Any, int]], as_json: bool) -> None:
+    """Run a command on part and setup, print its result and leave with its exit code."""
+    with _errors(as_json):
+        from geometry.step_text import check_text
+        from service.console import Progress, print_json
+        from service.convert import read_setup
+
+        given = read_setup(setup)
+        check_text(part)
+        progress = Progress()
+        try:
+            result, code = run(given, progress)
+        finally:
+            progress.close()
+        print_json(result)
+        raise typer.Exit(code)
+
+
+@contextmanager
+def _errors(as_json: bool) -> Iterator[None]:
+    """Turn errors into a block or a problem document and the exit code of their class."""
+    from geometry.errors import CamError, CancelledError, InternalError
+    from service.console import report_error
+
+    try:
+        yield
+    except CamError as error:
+        raise typer.Exit(report_error(error, as_json=as_json)) from None
+    except KeyboardInterrupt:
+        raise typer.Exit(report_error(CancelledError("stopped by Ctrl-C"), as_json=as_json)) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        import traceback
+
+        traceback.print_exc()
+        bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
+                            remedy="please report it with part and setup")
+        raise typer.Exit(report_error(bug, as_json=as_json)) from None
+
+
+def main() -> None:
+    """Entry point of the ``zonemill`` program."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

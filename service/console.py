@@ -1,0 +1,80 @@
+"""What the command line says: the result on stdout, everything else on stderr, errors as one clear block."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+from geometry.errors import CamError
+from service.errors import mapping_of, problem_document
+
+MEASURED_SHOWN = 20
+
+
+def say(text: str) -> None:
+    """One line to stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+class Progress:
+    """Progress lines on stderr: every new stage with its time, on a terminal also the percentage."""
+
+    def __init__(self) -> None:
+        self.started, self.stage, self.shown = time.monotonic(), "", 0.0
+        self.live = sys.stderr.isatty()
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        now = time.monotonic()
+        if stage != self.stage:
+            self.stage = stage
+            self._print(f"{now - self.started:7.1f} s  {100 * fraction:3.0f} %  {stage}", new=True)
+        elif self.live and now - self.shown > 0.25:
+            self._print(f"{now - self.started:7.1f} s  {100 * fraction:3.0f} %  {stage}", new=False)
+
+    def _print(self, text: str, *, new: bool) -> None:
+        self.shown = time.monotonic()
+        if self.live:
+            print(("\n" if new else "") + "\r\x1b[K" + text, end="", file=sys.stderr, flush=True)
+        else:
+            say(text)
+
+    def close(self) -> None:
+        """End the line."""
+        if self.live and self.stage:
+            say("")
+
+
+def print_json(data: Any) -> None:
+    """The result, as JSON on stdout."""
+    sys.stdout.write(json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def error_block(error: CamError) -> str:
+    """An error as a person wants to read it."""
+    lines = [f"error: {error.message}", f"  code      {error.code} ({type(error).__name__})"]
+    if error.subjects:
+        lines.append(f"  concerns  {', '.join(error.subjects)}")
+    if isinstance(error.measured, list) and error.measured and isinstance(error.measured[0], dict):
+        for item in error.measured[:MEASURED_SHOWN]:
+            lines.append("  found     " + ": ".join(str(v) for v in item.values()))
+        if len(error.measured) > MEASURED_SHOWN:
+            lines.append(f"  found     and {len(error.measured) - MEASURED_SHOWN} more")
+    elif error.measured is not None:
+        lines.append(f"  measured  {error.measured}")
+    if error.limit is not None:
+        lines.append(f"  limit     {error.limit}")
+    if error.remedy:
+        lines.append(f"  remedy    {error.remedy}")
+    return "\n".join(lines)
+
+
+def report_error(error: CamError, *, as_json: bool) -> int:
+    """Print an error (block on stderr, with ``as_json`` the problem document on stdout); returns the exit code."""
+    if as_json:
+        print_json(problem_document(error))
+    else:
+        say(error_block(error))
+    return mapping_of(error).exit_code

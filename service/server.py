@@ -1,0 +1,130 @@
+"""Runs the application under uvicorn: in the foreground, or in a thread for the demo."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+import structlog
+import uvicorn
+from pydantic import ValidationError
+
+from geometry.errors import CamError, SetupError
+from service.app import create_app
+from service.convert import problems_of
+from service.errors import UnavailableError
+from service.logs import configure
+from service.settings import Settings
+
+log = structlog.get_logger(__name__)
+
+
+def settings_with(given: dict[str, Any]) -> Settings:
+    """Settings from the environment with some given in code; those that are None count as not given.
+
+    Raises
+    ------
+    SetupError
+        A setting has a value that makes no sense.
+    """
+    try:
+        return Settings(**{k: v for k, v in given.items() if v is not None})
+    except ValidationError as error:
+        problems = problems_of(error, "settings")
+        raise SetupError(f"setting {problems[0]['at']}: {problems[0]['problem']}", code="bad_setting",
+                         subjects=tuple(p["at"] for p in problems), measured=problems,
+                         remedy="docs/settings.md lists every setting") from None
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        raise SetupError(f"cannot listen on {host}:{port}: {error.strerror}", code="cannot_listen",
+                         remedy="take another --port; 0 takes a free one") from None
+    return listener
+
+
+class _Server(uvicorn.Server):
+    """Tells open event streams to end as soon as the server is asked to stop."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """SIGINT or SIGTERM came."""
+        self.config.app.state.stopping.set()  # type: ignore[union-attr]
+        super().handle_exit(sig, frame)
+
+    def startup_error(self) -> CamError:
+        """Why it did not start."""
+        known: CamError | None = self.config.app.state.startup_error  # type: ignore[union-attr]
+        return known or UnavailableError("the service did not start; the log says why", code="did_not_start")
+
+
+def _server(settings: Settings, chain: str = "service.chain") -> _Server:
+    return _Server(uvicorn.Config(create_app(settings, chain), log_config=None, access_log=False,
+                                  timeout_graceful_shutdown=5))
+
+
+def run_server(settings: Settings) -> None:
+    """Serve until SIGINT or SIGTERM; running jobs go back to the queue.
+
+    Raises
+    ------
+    SetupError
+        Port in use, data folder in use, or exposed without tokens.
+    """
+    configure(settings.log_level, settings.log_format)
+    settings.check_exposure()
+    listener = _listen(settings.host, settings.port)
+    host, port = listener.getsockname()[:2]
+    log.info("serving", url=f"http://{host}:{port}", data=str(settings.data_dir), pid=os.getpid())
+    server = _server(settings)
+    try:
+        server.run(sockets=[listener])
+    except KeyboardInterrupt:
+        log.info("stopped")  # uvicorn raises the signal again when all is closed
+    if not server.started:
+        raise server.startup_error()
+
+
+@contextmanager
+def background(settings: Settings, chain: str = "service.chain") -> Iterator[str]:
+    """Serve in a thread; yields the base URL.
+
+    Raises
+    ------
+    UnavailableError
+        The service did not start.
+    """
+    settings.check_exposure()
+    listener = _listen(settings.host, settings.port)
+    server = _server(settings, chain)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="server", daemon=True)
+    thread.start()
+    try:
+        while not server.started:
+            if not thread.is_alive():
+                raise server.startup_error()
+            time.sleep(0.02)
+        yield f"http://{settings.host}:{listener.getsockname()[1]}"
+    finally:
+        server.config.app.state.stopping.set()  # type: ignore[union-attr]
+        server.should_exit = True
+        thread.join(timeout=20)
+
+
+def wait_for_interrupt() -> None:
+    """Sleep until Ctrl-C."""
+    stop = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    stop.wait()

@@ -1,0 +1,76 @@
+"""Tokens, rates, libraries, health and metrics."""
+
+TOOL = {"id": "T7", "kind": "flat", "diameter_mm": 4}
+
+
+def _bearer(token):
+    return {"Authorization": f"Bearer {token}"}
+
+
+def test_with_tokens_set_nobody_gets_in_without_one_or_sees_others_jobs(make_client, post):
+    client = make_client(tokens={"ada": "aaa", "bob": "bbb"})
+    for headers in ({}, _bearer("ccc"), {"Authorization": "Basic x"}):
+        for path in ("/v1/jobs", "/v1/tools", "/metrics"):
+            answer = client.get(path, headers=headers)
+            assert answer.status_code == 401 and answer.headers["www-authenticate"] == "Bearer"
+            assert answer.json()["code"] == "unauthorized"
+    assert post(client, "").status_code == 401
+    assert client.get("/healthz").status_code == client.get("/readyz").status_code == 200
+    job = post(client, "sleep", key="k", headers=_bearer("aaa")).json()
+    assert client.get(job["links"]["self"], headers=_bearer("aaa")).status_code == 200
+    for method, path in (("GET", ""), ("DELETE", ""), ("GET", "/events"), ("GET", "/files")):
+        answer = client.request(method, job["links"]["self"] + path, headers=_bearer("bbb"))
+        assert answer.status_code == 404
+    assert client.get("/v1/jobs", headers=_bearer("bbb")).json()["items"] == []
+    other = post(client, "", key="k", headers=_bearer("bbb"))  # keys are per principal
+    assert other.status_code == 202 and other.json()["id"] != job["id"]
+
+
+def test_too_many_submissions(make_client, post):
+    client = make_client(post_rate="2/minute")
+    assert [post(client, "sleep").status_code for _ in range(3)] == [202, 202, 429]
+    answer = post(client, "sleep")
+    assert answer.json()["code"] == "too_many_requests" and answer.headers["retry-after"]
+    assert client.get("/v1/jobs").status_code == 200
+
+
+def test_a_setup_refers_to_the_library_and_keeps_what_it_found(client, post, finish):
+    assert client.put("/v1/tools/finisher", json=TOOL).status_code == 201
+    assert client.put("/v1/tools/finisher", json=TOOL).status_code == 200
+    assert client.get("/v1/tools/finisher").json()["entry"]["stickout_mm"] == 40
+    assert client.put("/v1/machines/mill", json={"max_rpm": 12000}).status_code == 201
+    steel = {"name": "1.2379", "cutting_speed_m_min": 70,
+             "feed_per_tooth": [{"diameter_mm": 4, "feed_per_tooth_mm": 0.01}]}
+    assert client.put("/v1/materials/d2", json=steel).status_code == 201
+    setup = {"tools": ["lib:finisher"], "machine": "lib:mill", "material": "lib:d2"}
+    job = finish(client, post(client, setup=setup).json())
+    assert client.get(job["links"]["report"]).json()["tools"] == [{"id": "T7"}]
+    client.put("/v1/tools/finisher", json={**TOOL, "diameter_mm": 5})
+    assert post(client, setup=setup).json()["setup_sha256"] != job["setup_sha256"]
+    for path in ("/v1/tools/finisher", "/v1/machines/mill", "/v1/materials/d2"):
+        assert client.delete(path).status_code == 204
+        assert client.delete(path).json()["code"] == client.get(path).json()["code"] == "no_such_entry"
+    assert post(client, setup=setup).json()["code"] == "bad_setup"
+
+
+def test_library_entries_are_checked(client):
+    answer = client.put("/v1/tools/x", json={**TOOL, "diameter_mm": -1})
+    assert answer.status_code == 422 and answer.headers["content-type"] == "application/problem+json"
+    assert client.put("/v1/tools/..x", json=TOOL).status_code == 422
+    names = [m["name"] for m in client.get("/v1/materials").json()["items"]]
+    assert "Ti-6Al-4V" in names and client.get("/v1/machines").json() == {"items": []}
+
+
+def test_health_and_metrics(client, post, finish):
+    finish(client, post(client, "").json())
+    assert client.get("/healthz").json()["status"] == "ok"
+    assert client.get("/readyz").json() == {"status": "ok", "checks": {"database": "ok", "engine": "ok"}}
+    text = client.get("/metrics").text
+    assert 'zonemill_submissions_total{kind="plan"}' in text and 'zonemill_jobs{state="proved"}' in text
+    assert 'route="/v1/jobs/{job_id}"' in text and "/v1/jobs/j" not in text
+
+
+def test_a_request_id_is_kept_and_otherwise_made(client):
+    given = "3f2b8c1e5d6a4f7e9b0c1d2e3f4a5b6c"
+    assert client.get("/healthz", headers={"X-Request-ID": given}).headers["x-request-id"] == given
+    assert client.get("/healthz").headers["x-request-id"]

@@ -1,0 +1,117 @@
+"""Bad input over HTTP: status, problem type, and nothing left behind."""
+
+import json
+
+import pytest
+
+from tests.contract.conftest import STEP
+
+TOOL = {"id": "T1", "kind": "ball", "diameter_mm": 3}
+
+
+def _is_problem(answer, status, code):
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    body = answer.json()
+    assert (body["status"], body["code"]) == (status, code), body
+    assert body["type"].startswith("urn:zonemill:problem:") and body["type"].endswith(f":{code}")
+    assert body["title"] and body["detail"] and body["request_id"] == answer.headers["x-request-id"]
+    return body
+
+
+@pytest.mark.parametrize(("setup", "at"), [
+    ({}, "tools"), ({"tools": []}, "tools"),
+    ({"tools": [{**TOOL, "diameter_mm": -3}]}, "tools[0].diameter_mm"),
+    ({"tools": [{**TOOL, "flute_length_mm": 30, "neck_length_mm": 10}]}, "tools[0]"),
+    ({"tools": [TOOL], "unit": "inch"}, "unit"),
+    ({"tools": [{**TOOL, "diameter_in": 0.1}]}, "tools[0].diameter_in"),
+    ({"tools": [{**TOOL, "diameter_mm": "3 mm"}]}, "tools[0].diameter_mm"),
+    ({"tools": [TOOL], "quality": {"scallop_height_mm": 2}}, "setup"),
+    ({"tools": ["lib:none"]}, "tools[0]"),
+    ([], "setup")])
+def test_a_wrong_setup_is_refused_at_once_with_the_place(client, post, setup, at):
+    before = client.get("/v1/jobs?limit=200").json()["items"]
+    body = _is_problem(post(client, setup=setup), 422, "bad_setup")
+    assert at in body["subjects"] and body["measured"][0]["problem"]
+    assert client.get("/v1/jobs?limit=200").json()["items"] == before
+
+
+def test_every_problem_of_a_setup_is_told_at_once(client, post):
+    body = _is_problem(post(client, setup={"tools": [{**TOOL, "diameter_mm": -1}], "unit": 1}), 422, "bad_setup")
+    assert body["subjects"] == ["tools[0].diameter_mm", "unit"]
+
+
+@pytest.mark.parametrize(("setup", "code"), [("{", "setup_not_json"), ('{"tools": NaN}', "bad_setup"),
+                                             ("[" * 100_000, "setup_not_json")])
+def test_setup_text_that_is_no_setup(client, post, setup, code):
+    _is_problem(post(client, setup=setup), 422, code)
+
+
+@pytest.mark.parametrize(("part", "code"), [
+    (b"", "empty_file"), (b"solid cube\nendsolid\n", "not_step"), (STEP[:150], "truncated_step"),
+    (STEP.replace(b"(0.,0.,0.)", b"(#7)"), "dangling_reference")])
+def test_a_part_that_is_no_step_file(client, post, part, code):
+    body = _is_problem(post(client, part=part), 422, code)
+    assert ":bad-step:" in body["type"]
+    assert not list(client.app.state.engine.artifacts.tmp.iterdir())
+
+
+def test_a_body_over_the_limit_is_refused(client, post):
+    body = _is_problem(post(client, part=STEP + b" " * 2_100_000), 413, "body_too_large")
+    assert body["limit"] == 2_000_000
+
+    def endless():
+        for _ in range(64):
+            yield b"x" * 65536
+
+    answer = client.post("/v1/jobs", content=endless(), headers={"content-type": "multipart/form-data; boundary=b"})
+    assert answer.status_code == 413 and answer.headers["content-type"] == "application/problem+json"
+
+
+def test_malformed_forms(client, post):
+    _is_problem(client.post("/v1/jobs", json={}), 422, "not_multipart")
+    _is_problem(client.post("/v1/jobs", files={"part": ("a", STEP)}), 422, "missing_part")
+    _is_problem(client.post("/v1/jobs", files={"part": ("a", STEP), "setup": "{}", "x": "1"}), 422, "unknown_part")
+    _is_problem(client.post("/v1/jobs", content=b"junk", headers={"content-type": "multipart/form-data"}), 422,
+                "bad_multipart")
+    _is_problem(post(client, path="/v1/verifications"), 422, "missing_part")
+    _is_problem(post(client, path="/v1/verifications", program=b""), 422, "empty_program")
+    answer = client.post("/v1/jobs", files={"part": ("a.step", STEP)},
+                         data={"setup": json.dumps({"tools": [TOOL]})})
+    assert answer.status_code == 202  # a plain form field will do as well
+
+
+def test_the_key_has_a_length(client, post):
+    _is_problem(post(client, key="k" * 256), 422, "malformed_request")
+    _is_problem(post(client, key=""), 422, "malformed_request")
+
+
+def test_what_is_not_there_is_404_and_what_is_not_offered_405(client, post):
+    _is_problem(client.get("/nowhere"), 404, "no_such_path")
+    _is_problem(client.get("/v1/jobs/"), 404, "no_such_path")
+    _is_problem(client.get("/v1/jobs/jx"), 404, "no_such_job")
+    answer = client.patch("/v1/jobs")
+    _is_problem(answer, 405, "method_not_allowed")
+    assert "GET" in answer.headers["allow"]
+    _is_problem(client.get("/v1/jobs?limit=0"), 422, "malformed_request")
+
+
+def test_files_cannot_be_fetched_from_elsewhere(client, post, finish):
+    job = finish(client, post(client, "").json())
+    for name in ("state", "..%2Fstate", "%2Fetc%2Fpasswd", "nothing.txt", "%2e%2e"):
+        answer = client.get(f"{job['links']['files']}/{name}")
+        assert answer.status_code == 404, name
+
+
+def test_results_of_a_running_job_are_not_ready(client, post):
+    job = post(client, "sleep").json()
+    _is_problem(client.get(job["links"]["files"]), 409, "not_ready")
+    client.delete(job["links"]["self"])
+    _is_problem(client.get(job["links"]["files"]), 409, "no_result")
+
+
+def test_a_bug_in_a_route_is_a_problem_document_too(make_client, monkeypatch):
+    client = make_client()
+    monkeypatch.setattr(client.app.state.engine.library, "all", lambda: 1 / 0)
+    answer = client.get("/v1/tools")
+    assert answer.status_code == 500 and answer.json()["code"] == "bug" and "division" not in answer.text

@@ -1,0 +1,133 @@
+"""The command line, with a chain that answers what it is told."""
+
+import json
+import subprocess
+import sys
+import types
+
+import pytest
+from typer.testing import CliRunner
+
+import service
+from geometry.errors import InternalError, PartError, VerificationError
+from service.cli import app
+
+STEP = ("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+        "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\n"
+        "END-ISO-10303-21;\n")
+SETUP = {"tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3}]}
+
+
+class FakeChain(types.ModuleType):
+    def __init__(self):
+        super().__init__("service.chain")
+        self.answer = {"state": "proved", "findings": []}
+
+    def _say(self, progress):
+        progress("zones", 0.5)
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+    def plan(self, part_path, setup, out, progress):
+        return self._say(progress)
+
+    def zones_only(self, part_path, setup, progress):
+        return self._say(progress)
+
+    def verify_program(self, part_path, setup, program_text, progress):
+        assert program_text.strip()
+        return self._say(progress)
+
+
+@pytest.fixture
+def chain(monkeypatch):
+    fake = FakeChain()
+    monkeypatch.setitem(sys.modules, "service.chain", fake)
+    monkeypatch.setattr(service, "chain", fake, raising=False)
+    return fake
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "p.step").write_text(STEP)
+    (tmp_path / "s.json").write_text(json.dumps(SETUP))
+    (tmp_path / "x.ngc").write_text("G21\nM2\n")
+    return tmp_path
+
+
+def call(*args):
+    return CliRunner().invoke(app, [str(a) for a in args])
+
+
+def test_plan_prints_the_report_alone_and_says_how_it_goes_on_stderr(chain, files):
+    got = call("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "out")
+    assert got.exit_code == 0 and json.loads(got.stdout) == chain.answer
+    assert "zones" in got.stderr and (files / "out").is_dir()
+
+
+@pytest.mark.parametrize(("answer", "code"), [
+    ({"state": "unproved", "findings": []}, 3), (PartError("open"), 2), (VerificationError("broke"), 1),
+    (InternalError("bug"), 1), (KeyError("x"), 1)])
+def test_exit_codes_of_plan(chain, files, answer, code):
+    chain.answer = answer
+    got = call("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "out")
+    assert got.exit_code == code
+    if isinstance(answer, Exception):
+        assert got.stdout == "" and "error:" in got.stderr
+
+
+def test_verify_answers_0_without_and_3_with_findings(chain, files):
+    args = ("verify", files / "p.step", "--setup", files / "s.json", "--program", files / "x.ngc")
+    assert call(*args).exit_code == 0
+    chain.answer = {"state": "unproved", "findings": [{"kind": "gouge"}]}
+    assert call(*args).exit_code == 3
+    (files / "x.ngc").write_text("\n")
+    got = call(*args)
+    assert got.exit_code == 2 and "empty_program" in got.stderr
+
+
+def test_zones_prints_what_the_chain_found(chain, files):
+    got = call("zones", files / "p.step", "--setup", files / "s.json")
+    assert got.exit_code == 0 and json.loads(got.stdout) == chain.answer
+
+
+@pytest.mark.parametrize(("setup", "code"), [
+    ("{", "setup_not_json"), (json.dumps({"tools": []}), "bad_setup"),
+    (json.dumps({**SETUP, "unit": "inch"}), "bad_setup")])
+def test_a_bad_setup_is_named_before_anything_is_computed(files, setup, code):
+    (files / "s.json").write_text(setup)
+    got = call("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "out")
+    assert got.exit_code == 2 and code in got.stderr and got.stdout == ""
+    got = call("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "out", "--json")
+    assert got.exit_code == 2 and json.loads(got.stdout)["code"] == code
+
+
+@pytest.mark.parametrize(("text", "code"), [("", "empty_file"), ("solid stl\n", "not_step"),
+                                            (STEP[:120], "truncated_step")])
+def test_a_file_that_is_no_step_is_refused(files, text, code):
+    (files / "p.step").write_text(text)
+    got = call("zones", files / "p.step", "--setup", files / "s.json")
+    assert got.exit_code == 2 and code in got.stderr
+
+
+def test_missing_files_are_bad_input(files):
+    assert call("zones", files / "no.step", "--setup", files / "s.json").exit_code == 2
+    assert call("zones", files / "p.step", "--setup", files / "no.json").exit_code == 2
+    (files / "taken").write_text("")
+    got = call("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "taken")
+    assert got.exit_code == 2 and "out_not_writable" in got.stderr
+
+
+def test_serve_refuses_to_be_reached_from_outside_without_a_token(files, monkeypatch):
+    monkeypatch.delenv("ZONEMILL_TOKENS", raising=False)
+    got = call("serve", "--host", "0.0.0.0", "--port", "0", "--data", files / "data")
+    assert got.exit_code == 2 and "exposed_without_token" in got.stderr
+    got = call("serve", "--port", "70000")
+    assert got.exit_code == 2 and "bad_setting" in got.stderr
+
+
+def test_help_imports_nothing_heavy():
+    text = ("import sys, service.cli; "
+            "print([m for m in ('numpy', 'numba', 'fastapi', 'pydantic', 'OCP', 'dask') if m in sys.modules])")
+    assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
