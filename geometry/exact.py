@@ -52,7 +52,7 @@ class ExactFaces:
         from geometry.occ.loading import load_solid
         from geometry.occ.topology import faces_of
 
-        self._faces = faces_of(load_solid(path, solid)[1])
+        self._faces = faces_of(load_solid(path, solid).body)
         self._placement = placement or Placement()
 
     def __len__(self) -> int:

@@ -28,18 +28,23 @@ RESOLUTION = 1e-7
 SLIVER_TOLERANCES = 10.0
 
 
-def face_info(number: int, shape: Shape, mesh: FaceMesh, tolerance: float) -> FaceInfo:
+def surface_name(face: Shape) -> str:
+    """Word for the kind of surface a kernel face lies on, one of those ``FaceInfo.surface`` may hold."""
+    return NAMES.get(BRepAdaptor_Surface(face, False).GetType(), "other")
+
+
+def face_info(number: int, shape: Shape, name: str, mesh: FaceMesh, tolerance: float) -> FaceInfo:
     """Describe one face.
 
     number    : int, 1-based
     shape     : kernel face
+    name      : kind of surface the file gave it
     mesh      : FaceMesh of it
     tolerance : float, mm, modelling tolerance of the file
 
     Returns FaceInfo.
     """
     surface = BRepAdaptor_Surface(shape, True)
-    name = NAMES.get(surface.GetType(), "other")
     low, high = (0.0, 0.0) if name == "plane" else _range(surface, mesh, shape.Orientation() == TopAbs_REVERSED)
     area = area_of(shape)
     perimeter = length_of(shape)

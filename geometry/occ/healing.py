@@ -10,6 +10,7 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
+from OCP.ShapeCustom import ShapeCustom
 from OCP.ShapeFix import ShapeFix_Shape
 from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 from OCP.TopoDS import TopoDS
@@ -49,6 +50,23 @@ def one_solid(shape: Shape, solid: int | None, warnings: list[str]) -> Shape:
     if len(solids) > 1:
         solids = _fused(_without_strays(solids, warnings), warnings)
     return _outward(_valid(_chosen(solids, solid), warnings), warnings)
+
+
+def swept_as_splines(solid: Shape) -> Shape:
+    """The same solid with extruded and revolved surfaces written as splines, which is exact.
+
+    The kernel's mesher ignores the chord inside swept surfaces and fills them with needless points: a spline wall
+    asked for 0.005 mm came out 0.057 mm off with 7962 triangles, as a spline 0.0023 mm off with 236. Faces keep
+    their number; returned unchanged where the rewriting fails.
+    """
+    out = ShapeCustom.ConvertToBSpline_s(solid, True, True, False, False)
+    if len(solids_of(out)) != 1 or len(faces_of(out)) != len(faces_of(solid)):
+        return solid
+    # the kernel integrates swept surfaces coarsely (0.05 % off on the wall above), so this only catches a wreck
+    before = volume_of(solid)
+    if abs(volume_of(out) - before) > 5e-3 * abs(before) or free_edges(out):
+        return solid
+    return solids_of(out)[0]
 
 
 def _sewn(shape: Shape, warnings: list[str]) -> Shape:

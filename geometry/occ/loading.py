@@ -2,35 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from geometry.frames import Placement
-from geometry.occ.curvature import face_info
+from geometry.occ.curvature import face_info, surface_name
 from geometry.occ.edges import edge_infos
-from geometry.occ.healing import one_solid
+from geometry.occ.healing import one_solid, swept_as_splines
 from geometry.occ.meshing import SolidMesh, mesh_solid
 from geometry.occ.reading import StepShape, read_shape
-from geometry.occ.sizes import check_size, doubts
-from geometry.occ.topology import Shape, box_of, faces_of, volume_of
+from geometry.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
+from geometry.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.part import EdgeInfo, FaceInfo, Part
 from geometry.step import check_tolerances
 
 # Modelling tolerance (mm) taken when the file names none, and the range in which a named one is believed.
 USUAL_TOLERANCE, TOLERANCE_RANGE = 1e-3, (1e-5, 0.05)
-# Mesh and exact volume further apart than this share mean that one of them is wrong.
-VOLUME_SHARE = 1e-3
+# A mesh off by d everywhere changes the volume by area * d; this many times that, and something else is wrong.
+VOLUME_ROOM = 2.0
 
 
-def load_solid(path: str | Path, solid: int | None = None) -> tuple[StepShape, Shape, list[str]]:
-    """Read and heal: the file, its one solid (kernel shape, STEP coordinates in mm) and what was done to it."""
+@dataclass(frozen=True)
+class LoadedSolid:
+    """The one solid of a file.
+
+    step     : StepShape, the file
+    body     : kernel solid, STEP coordinates, mm
+    surfaces : kind of surface the file gives each face
+    warnings : what was doubtful or done to it; later stages append
+    """
+
+    step: StepShape
+    body: Shape
+    surfaces: list[str]
+    warnings: list[str]
+
+
+def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
+    """Read a file and heal it into one solid; errors are those of ``geometry.step.read_part``."""
     step = read_shape(path)
     warnings = list(step.warnings)
-    check_size(box_of(step.shape), step.unit, step.factor)
+    _check_size(step.shape, step)
     body = one_solid(step.shape, solid, warnings)
-    check_size(box_of(body), step.unit, step.factor)
-    return step, body, warnings
+    _check_size(body, step)
+    surfaces = [surface_name(f) for f in faces_of(body)]
+    return LoadedSolid(step, swept_as_splines(body), surfaces, warnings)
 
 
 def load_part(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
@@ -38,21 +56,32 @@ def load_part(path: str | Path, *, placement: Placement | None = None, solid: in
     """The work behind ``geometry.step.read_part``, in this process; arguments and errors are those of ``read_part``
     except that nothing limits time or memory here."""
     check_tolerances(chord, angle)
-    step, body, warnings = load_solid(path, solid)
+    loaded = load_solid(path, solid)
+    step, body, warnings = loaded.step, loaded.body, loaded.warnings
     mesh = mesh_solid(body, chord, angle)
     warnings += mesh.warnings
     tolerance = _tolerance(step)
-    faces = tuple(face_info(i + 1, f, mesh.faces[i], tolerance) for i, f in enumerate(faces_of(body)))
+    faces = tuple(face_info(i + 1, f, loaded.surfaces[i], mesh.faces[i], tolerance)
+                  for i, f in enumerate(faces_of(body)))
     edges = edge_infos(body, mesh, warnings)
-    volume = _volume(body, mesh, warnings)
+    area = sum(f.area for f in faces)
+    volume = _volume(body, mesh, VOLUME_ROOM * area * max(chord, mesh.deviation), warnings)
     warnings += _slivers(faces, tolerance)
-    warnings += doubts(mesh.mesh.bounds, volume, sum(f.area for f in faces), step.unit, step.factor,
-                       step.text.products)
+    warnings += doubts(mesh.mesh.bounds, volume, area, step.unit, step.factor, step.text.products)
     matrix = (placement or Placement()).matrix
+    check_size(mesh.mesh.bounds, step.unit, step.factor)
     moved = mesh.mesh.transformed(matrix)
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
                 bounds=moved.bounds, unit=step.unit, chord=chord, angle=angle, deviation=mesh.deviation,
                 warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256)
+
+
+def _check_size(shape: Shape, step: StepShape) -> None:
+    """Before healing, which could take long on a shape of absurd size, and after it."""
+    rough = quick_box(shape)
+    # the rough box is never too small, and on free-form faces rarely more than twice too large
+    if not 10.0 * REFUSE_BELOW <= (rough[1] - rough[0]).max() <= REFUSE_ABOVE:
+        check_size(box_of(shape), step.unit, step.factor)
 
 
 def _tolerance(step: StepShape) -> float:
@@ -60,9 +89,9 @@ def _tolerance(step: StepShape) -> float:
     return USUAL_TOLERANCE if named is None else float(np.clip(named * step.factor, *TOLERANCE_RANGE))
 
 
-def _volume(body: Shape, mesh: SolidMesh, warnings: list[str]) -> float:
-    exact, meshed = volume_of(body), mesh.mesh.volume
-    if abs(exact - meshed) > VOLUME_SHARE * abs(meshed):
+def _volume(body: Shape, mesh: SolidMesh, room: float, warnings: list[str]) -> float:
+    exact, meshed = exact_volume(body), mesh.mesh.volume
+    if abs(exact - meshed) > room + 1e-6 * abs(meshed):
         warnings.append(f"the exact solid claims {exact:.6g} mm³ and its mesh encloses {meshed:.6g} mm³; "
                         "the mesh is believed")
         return meshed

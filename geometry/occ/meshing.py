@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.errors import GeometryError
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.occ.deviation import largest_deviation
+from geometry.occ.holes import fill_slivers
 from geometry.occ.topology import Shape, faces_of
 
 MAX_REMESH = 2
@@ -81,13 +82,19 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
         count = sum(len(f.triangles) for f in faces)
         if deviation <= DEVIATION_ROOM * asked or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES:
             break
-        chord, angle = 0.5 * chord, 0.75 * angle
+        # the deviation falls about in proportion to the chord, so aim a little below the limit at once
+        chord *= float(np.clip(0.9 * DEVIATION_ROOM * asked / deviation, 0.3, 0.8))
     mesh, edge_nodes = _join(solid, faces)
     warnings = []
     if deviation > DEVIATION_ROOM * asked:
         warnings.append(f"the mesh deviates up to {deviation:.4g} mm from the exact surface; "
                         f"{asked:g} mm were asked for")
     open_edges = count_open_edges(mesh)
+    if open_edges:
+        mesh, holes = fill_slivers(mesh, asked)
+        open_edges = count_open_edges(mesh)
+        if holes:
+            warnings.append(f"{holes} sliver holes that the CAD kernel left in the mesh were closed")
     if open_edges:
         warnings.append(f"{open_edges} edges of the mesh are not shared by exactly two triangles")
     return SolidMesh(mesh, faces, edge_nodes, deviation, chord, warnings)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from geometry.errors import PartError
 from geometry.mesh import F64
 
@@ -13,8 +11,9 @@ REFUSE_BELOW, REFUSE_ABOVE = 0.5, 10_000.0
 DOUBT_BELOW, DOUBT_ABOVE = 2.0, 5_000.0
 # Mean wall thickness (mm) below which a whole part is more likely mis-scaled than machinable.
 DOUBT_THICKNESS = 0.1
-# What one unit is when it was meant to be another: mm per mm, cm, inch, foot, m.
-FACTORS = {"mm": 1.0, "cm": 10.0, "inch": 25.4, "foot": 304.8, "m": 1000.0}
+# What a unit may have been meant to be, mm in one of it. Likeliest first: mm against m is the usual slip, since many
+# CAD kernels count in metres; then inch.
+FACTORS = {"mm": 1.0, "m": 1000.0, "inch": 25.4, "cm": 10.0, "foot": 304.8}
 # Things nobody makes smaller than a metre in earnest; a small one under such a name is worth a question.
 LARGE_THINGS = re.compile(r"wind[\s_-]*(turbine|blade)|turbine[\s_-]*tower|fuselage|\bhull\b|wing[\s_-]*spar",
                           re.IGNORECASE)
@@ -68,13 +67,9 @@ def doubts(box: F64, volume: float, area: float, unit: str, factor: float, names
 
 
 def _likely(size: float, unit: str, factor: float, at_least: float = 0.0) -> str:
-    """The unit that would make the part plausible with the least change of scale, in words."""
-    choices = []
+    """The likeliest unit that would make the part plausible, in words."""
     for name, millimetres in FACTORS.items():
         scale = millimetres / factor
-        if abs(np.log(scale)) > 1e-6 and DOUBT_BELOW <= size * scale <= DOUBT_ABOVE and scale >= at_least:
-            choices.append((abs(np.log(scale)), name, scale))
-    if not choices:
-        return ""
-    _, name, scale = min(choices)
-    return f"; read as {name} it would be {size * scale:.4g} mm (factor {scale:.4g})"
+        if name != unit and DOUBT_BELOW <= size * scale <= DOUBT_ABOVE and scale >= at_least:
+            return f"; read as {name} it would be {size * scale:.4g} mm (factor {scale:.4g})"
+    return ""

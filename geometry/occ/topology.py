@@ -51,23 +51,44 @@ def box_of(shape: Shape) -> F64:
     """(2, 3) float64, mm: a box that holds the shape; free-form faces may leave some room in it."""
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return _corners(box)
+
+
+def _corners(box: Bnd_Box) -> F64:
     if box.IsVoid():
         return np.zeros((2, 3))
     x0, y0, z0, x1, y1, z1 = box.Get()
     return np.array([[x0, y0, z0], [x1, y1, z1]])
 
 
+def quick_box(shape: Shape) -> F64:
+    """(2, 3) float64, mm: a box from poles and knots, cheap and never too small, possibly much too large."""
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box, False)
+    return _corners(box)
+
+
 def volume_of(shape: Shape) -> float:
-    """Enclosed volume, mm³; negative when the shape is inside out."""
+    """Enclosed volume, mm³, by a fast fixed rule; negative when the shape is inside out."""
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, properties)
     return float(properties.Mass())
 
 
-def area_of(shape: Shape) -> float:
-    """Surface area, mm²."""
+def exact_volume(shape: Shape) -> float:
+    """Enclosed volume, mm³, integrated until its estimated relative error is below 1e-5.
+
+    The fixed rule behind ``volume_of`` is faster and was 0.04 % off on a spline wall of known volume.
+    """
     properties = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(shape, properties)
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-5, True)
+    return float(properties.Mass())
+
+
+def area_of(shape: Shape) -> float:
+    """Surface area, mm², integrated until its estimated relative error is below 1e-4."""
+    properties = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(shape, properties, 1e-4)
     return float(properties.Mass())
 
 
