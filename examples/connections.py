@@ -213,7 +213,8 @@ def _ring(first: F64, second: F64, *, curved: bool) -> Any:
     def line(p: F64, q: F64) -> Any:
         return cq.Edge.makeLine(cq.Vector(*p), cq.Vector(*q))
 
-    return cq.Wire.assembleEdges([rail(first), line(first[2], second[2]), rail(second[::-1]), line(second[0], first[0])])
+    there, back = line(first[2], second[2]), line(second[0], first[0])
+    return cq.Wire.assembleEdges([rail(first), there, rail(second[::-1]), back])
 
 
 def _arc(a: F64, m: F64, b: F64, n: int) -> F64:

@@ -166,7 +166,9 @@ def clear_of(spec: ConnectionSpec, others: list[ConnectionSpec], plan: float = 1
     """Whether a connection keeps ``plan`` mm beside or ``height`` mm above or below every other one."""
     for other in others:
         stacked = spec.z_range[0] - other.z_range[1] >= height or other.z_range[0] - spec.z_range[1] >= height
-        if not stacked and spec.footprint().distance(other.footprint()) < plan and set(spec.indices) & set(other.indices):
+        if stacked or not set(spec.indices) & set(other.indices):
+            continue
+        if spec.footprint().distance(other.footprint()) < plan:
             return False
     return True
 

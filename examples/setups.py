@@ -41,7 +41,8 @@ def suggest_setup(layout: Layout, truth: dict[str, Any]) -> dict[str, Any]:
     least = sorted(c["gap_min"] for c in truth["channels"])
     narrowest = least[0] if least else 6.0
     fine = next((d for d in (2.0, 1.5, 1.0, 0.8) if d <= 0.85 * narrowest), 0.6)
-    tools = [tool(1, "flat", 4.0, reach), tool(2, "ball", 3.0, reach), tool(3, "ball", 1.5, min(reach, 15.0), shank=4.0)]
+    tools = [tool(1, "flat", 4.0, reach), tool(2, "ball", 3.0, reach)]
+    tools.append(tool(3, "ball", 1.5, min(reach, 15.0), shank=4.0))
     if fine < 1.5:
         tools.append(tool(4, "ball", fine, min(reach, 14.0 * fine), shank=4.0))
     return setup_with(tools, scallop=0.02)
