@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class ExactFaces:
         from geometry.occ.loading import load_solid
         from geometry.occ.topology import faces_of
 
-        self._faces = faces_of(load_solid(path, solid).body)
+        self._faces = faces_of(load_solid(Path(path), solid).body)
         self._placement = placement or Placement()
 
     def __len__(self) -> int:
