@@ -1,0 +1,250 @@
+"""Connections: material that bridges a channel and leaves void below some part of its span.
+
+A *body* is a thin sheet (see ``zones.walls``) or a component of the remaining faces across convex and smooth edges.
+A body *ends* at a wall where their common concave edges (or fillets) run round it: its normals along that border
+point to different sides. A wall that something else ends at shows one normal there, so a long wall with a window
+or a gate is not mistaken for a bridge between the ribs that meet it.
+A body with two ends and void below is a connection; with floor below its whole span it stays a wall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.part import EdgeKind
+from zones.facegraph import STEEP_NZ, FaceGraph, UnionFind, cast
+from zones.walls import NO_WALL, SEAT, Sheets
+
+# Normals of a body along the border it shares with a wall differ by more than 60 degrees where it ends there.
+END_DOT = 0.5
+# Void: the next material below lies deeper than this share of the part's height.
+VOID_SHARE = 0.01
+# The underside of a body is what looks down by more than this; leaning ribs do so too, but have floor contact.
+DOWN_NZ = -0.1
+# A span is covered by its floor contact up to gaps of this share.
+SPAN_SLACK = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """A concave border between two bodies, of one edge or one fillet.
+
+    a, b     : bodies
+    na, nb   : (k, 3) float64, outward normals of each body along it
+    nodes    : mesh vertices on it
+    """
+
+    a: int
+    b: int
+    na: F64
+    nb: F64
+    nodes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """One place where a body ends at another.
+
+    at     : the other body
+    nodes  : mesh vertices along the border
+    """
+
+    at: int
+    nodes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Bridges:
+    """Bodies of a part and which of them are connections.
+
+    body        : (n,) int, label of every face; thin bodies keep their label, fillets and slivers have ``NO_WALL``
+    connections : per connection the labels of its bodies
+    ends        : per connection its ends at walls
+    base        : labels of bodies that walls stand on
+    """
+
+    body: np.ndarray
+    connections: list[list[int]]
+    ends: list[list[End]]
+    base: set[int]
+
+
+def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
+    """Tell the connections among the bodies of a part.
+
+    graph, sheets : of the part
+    Returns Bridges.
+    """
+    body = all_bodies(graph, sheets.body)
+    borders = find_borders(graph, body)
+    thin = set(sheets.labels)
+    base = {SEAT} | _supports(graph, sheets, body)
+    floating = {x for x in np.unique(body).tolist() if x != NO_WALL and x not in base}
+    void = {x: _void_points(graph, body, x) for x in floating}
+    floors = {x for x in floating - thin if len(void[x]) == 0 and _looks_up(graph, body == x)}
+    base, floating = base | floors, floating - floors
+    bridging = set()
+    for x in sorted(floating):
+        ends = _ends(graph, [x], borders, thin - {x})
+        if len(ends) >= 2 and _open_below(graph, x, ends, borders, void[x], floating - thin):
+            bridging.add(x)
+    groups = _groups(floating, thin, bridging, borders, void)
+    out, out_ends = [], []
+    walls = thin - bridging
+    for group in groups:
+        ends = _ends(graph, group, borders, walls)
+        if len(ends) >= 2:
+            out.append(group)
+            out_ends.append(ends)
+    return Bridges(body, out, out_ends, base)
+
+
+def all_bodies(graph: FaceGraph, label: np.ndarray) -> np.ndarray:
+    """Bodies of the faces that belong to no sheet, added to the labels of the sheets.
+
+    label : (n,) int from Sheets.body
+    Returns (n,) int; new bodies are numbered from n.
+    """
+    loose = (label == NO_WALL) & ~graph.fillet & ~graph.sliver
+    sets = UnionFind(graph.n)
+    for link in graph.links:
+        if link.joins and loose[link.a] and loose[link.b]:
+            sets.union(link.a, link.b)
+    return np.asarray(np.where(loose, sets.labels() + graph.n, label))
+
+
+def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
+    """Concave borders between different bodies, by edges and by fillets.
+
+    body : (n,) int labels
+    """
+    out = []
+    for link in graph.links:
+        a, b = int(body[link.a]), int(body[link.b])
+        if link.kind == EdgeKind.CONCAVE and a != b and NO_WALL not in (a, b):
+            nodes = link.nodes
+            out.append(Border(a, b, graph.normals_at(link.a, nodes), graph.normals_at(link.b, nodes), nodes))
+    for fillet in np.flatnonzero(graph.fillet):
+        links = [k for k in graph.at[fillet] if body[k.other(int(fillet))] != NO_WALL]
+        for i, first in enumerate(links):
+            f = first.other(int(fillet))
+            for second in links[i + 1:]:
+                g = second.other(int(fillet))
+                if body[f] != body[g]:
+                    nodes = np.concatenate([first.nodes, second.nodes])
+                    out.append(Border(int(body[f]), int(body[g]), graph.normals_at(f, first.nodes),
+                                      graph.normals_at(g, second.nodes), nodes))
+    return out
+
+
+def _ends(graph: FaceGraph, group: list[int], borders: list[Border], walls: set[int]) -> list[End]:
+    """Places where a group of bodies ends at walls, each a connected run of borders."""
+    mine = set(group)
+    out = []
+    touching: dict[int, list[tuple[F64, np.ndarray]]] = {}
+    for border in borders:
+        for x, w, normals in ((border.a, border.b, border.na), (border.b, border.a, border.nb)):
+            if x in mine and w in walls and w not in mine:
+                touching.setdefault(w, []).append((normals, border.nodes))
+    for wall in sorted(touching):
+        for cluster in _connected_runs(touching[wall]):
+            normals = np.concatenate([touching[wall][i][0] for i in cluster])
+            normals = normals[np.isfinite(normals).all(axis=1)]
+            if len(normals) and float((normals @ normals.T).min()) < END_DOT:
+                out.append(End(wall, np.concatenate([touching[wall][i][1] for i in cluster])))
+    return out
+
+
+def _connected_runs(runs: list[tuple[F64, np.ndarray]]) -> list[list[int]]:
+    """Runs that share a mesh vertex, as lists of indices."""
+    sets = UnionFind(len(runs))
+    owner: dict[int, int] = {}
+    for i, (_, nodes) in enumerate(runs):
+        for node in nodes.tolist():
+            sets.union(owner.setdefault(node, i), i)
+    label = sets.labels()
+    return [np.flatnonzero(label == k).tolist() for k in np.unique(label)]
+
+
+def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
+    """Bodies whose underside is what a ray straight down through a wall leaves by: what the wall stands on."""
+    out = set()
+    rows = np.flatnonzero(sheets.thin[graph.face] & np.isfinite(graph.inward))
+    s = graph.samples
+    middle = s.points[rows] - 0.5 * graph.inward[rows, None] * s.normals[rows]
+    down = np.broadcast_to([0.0, 0.0, -1.0], middle.shape)
+    _, hit = cast(graph.tree, middle, down, graph.skin)
+    below = np.where(hit >= 0, body[graph.face_of[hit]], NO_WALL)
+    mine = body[graph.face[rows]]
+    for wall in sheets.labels:
+        foreign = below[(mine == wall) & (below != wall) & (below != NO_WALL)]
+        labels, counts = np.unique(foreign, return_counts=True)
+        if counts.sum() >= 0.1 * (mine == wall).sum():
+            out |= {int(x) for x, c in zip(labels, counts, strict=True) if c >= 0.5 * counts.sum()}
+    return out - set(sheets.labels)
+
+
+def _void_points(graph: FaceGraph, body: np.ndarray, x: int) -> F64:
+    """Points of the downward faces of a body with void below them, (k, 3) float64, mm."""
+    s = graph.samples
+    low = graph.part.bounds[0, 2] + VOID_SHARE * graph.height
+    rows = np.flatnonzero((body[graph.face] == x) & (s.normals[:, 2] < DOWN_NZ) & (s.points[:, 2] > low))
+    down = np.broadcast_to([0.0, 0.0, -1.0], (len(rows), 3))
+    distance, hit = cast(graph.tree, s.points[rows], down, graph.skin)
+    own = (hit >= 0) & (body[graph.face_of[hit]] == x)
+    return np.asarray(s.points[rows[(distance > VOID_SHARE * graph.height) & ~own]])
+
+
+def _looks_up(graph: FaceGraph, faces: np.ndarray) -> bool:
+    """Whether the area-weighted mean normal of faces ((n,) bool) is within 60 degrees of +Z."""
+    mean = (graph.normal[faces] * graph.area[faces, None]).sum(axis=0)
+    return bool(mean[2] > STEEP_NZ * np.linalg.norm(mean))
+
+
+def _open_below(graph: FaceGraph, x: int, ends: list[End], borders: list[Border], void: F64,
+                unsupported: set[int]) -> bool:
+    """Whether a body leaves void below some part of its span, where no floor or rib carries it either.
+
+    unsupported : bodies that carry nothing (bars and the like)
+    """
+    if len(void) == 0:
+        return False
+    v = graph.mesh.vertices
+    a, b = (v[e.nodes].mean(axis=0)[:2] for e in ends[:2])
+    span = float(np.linalg.norm(b - a))
+    if span < 1e-9:
+        return True
+    along = (b - a) / span
+    covered = []
+    for border in borders:
+        if x in (border.a, border.b):
+            other = border.b if border.a == x else border.a
+            if other not in unsupported and all(other != e.at for e in ends):
+                u = v[border.nodes][:, :2] @ along
+                covered.append((float(u.min()), float(u.max())))
+    u = void[:, :2] @ along
+    slack = SPAN_SLACK * span
+    under = np.zeros(len(u), bool)
+    for low, high in covered:
+        under |= (u >= low - slack) & (u <= high + slack)
+    return bool((~under).sum() >= max(1, 0.02 * len(u)))
+
+
+def _groups(floating: set[int], thin: set[int], bridging: set[int], borders: list[Border],
+            void: dict[int, F64]) -> list[list[int]]:
+    """Bodies that are one connection: bridging ones, with the floating pieces that meet them (forks)."""
+    piece = {x for x in floating if x in bridging or (x not in thin and len(void[x]))}
+    order = sorted(piece)
+    place = {x: i for i, x in enumerate(order)}
+    sets = UnionFind(len(order))
+    for border in borders:
+        if border.a in piece and border.b in piece:
+            sets.union(place[border.a], place[border.b])
+    label = sets.labels()
+    return [[order[i] for i in np.flatnonzero(label == k)] for k in np.unique(label)]
+
+
+__all__ = ["Border", "Bridges", "End", "all_bodies", "find_borders", "find_bridges"]

@@ -1,0 +1,131 @@
+"""Part -> walls, connections, channels, and the role of every face.
+
+    faces measured (facegraph) -> thin bodies (walls) -> bridges among the bodies (connections)
+    -> walls are the thin bodies that are left and stand on something -> facing walls (channels)
+
+No step knows where a part comes from; nothing depends on the order of its faces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.part import Part
+from zones.channels import find_facings
+from zones.connections import Bridges, find_borders, find_bridges
+from zones.facegraph import STEEP_NZ, FaceGraph
+from zones.model import Channel, Connection, Decomposition, Wall
+from zones.walls import SEAT, Sheets, find_sheets
+
+
+def decompose(part: Part) -> Decomposition:
+    """Find walls, connections and channels of a part.
+
+    part : Part in the setup frame, mm, access along +Z
+
+    Returns
+    -------
+    Decomposition
+        Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are those of the mesh, refined until
+        the search neighbourhood is below 1 % of the sample pitch; they exceed the gap of the exact surfaces by at
+        most twice ``part.deviation``.
+    """
+    graph = FaceGraph(part)
+    sheets = find_sheets(graph)
+    bridges = find_bridges(graph, sheets)
+    bridging = {x for group in bridges.connections for x in group}
+    wall_labels = [x for x in sheets.labels if x not in bridging and _stands(graph, sheets, bridges, x)]
+    wall_labels.sort(key=lambda x: _place(graph, np.flatnonzero(bridges.body == x)))
+    walls = tuple(_wall(graph, sheets, bridges.body, x, f"W{i}") for i, x in enumerate(wall_labels, 1))
+    name = {x: w.id for x, w in zip(wall_labels, walls, strict=True)}
+    connections = _connections(graph, bridges, name)
+    connection_faces = [int(f) - 1 for c in connections for f in c.faces]
+    left_out = graph.fillet | graph.sliver
+    left_out[connection_faces] = True
+    sides = [sheets.sides(x) for x in wall_labels]
+    channels = tuple(
+        Channel(f"H{i}", (walls[f.walls[0]].id, walls[f.walls[1]].id), f.gap_min, f.at)
+        for i, f in enumerate(find_facings(graph, sides, left_out), 1))
+    roles = _roles(graph, bridges, set(wall_labels), set(connection_faces))
+    seat = tuple(int(f) + 1 for f in np.flatnonzero(graph.seat))
+    return Decomposition(walls, connections, channels, roles, seat, _warnings(graph, walls))
+
+
+def _stands(graph: FaceGraph, sheets: Sheets, bridges: Bridges, label: int) -> bool:
+    """Whether a thin body is mostly steep and stands on the base, the seat, or a floor."""
+    sides = sheets.sides(label)
+    if graph.area[sides[graph.steep[sides]]].sum() < 0.5 * graph.area[sides].sum():
+        return False
+    for link in graph.links:
+        for f, g in ((link.a, link.b), (link.b, link.a)):
+            if bridges.body[f] == label and (graph.seat[g] or int(bridges.body[g]) in bridges.base):
+                return True
+    return any(label in (b.a, b.b) and {b.a, b.b} & bridges.base for b in find_borders(graph, bridges.body))
+
+
+def _place(graph: FaceGraph, faces: np.ndarray) -> tuple[float, ...]:
+    """Area centroid of faces, rounded to a millionth of the part size so that noise cannot change an order."""
+    weight = graph.area[faces]
+    centre = (graph.centroid[faces] * weight[:, None]).sum(axis=0) / max(float(weight.sum()), 1e-30)
+    pitch = 10.0 ** np.floor(np.log10(1e-5 * max(graph.size, 1e-9)))
+    return tuple(float(c) for c in np.round(centre / pitch))
+
+
+def _wall(graph: FaceGraph, sheets: Sheets, body: np.ndarray, label: int, name: str) -> Wall:
+    faces = np.flatnonzero(body == label)
+    thin = sheets.sides(label)
+    rows = graph.face_rows(np.isin(np.arange(graph.n), thin))
+    low, high = graph.z_range[faces, 0].min(), graph.z_range[faces, 1].max()
+    return Wall(name, tuple(int(f) + 1 for f in faces), tuple(int(f) + 1 for f in faces[graph.steep[faces]]),
+                float(np.median(graph.inward[rows])), float(low), float(high))
+
+
+def _connections(graph: FaceGraph, bridges: Bridges, name: dict[int, str]) -> tuple[Connection, ...]:
+    found = []
+    for group, ends in zip(bridges.connections, bridges.ends, strict=True):
+        at = [name[e.at] for e in ends if e.at in name]
+        if len(at) < 2:
+            continue
+        walls = sorted(set(at), key=lambda w: int(w[1:]))
+        if len(walls) == 1:
+            walls = walls * 2
+        faces = np.flatnonzero(np.isin(bridges.body, group))
+        found.append((_place(graph, faces), faces, tuple(walls)))
+    found.sort(key=lambda f: f[0])
+    return tuple(
+        Connection(f"C{i}", tuple(int(f) + 1 for f in faces), walls,
+                   float(graph.z_range[faces, 0].min()), float(graph.z_range[faces, 1].max()))
+        for i, (_, faces, walls) in enumerate(found, 1))
+
+
+def _roles(graph: FaceGraph, bridges: Bridges, walls: set[int], connections: set[int]) -> dict[int, str]:
+    """Role of every face number; a face of the base that looks up is floor."""
+    out = {}
+    for face in range(graph.n):
+        body = int(bridges.body[face])
+        if graph.fillet[face]:
+            role = "fillet"
+        elif face in connections:
+            role = "connection"
+        elif body in walls:
+            role = "wall"
+        elif body == SEAT or body in bridges.base:
+            role = "floor" if graph.normal[face, 2] > STEEP_NZ else "base"
+        else:
+            role = "free"
+        out[face + 1] = role
+    return out
+
+
+def _warnings(graph: FaceGraph, walls: tuple[Wall, ...]) -> tuple[str, ...]:
+    out = []
+    slivers = [f"F{f + 1}" for f in np.flatnonzero(graph.sliver)]
+    if slivers:
+        out.append(f"{len(slivers)} sliver faces take no part in the search for walls: {', '.join(slivers[:10])}")
+    if not graph.seat.any():
+        out.append("no plane faces away from the access, so the part has no seat")
+    if not walls:
+        out.append("no wall was found: the part is one free surface")
+    return tuple(out)
+
+
