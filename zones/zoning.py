@@ -257,3 +257,17 @@ def _refusal(tool: ToolBody, form: Form, usable: NDArray[np.bool_], by_cutter: N
                 "value": round(tool.neck_length, 3), "limit": round(plane, 3)}
     return {"tool": tool.id, "reason": "adds less area than is worth a zone", "value": round(got, 3),
             "limit": round(least, 3)}
+
+
+def is_open(zone: ZoneArea, field: TipField) -> bool:
+    """Whether passes can leave the zone: at its deepest tips the free region leads out of the part.
+
+    A zone with walls or connections all round is closed.
+    """
+    from scipy import ndimage
+
+    deep = zone.tips[zone.tips[:, 2] <= np.quantile(zone.tips[:, 2], 0.1) + 1e-9]
+    labels, _ = ndimage.label(field.height <= float(deep[:, 2].max()) + 1e-3)
+    border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
+    inside = labels[field.lattice.cells(deep[:, :2])]
+    return bool(np.isin(inside[inside > 0], border[border > 0]).mean() > 0.5) if (inside > 0).any() else False

@@ -1,0 +1,142 @@
+"""From a STEP file and a setup to zones: the first half of the chain, shared by planning and the dry check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geometry.bvh import TriangleTree
+from geometry.errors import SetupError
+from geometry.frames import Placement
+from geometry.mesh import F64, TriangleMesh
+from geometry.part import Part
+from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.step import read_part
+from schemas.setup import Setup
+from service.convert import face_numbers, tool_bodies
+from zones.decompose import decompose
+from zones.model import Decomposition
+from zones.reach import Clearances, TipField, lattice_step
+from zones.zoning import ZoneArea, build_zones, face_regions, machinable_faces
+
+PLANNING_DENSITY = 25.0  # samples a mm²
+MOST_SAMPLES = 1_500_000
+AIR = 4.0  # mm beyond the cutter's radius that the planning lattice covers round the part
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A part in the setup frame with everything known before the first pass is laid.
+
+    samples : of the machinable area, planning density
+    lift    : mm, distance along the normal within which a touch counts as reach
+    """
+
+    setup: Setup
+    part: Part
+    tree: TriangleTree
+    obstacles: TriangleTree
+    decomposition: Decomposition
+    regions: dict[int, str]
+    samples: SurfaceSamples
+    fields: dict[str, TipField]
+    zones: tuple[ZoneArea, ...]
+    lift: float
+    warnings: tuple[str, ...]
+
+
+def mesh_chord(setup: Setup) -> float:
+    """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
+    q = setup.quality
+    return float(np.clip(0.15 * q.scallop_height_mm, 0.001, min(0.005, 0.4 * q.gouge_tolerance_mm)))
+
+
+def clearances(setup: Setup) -> Clearances:
+    """The radial clearances of a setup, mm."""
+    c = setup.clearance_mm
+    return Clearances(c.neck, c.shank, c.holder, c.rapid)
+
+
+def load(path: Path, setup: Setup) -> Part:
+    """The part of a STEP file in the setup frame."""
+    p = setup.placement
+    placement = Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+    return read_part(path, placement=placement, solid=setup.part.solid, chord=mesh_chord(setup))
+
+
+def obstacle_mesh(part: Part, setup: Setup) -> TriangleMesh:
+    """The part and the fixture boxes, these grown by the rapid clearance, as one mesh."""
+    vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
+    n = len(part.mesh.vertices)
+    for fixture in setup.fixtures:
+        lo = np.array(fixture.box_mm[0]) - setup.clearance_mm.rapid
+        hi = np.array(fixture.box_mm[1]) + setup.clearance_mm.rapid
+        v, f = _box(lo, hi)
+        vertices.append(v)
+        faces.append((f + n).astype(np.int32))
+        ids.append(np.zeros(len(f), np.int32))
+        n += len(v)
+    return TriangleMesh(np.vstack(vertices), np.vstack(faces), np.concatenate(ids))
+
+
+def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
+    corners = np.array([[(lo, hi)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
+
+
+def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
+    """Read, decompose, measure reach, build zones.
+
+    Raises
+    ------
+    CamError
+        The part or the setup is wrong, or the reader ran out of its limits.
+    """
+    progress("read", 0.0)
+    part = load(path, setup)
+    progress("zones", 0.12)
+    tree = TriangleTree(part.mesh)
+    obstacles = TriangleTree(obstacle_mesh(part, setup)) if setup.fixtures else tree
+    decomposition = decompose(part)
+    samples = machinable_samples(part, decomposition, setup, PLANNING_DENSITY, 0)
+    lift = max(0.1 * setup.quality.scallop_height_mm, 1.5 * part.chord)
+    fields = {}
+    for k, body in enumerate(tool_bodies(setup)):
+        step = lattice_step(body)
+        fields[body.id] = TipField(obstacles, body, clearances(setup), part.bounds, body.radius + AIR, step,
+                                   setup.quality.stock_allowance_mm)
+        progress("zones", 0.14 + 0.08 * k / len(setup.tools))
+    regions = face_regions(part, decomposition, samples, tree)
+    zones = tuple(build_zones(samples, regions, fields, setup.quality.scallop_height_mm, lift))
+    progress("zones", 0.25)
+    return Prepared(setup, part, tree, obstacles, decomposition, regions, samples, fields, zones, lift,
+                    (*part.warnings, *decomposition.warnings))
+
+
+def machinable_samples(part: Part, decomposition: Decomposition, setup: Setup, density: float,
+                       seed: int) -> SurfaceSamples:
+    """Samples of the machinable area Ma.
+
+    density : samples a mm², less where the whole surface would take more than ``MOST_SAMPLES`` at seed 0
+    seed    : planning and proof use different ones
+    """
+    wanted = None if setup.operations.faces is None else set(face_numbers(setup.operations.faces))
+    excluded = set(face_numbers(setup.operations.exclude_faces))
+    known = {f.number for f in part.faces}
+    if unknown := sorted(((wanted or set()) | excluded) - known):
+        raise SetupError(f"faces {', '.join(f'F{f}' for f in unknown)} do not exist; the part has F1 to "
+                         f"F{len(part.faces)}", code="no_such_face", subjects=tuple(f"F{f}" for f in unknown),
+                         limit=len(part.faces), remedy="name faces of zones.json")
+    coarse = sample_surface(part.mesh, 4.0, seed=1234)
+    faces = machinable_faces(coarse, decomposition, wanted, excluded)
+    triangles = np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))
+    if seed == 0:
+        area = float(part.mesh.areas[triangles].sum())
+        density = min(density, MOST_SAMPLES / max(area, 1e-9))
+    return sample_surface(part.mesh, density, seed=seed, triangles=triangles)

@@ -1,0 +1,201 @@
+"""report.json and zones.json from what the chain found; plain dictionaries with the keys of the wire models."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.sampling import SurfaceSamples
+from schemas.setup import Setup, setup_sha256
+from service.prepare import Prepared
+from service.version import VERSION
+from toolpath.motion import Motion, Workingstep
+from toolpath.plan import Plan, ZonePlan
+from verify.model import Proof
+from zones.remainder import Remainder, explain
+from zones.zoning import ZoneArea, is_open
+
+RAPID_MM_MIN = 10000.0
+REMAINDER_FLOOR_MM2 = 0.005
+ZONES_KEYS = ("part", "walls", "connections", "channels", "zones", "remainder")
+
+
+def r(value: float, digits: int = 4) -> float | None:
+    """A number rounded for the wire; None where it is not finite."""
+    return round(float(value), digits) + 0.0 if math.isfinite(value) else None
+
+
+def faces(numbers: tuple[int, ...]) -> list[str]:
+    """Face ids of face numbers."""
+    return [f"F{n}" for n in numbers]
+
+
+def material_name(setup: Setup) -> str:
+    """Name of the material of a setup."""
+    return str(getattr(setup.material, "name", None) or getattr(setup.material, "id", None) or "material")
+
+
+def zones_document(report: dict[str, Any]) -> dict[str, Any]:
+    """The part of a report that is zones.json."""
+    return {k: report[k] for k in ZONES_KEYS}
+
+
+def _shape(ready: Prepared) -> dict[str, Any]:
+    d, part = ready.decomposition, ready.part
+    return {
+        "part": {"faces": len(part.faces), "volume_mm3": r(part.volume, 3),
+                 "bbox_mm": [[r(v) for v in row] for row in part.bounds.tolist()],
+                 "unit": part.unit, "mesh_chord_mm": part.chord, "mesh_deviation_mm": r(part.deviation, 6),
+                 "triangles": len(part.mesh.faces), "warnings": list(ready.warnings)},
+        "walls": [{"id": w.id, "faces": faces(w.faces), "sides": faces(w.sides), "thickness_mm": r(w.thickness, 3),
+                   "z_mm": [r(w.z_bottom), r(w.z_top)]} for w in d.walls],
+        "connections": [{"id": c.id, "walls": list(c.walls), "faces": faces(c.faces),
+                         "z_mm": [r(c.z_bottom), r(c.z_top)]} for c in d.connections],
+        "channels": [{"id": c.id, "walls": list(c.walls), "gap_min_mm": r(c.gap_min),
+                      "at_mm": [r(v) for v in c.at]} for c in d.channels],
+    }
+
+
+def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
+    return {"id": zone.id, "kind": zone.kind, "profile": None, "level": None,
+            "open": is_open(zone, ready.fields[zone.tool.id]), "region": zone.region, "form": str(zone.form),
+            "faces": faces(zone.faces), "access": ready.setup.access[0].id, "tool": zone.tool.id,
+            "axis": [0.0, 0.0, 1.0], "depth_mm": [r(zone.top), r(zone.bottom)],
+            "cutting_plane_mm": r(zone.plane), "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
+            "strategy": {"steep": "zlevel", "level": "floor" if zone.tool.kind != "ball" else "zigzag",
+                         "shallow": "zigzag"}[str(zone.form)],
+            "rejected": list(zone.rejected)}
+
+
+def _remainder(items: list[Remainder]) -> list[dict[str, Any]]:
+    return [{"faces": faces(x.faces), "area_mm2": r(x.area, 3), "reason": x.reason, "would_need": x.would_need,
+             "at_mm": [r(v) for v in x.at]} for x in items if x.area >= REMAINDER_FLOOR_MM2]
+
+
+def dry_report(ready: Prepared) -> dict[str, Any]:
+    """zones.json without a plan: what the tools at hand reach and what they do not."""
+    taken = np.zeros(len(ready.samples), np.bool_)
+    for z in ready.zones:
+        taken[z.samples] = True
+    rest = ready.samples.subset(~taken)
+    items = explain(rest, ready.regions, ready.fields, ready.part, ready.tree, ready.decomposition, ready.lift)
+    return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(items)}
+
+
+def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, zone: NDArray[np.int32],
+               given_up: NDArray[np.bool_]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """report.json without its files, and which proof samples stay uncut.
+
+    A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
+    """
+    proved = np.asarray(proof.proved, dtype=np.bool_)
+    rest = ~proved & (zone == 0)
+    items = explain(dense.subset(rest), ready.regions, ready.fields, ready.part, ready.tree, ready.decomposition,
+                    ready.lift, given_up[rest])
+    area = dense.area
+    total, done = float(area.sum()), float(area[proved].sum())
+    reach = float(area[proved | (zone > 0)].sum())
+    coverage = done / total if total > 0 else 0.0
+    remainder = _remainder(items)
+    findings = [f.as_dict() for f in proof.findings]
+    findings += _unmet(ready, made, coverage, remainder)
+    plans = {p.zone.id: p for p in made.zones}
+    steps = {s.id: s for s in made.steps}
+    report = {
+        **_shape(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
+        "labels": dict(ready.setup.labels),
+        "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
+        "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
+        "steps": [_step(s) for s in made.steps], "remainder": remainder, "findings": findings,
+        "finding_counts": dict(proof.counts), "coverage": r(coverage, 6),
+        "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
+        "machinable_area_mm2": r(total, 3), "machining_time_s": r(proof.machining_time, 1),
+        "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
+            "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
+            "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
+        "tools": _tools(ready, proof), "files": [], "version": VERSION,
+    }
+    return report, rest
+
+
+def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Findings that no program can have: nothing could be cut, or less than the setup demands."""
+    least = ready.setup.quality.coverage_min
+    if not made.steps:
+        would = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
+        return [{"kind": "nothing_cut", "message": "no tool of the setup can cut anything of what was asked for",
+                 "would_need": would}]
+    if coverage < least:
+        return [{"kind": "coverage", "depth": r(coverage, 6), "limit": least,
+                 "message": f"coverage {coverage:.4f} is below coverage_min {least:g}"}]
+    return []
+
+
+def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict[str, Workingstep],
+             proof: Proof) -> dict[str, Any]:
+    out = _zone(ready, zone)
+    result = proof.zones.get(zone.id)
+    step = steps.get(plan.step) if plan is not None and plan.step else None
+    out["scallop_mm"] = {"requested": ready.setup.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
+    out["passes"], out["cutting_length_mm"], out["machining_time_s"] = 0, 0.0, 0.0
+    if plan is not None:
+        out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes)
+    if step is not None:
+        out.update(cutting_length_mm=r(cutting_length(step), 1), machining_time_s=r(step_time(step), 1), step=step.id)
+    if result is not None:
+        out["scallop_mm"] |= {"p50": r(result.scallop_p50, 5), "p99": r(result.scallop_p99, 5),
+                              "max": r(result.scallop_max, 5)}
+        out.update(gouge_mm=r(result.gouge, 5), coverage=r(result.coverage, 6),
+                   proved_area_mm2=r(result.proved_area, 3))
+    return out
+
+
+def cutting_length(step: Workingstep) -> float:
+    """Length of the cutting passes of a step, mm."""
+    return float(sum(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum() for t in step.trajectories
+                     if t.motion is Motion.CUT))
+
+
+def step_time(step: Workingstep) -> float:
+    """Time of a step at its feeds, rapids at ``RAPID_MM_MIN``, s."""
+    total = 0.0
+    for t in step.trajectories:
+        length = float(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum())
+        total += 60.0 * length / (RAPID_MM_MIN if t.motion is Motion.RAPID else t.feed)
+    return total
+
+
+def _step(step: Workingstep) -> dict[str, Any]:
+    return {"id": step.id, "name": step.name, "zone": step.zone, "tool": step.tool.id, "operation": step.operation,
+            "strategy": step.strategy, "faces": faces(step.faces), "spindle_rpm": r(step.spindle_rpm, 1),
+            "feed_mm_min": r(step.feed, 1), "side_step_mm": r(step.side_step),
+            "cutting_length_mm": r(cutting_length(step), 1), "machining_time_s": r(step_time(step), 1),
+            "points": int(sum(len(t.points) for t in step.trajectories))}
+
+
+def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
+    out = []
+    for f in ready.fields.values():
+        t = f.tool
+        slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
+        out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),
+                    "slenderness": r(slender, 2), "deflection_mm": None,
+                    "neck_clearance_mm": r(t.neck_clearance(ready.setup.clearance_mm.neck))})
+    return out
+
+
+def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) -> dict[str, Any]:
+    """The answer to ``zonemill verify``."""
+    total = float(dense.area.sum())
+    done = float(dense.area[np.asarray(proof.proved, dtype=np.bool_)].sum())
+    return {"state": "proved" if proof.clean else "unproved",
+            "findings": [f.as_dict() for f in proof.findings], "finding_counts": dict(proof.counts),
+            "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
+            "coverage": r(done / total if total else 0.0, 6), "gouge_max_mm": r(proof.gouge_max, 5),
+            "machining_time_s": r(proof.machining_time, 1), "cutting_length_mm": r(proof.cutting_length, 1),
+            "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
+                      "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes)},
+            "part": _shape(ready)["part"], "version": VERSION}
