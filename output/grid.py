@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from output.model import Motion, Trajectory, Workingstep, Workplan
+from output.model import Workplan
+from toolpath.motion import Motion, Trajectory, Workingstep
 
 I64 = NDArray[np.int64]
 

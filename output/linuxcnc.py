@@ -22,8 +22,9 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.toolbody import ToolBody
 from output.grid import GRID, I64, PER_MM, check_plan, grid_path, link, to_grid
-from output.model import Motion, Trajectory, Workingstep, Workplan
+from output.model import Workplan
 from output.text import ascii_text, decimal, face_words, step_title, tool_name
+from toolpath.motion import Motion, Trajectory, Workingstep
 
 LINE = 100
 """Longest line of a program, characters."""

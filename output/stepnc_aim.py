@@ -15,10 +15,11 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.toolbody import ToolBody
 from output.grid import I64, check_plan, grid_path, link, to_grid
-from output.model import Motion, Trajectory, Workingstep, Workplan
+from output.model import Workplan
 from output.part21 import Part21, quoted, real, reals, refs
 from output.stepnc_words import header_words, operation_words, region_name, setup_words, stock_box
 from output.text import decimal, step_title, tool_name
+from toolpath.motion import Motion, Trajectory, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
 _TYPE = {

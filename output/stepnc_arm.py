@@ -17,7 +17,7 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.toolbody import ToolBody
 from output.grid import GRID, I64, check_plan, grid_path, link, to_grid
-from output.model import Motion, Trajectory, Workingstep, Workplan
+from output.model import Workplan
 from output.part21 import Part21, quoted, real, reals, refs
 from output.stepnc_words import (
     header_words,
@@ -29,6 +29,7 @@ from output.stepnc_words import (
     stock_box,
 )
 from output.text import step_title, tool_name
+from toolpath.motion import Motion, Trajectory, Workingstep
 
 _TYPE = {
     Motion.RAPID: ".CONNECT.", Motion.APPROACH: ".APPROACH.", Motion.CUT: ".TRAJECTORY_PATH.",

@@ -6,8 +6,9 @@ import numpy as np
 
 from geometry.errors import OutputError
 from output.grid import GRID, I64, to_grid
-from output.model import Motion, Workingstep, Workplan
+from output.model import Workplan
 from output.text import face_words
+from toolpath.motion import Motion, Workingstep
 
 
 def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:

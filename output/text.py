@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 
 from geometry.toolbody import ToolBody
-from output.model import Workingstep
+from toolpath.motion import Workingstep
 
 _PLAIN = str.maketrans({
     "ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "ø": "oe", "Ø": "Oe", "æ": "ae",

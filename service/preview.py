@@ -21,10 +21,10 @@ from PIL.ImageFont import FreeTypeFont
 
 from geometry.mesh import F64
 from geometry.part import EdgeKind, Part
-from output.model import Motion, Trajectory, Workingstep
 from output.text import ascii_text, decimal
 from service.camera import Camera
 from service.raster import F32, Canvas
+from toolpath.motion import Motion, Trajectory, Workingstep
 from zones.model import Decomposition
 
 SIZE = (1760, 960)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.toolbody import HolderSegment, ToolBody
-from output.model import Motion, StockBox, Trajectory, Workingstep, Workplan
+from output.model import StockBox, Workplan
+from toolpath.motion import Motion, Trajectory, Workingstep
 
 HOLDER = (HolderSegment(20.0, 20.0, 30.0),)
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)

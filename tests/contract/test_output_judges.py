@@ -6,12 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from output.linuxcnc import write_linuxcnc
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from tests.synthetic_plan import BALL, long_plan, plan, step, tiny
+from toolpath.motion import Motion
+from verify.reader import read_program
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 CHECK = SHARED / "stepnc" / "p21check.py"
@@ -67,3 +71,20 @@ def test_linuxcnc_accepts(job, tmp_path):
     if done.returncode == 2:
         pytest.skip("LinuxCNC's interpreter could not be run here: " + done.stderr.strip()[-200:])
     assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
+def test_the_verifiers_reader_finds_the_planned_path(job):
+    """verify imports nothing of output: what it reads must be the plan, point for point, within the grid."""
+    wanted = job()
+    program = read_program(write_linuxcnc(wanted), tools={t.number for t in wanted.tools})
+    assert not program.remarks
+    for s in wanted.steps:
+        feeds = [t.points for t in s.trajectories if t.motion is not Motion.RAPID]
+        planned = np.concatenate([np.hstack([p[:-1], p[1:]]) for p in feeds])
+        moving = np.abs(planned[:, :3] - planned[:, 3:]).max(axis=1) > 1.5e-4  # longer than the grid: surely written
+        mine = (program.tool == s.tool.number) & (program.kind != 0)
+        read = np.hstack([program.start[mine], program.end[mine]])
+        distance, _ = cKDTree(read).query(planned[moving], p=np.inf)
+        assert distance.max() <= 0.5e-4 + 1e-9
+    assert np.nanmax(program.feed) == max(t.feed for s in wanted.steps for t in s.trajectories)

@@ -6,11 +6,11 @@ from PIL import Image
 
 from geometry.mesh import TriangleMesh
 from geometry.part import EdgeInfo, EdgeKind, FaceInfo, Part
-from output.model import Motion
 from service.camera import Camera
 from service.preview import CONNECTION, REMAINDER, SIZE, TOOLS, draw_preview, scale_length, wall_colour
 from service.raster import Canvas
 from tests.synthetic_plan import BALL, line, step
+from toolpath.motion import Motion
 from zones.model import Connection, Decomposition, Wall
 
 

@@ -8,13 +8,14 @@ import pytest
 
 from geometry.errors import OutputError
 from output.grid import grid_path
-from output.model import Motion, StockBox, Trajectory
+from output.model import StockBox
 from output.part21 import quoted, real, time_stamp
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from output.stepnc_words import pass_plane_normal
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, line, long_plan, plan, step, tiny
+from toolpath.motion import Motion, Trajectory
 
 WRITERS = {"tiny.arm.stpnc": write_stepnc_arm, "tiny.stpnc": write_stepnc_aim}
 both = pytest.mark.parametrize("write", WRITERS.values(), ids=["arm", "aim"])
