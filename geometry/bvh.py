@@ -50,7 +50,7 @@ def _arrays(mesh: TriangleMesh, leaf_size: int) -> TreeArrays:
 def _empty() -> TreeArrays:
     """A root without triangles: every query misses it."""
     none = np.zeros(0, np.int32)
-    column = np.array([[np.inf, -np.inf, np.inf, -np.inf, -np.inf, 0.0, 0.0, -np.inf]])
+    column = np.array([[np.inf, -np.inf, np.inf, -np.inf, -np.inf, 0.0, 0.0, -np.inf, 0.0, 1.0]])
     return TreeArrays(np.full((1, 3), np.inf), np.full((1, 3), -np.inf), column, np.full(1, -1, np.int32),
                       np.full(1, -1, np.int32), np.zeros(1, np.int32), np.zeros(1, np.int32), none,
                       np.zeros((0, 3, 3)), np.zeros((0, 5)))

@@ -5,7 +5,8 @@ Notation
     (``child``, ``child + 1``), so the sibling of node i > 0 is ``((i - 1) ^ 1) + 1``.
     A leaf holds the triangles ``first .. first + size - 1`` in leaf order; ``order`` maps leaf order
     to the triangle numbers of the mesh.
-    column row: x_lo, x_hi, y_lo, y_hi, z_max, a, b, c with z <= a x + b y + c for every point of the node.
+    column row: x_lo, x_hi, y_lo, y_hi, z_max, a, b, c, sin, 1/cos with z <= a x + b y + c for every point of the
+    node, and sine and reciprocal cosine of the angle by which that plane leans.
     facet row: unit normal turned upwards (nx, ny, nz >= 0), orientation seen from above (+1/-1), quality.
 """
 
@@ -23,7 +24,7 @@ from geometry.kernels.options import KERNEL
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
-LEAF_SIZE = 4
+LEAF_SIZE = 3
 BINS = 16
 # Traversals keep one bit a level in a 64-bit trail. From this depth on the builder halves by count,
 # which adds at most 31 levels for 2**31 triangles.
@@ -38,7 +39,7 @@ class TreeArrays(NamedTuple):
     """The hierarchy as plain arrays; njit functions take it as one argument.
 
     lower, upper : (k, 3) float64, mm    bounding boxes
-    column       : (k, 8) float64        box in plan, top z, and a plane above everything in the node
+    column       : (k, 10) float64       box in plan, top z, and a plane above everything in the node
     child        : (k,) int32            first of two adjacent children, -1 in a leaf
     parent       : (k,) int32            -1 at the root
     first, size  : (k,) int32            range of a leaf in leaf order, size 0 in inner nodes
@@ -217,10 +218,10 @@ def facet_rows(corners: F64):
 
 @njit(**KERNEL)
 def column_rows(node_lo, node_hi, child, parent, first, count, corners):
-    """(k, 8) plan box, top z and covering plane of each node; the plane leans as the node does on average."""
+    """(k, 10) plan box, top z and covering plane of each node; the plane leans as the node does on average."""
     k = node_lo.shape[0]
     normal = np.zeros((k, 3))
-    out = np.zeros((k, 8))
+    out = np.zeros((k, 10))
     for i in range(k - 1, -1, -1):
         for t in range(first[i], first[i] + count[i]):
             p, q, r = corners[t, 0], corners[t, 1], corners[t, 2]
@@ -238,8 +239,11 @@ def column_rows(node_lo, node_hi, child, parent, first, count, corners):
         out[i, 4] = node_hi[i, 2]
         n = normal[i]
         if n[2] > 0.05 * math.sqrt(n[0] * n[0] + n[1] * n[1]):
+            length = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
             out[i, 5], out[i, 6] = -n[0] / n[2], -n[1] / n[2]
+            out[i, 8], out[i, 9] = math.sqrt(n[0] * n[0] + n[1] * n[1]) / length, length / n[2]
         out[i, 7] = -np.inf
+        out[i, 9] = max(out[i, 9], 1.0)
     for leaf in range(k):
         for t in range(first[leaf], first[leaf] + count[leaf]):
             i = leaf

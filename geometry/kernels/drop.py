@@ -11,8 +11,8 @@ the triangle it is the answer; otherwise the maximum lies on an edge that faces 
 exactly rho = R touches the side of the cutter and lifts nothing. At R = 0 the tip is the height of the mesh.
 
 Traversal: a node cannot lift the tip above its bound, the maximum over the node's box of the node's covering
-plane (or top z) less a tangent plane of h, which lies below h everywhere. The child with the higher bound
-goes first; what is left behind is one bit a level in a 64-bit trail, so that no stack is needed.
+plane (or top z) less a paraboloid that lies below h. The child with the higher bound goes first; what is left
+behind is one bit a level in a 64-bit trail, so that no stack is needed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from geometry.kernels.options import KERNEL
 
 BLOCK_TOLERANCE = 1e-9  # mm: a lift below this does not block
 ROOT_STEPS = 60
-RIM = 0.98  # tangent planes of h are taken no farther out than this part of the corner radius
+RIM = 0.98  # tangents of h are taken no farther out than this part of the corner radius
 NOTHING = -np.inf
 
 
@@ -100,6 +100,26 @@ def _bull_edge(lo, hi, q, m, R, r, d):
 
 
 @njit(**KERNEL)
+def _edge_bound(z0, ez, length, u0, lo, hi, q, r, d):
+    """No point of the edge lifts a bull nose above this: ``_bound`` for a line, and no root to find."""
+    m = ez / length
+    near = lo if lo > 0.0 else (hi if hi < 0.0 else 0.0)
+    near2 = q * q + near * near
+    slant = math.sqrt(1.0 + m * m)
+    t = min(r * abs(m) / slant, RIM * r)
+    rho0 = d + t
+    if near2 > rho0 * rho0:
+        t = min(math.sqrt(near2) - d, RIM * r)
+        rho0 = d + t
+    root = math.sqrt((r - t) * (r + t))
+    k = t / (root * rho0)
+    u = hi if m > 0.0 else lo
+    if k > 1e-12:
+        u = min(max(m / k, lo), hi)
+    return z0 + (u - u0) * m - (r - root) - 0.5 * k * (q * q + u * u - rho0 * rho0)
+
+
+@njit(**KERNEL)
 def _edge(a, b, x, y, R, r, d, best):
     """Tip that the edge a-b allows and the place of the contact on it (0 at a, 1 at b); -inf: no lift."""
     if max(a[2], b[2]) <= best:
@@ -137,6 +157,8 @@ def _edge(a, b, x, y, R, r, d, best):
             height = R - math.sqrt(max((half - u) * (half + u), 0.0))
         else:
             height = R - half * (length / slant)
+    elif _edge_bound(a[2], ez, length, u0, lo, hi, q, r, d) <= best:
+        return NOTHING, 0.0
     elif ez >= 0.0:
         u, height = _bull_edge(lo, hi, q, ez / length, R, r, d)
     else:
@@ -199,7 +221,13 @@ def _triangle(v, facet, x, y, R, r, d, best):
 
 @njit(**KERNEL)
 def _bound(node, x, y, R, r, d, best):
-    """No point of the node lifts the tip above this; -inf where that is clear to be no higher than best."""
+    """No point of the node lifts the tip above this; -inf where that is clear to be no higher than best.
+
+    As a function of w = rho^2, h is convex, so h(rho) >= h(rho0) + k/2 (w - rho0^2) with k = h'(rho0) / rho0:
+    a paraboloid below the cutter, whatever its kind. Less that, the covering plane has its maximum over the
+    box where each coordinate has its own. rho0 is where the plane itself would touch (k = tan / rho0, for a
+    flat end the multiplier of rho <= R), or the nearest point of the box if that is farther out.
+    """
     if node[4] <= best:
         return NOTHING
     x_lo, x_hi, y_lo, y_hi = node[0] - x, node[1] - x, node[2] - y, node[3] - y
@@ -208,46 +236,29 @@ def _bound(node, x, y, R, r, d, best):
     near2 = u * u + v * v
     if near2 > R * R:
         return NOTHING
-    # h(rho) >= (rho - d)^2 / 2 r for a ball at no cost; for the others the top alone.
     by_top = node[4]
     if d <= 0.0 and r > 0.0:
         by_top -= near2 / (2.0 * r)
         if by_top <= best:
             return NOTHING
-    a, b = node[5], node[6]
-    # Tangent plane of h near the place where the covering plane would touch.
-    h0 = gx = gy = u = v = 0.0
-    if r > 0.0:
-        u, v = min(max(0.5 * (x_lo + x_hi), -R), R), min(max(0.5 * (y_lo + y_hi), -R), R)
-        rho2 = u * u + v * v
-        if d <= 0.0:
-            limit = RIM * r * r
-            if rho2 > limit:
-                f = math.sqrt(limit / rho2)
-                u *= f
-                v *= f
-                rho2 = limit
-            root = math.sqrt(r * r - rho2)
-            h0 = r - root
-            gx, gy = u / root, v / root
-        else:
-            rho = math.sqrt(rho2)
-            t = rho - d
-            if t > 0.0:
-                if t > RIM * r:
-                    t = RIM * r
-                    f = (d + t) / rho
-                    u *= f
-                    v *= f
-                    rho = d + t
-                root = math.sqrt((r - t) * (r + t))
-                h0 = r - root
-                f = t / (root * rho)
-                gx, gy = f * u, f * v
-    da, db = a - gx, b - gy
-    x_far = min(x_hi, R) if da > 0.0 else max(x_lo, -R)
-    y_far = min(y_hi, R) if db > 0.0 else max(y_lo, -R)
-    by_plane = node[7] + a * x + b * y + gx * u + gy * v - h0 + da * x_far + db * y_far
+    a, b, sine, slant = node[5], node[6], node[8], node[9]
+    if R <= 0.0:
+        return min(by_top, node[7] + a * x + b * y)
+    rho0 = d + r * sine
+    if near2 > rho0 * rho0 and r > 0.0:
+        rho0 = math.sqrt(near2)
+        t = min(rho0 - d, RIM * r)
+        rho0 = d + t
+        root = math.sqrt((r - t) * (r + t))
+        k = t / (root * rho0)
+        h0 = r - root
+    else:
+        k = slant / r if d <= 0.0 else sine * slant / rho0
+        h0 = r - r / slant
+    if not k > 1e-12:
+        return by_top
+    u, v = min(max(a / k, x_lo), x_hi), min(max(b / k, y_lo), y_hi)
+    by_plane = node[7] + a * (x + u) + b * (y + v) - h0 - 0.5 * k * (u * u + v * v - rho0 * rho0)
     return min(by_top, by_plane)
 
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from drop_shapes import CUTTERS, SHAPES, smooth
+from drop_shapes import CUTTERS, SHAPES, smooth, soup
 from naive_drop import drop, lift_of_points
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_contacts, drop_grid, drop_tips
 from geometry.kernels.drop import drop_tip_below
+from geometry.mesh import TriangleMesh
 from geometry.rays import heights
 from geometry.sampling import sample_surface
 
@@ -93,6 +94,16 @@ def test_radius_zero_is_the_height_of_the_mesh(shape):
         inside = ((w > 0).all(1) | (w < 0).all(1)) & (np.abs(n[:, 2]) > 1e-6)
         w = w[inside] / w[inside].sum(1, keepdims=True)
         assert z == pytest.approx((w * mesh.triangles[inside, :, 2]).sum(1).max(initial=-np.inf), abs=1e-9)
+
+
+@pytest.mark.parametrize("cutter", CUTTERS)
+def test_no_bound_hides_a_triangle(cutter):
+    # One leaf of everything has no bounds to go wrong.
+    rough = soup(9, 3000)
+    for mesh in (smooth(40), TriangleMesh(rough.vertices * [3.0, 3.0, 1.0], rough.faces)):
+        xy = _points(mesh, 300, seed=7)
+        plain = drop_tips(TriangleTree(mesh, leaf_size=len(mesh.faces)), xy, *CUTTERS[cutter])
+        np.testing.assert_allclose(drop_tips(TriangleTree(mesh), xy, *CUTTERS[cutter]), plain, rtol=0, atol=1e-11)
 
 
 def test_grid_is_the_points_one_by_one():

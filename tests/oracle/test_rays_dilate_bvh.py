@@ -124,7 +124,8 @@ def test_hierarchy_holds_every_triangle_once_and_covers_it(shape):
         points = a.corners[a.first[node]:a.first[node] + a.size[node]].reshape(-1, 3)
         while node >= 0:
             assert (points >= a.lower[node]).all() and (points <= a.upper[node]).all()
-            x_lo, x_hi, y_lo, y_hi, top, sx, sy, c = a.column[node]
+            x_lo, x_hi, y_lo, y_hi, top, sx, sy, c, sine, slant = a.column[node]
+            assert [sine * slant, slant] == pytest.approx([np.hypot(sx, sy), np.sqrt(1 + sx * sx + sy * sy)], rel=1e-9)
             assert [x_lo, y_lo] == list(a.lower[node, :2]) and [x_hi, y_hi, top] == list(a.upper[node])
             assert (points[:, 2] <= points[:, 0] * sx + points[:, 1] * sy + c + 1e-9).all()
             parent = a.parent[node]
