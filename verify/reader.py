@@ -402,8 +402,8 @@ class Reader:
     def _line_to(self, target: list[float], kind: int, feed: float) -> None:
         s = self.s
         start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
-        s.position = target
-        if kind == RAPID and s.offset is None and s.tool > 0 and start[2] != target[2]:
+        was, s.position = s.position, target
+        if kind == RAPID and s.offset is None and s.tool > 0 and target[2] == target[2] and was[2] != target[2]:
             self._remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
         if not any(math.isnan(v) for v in target):
             self.rows.append((*start, *target, kind, feed, s.tool, self.line))  # type: ignore[arg-type]

@@ -1,5 +1,7 @@
 """Residuals against closed forms."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -86,10 +88,10 @@ def test_the_grid_changes_nothing(tool):
     n = rng.normal(size=(400, 3))
     n /= np.linalg.norm(n, axis=1)[:, None]
     walk = rng.uniform(-6, 6, (61, 3)) * [1, 1, 0.3]
-    res, who = residual_on_normals(p, n, np.ones(400), path(walk), [tool])
+    res, _who = residual_on_normals(p, n, np.ones(400), path(walk), [tool])
     for i in range(400):
         best = 1.0
-        for a, b in zip(walk[:-1], walk[1:], strict=True):
+        for a, b in itertools.pairwise(walk):
             lo, hi = cutter_interval(*(p[i] - a), *n[i], *(b - a), tool.radius, tool.corner_radius, tool.flute_length)
             if lo <= hi and hi >= -1e-6:
                 best = min(best, lo)

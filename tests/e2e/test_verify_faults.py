@@ -1,0 +1,203 @@
+"""Faults planted into a right program: each is found, of the right kind, on the right line, as deep as planted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import ProgramError
+from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, line_of, program, scored, text
+from verify.model import FindingKind, StockKind
+from verify.prove import Proof, prove
+
+PART = block()
+SCORED = scored(PART)
+
+
+def run(lines, tools=(TOOL,), setup=SETUP, threads=2) -> Proof:
+    return prove([("pocket.ngc", text(lines))], PART, tools, setup, SCORED, ZONES, threads=threads)
+
+
+def first(proof, kind):
+    found = [f for f in proof.findings if f.kind == kind]
+    assert found, (kind, proof.counts)
+    return found[0]
+
+
+def test_a_right_program_has_no_finding():
+    proof = run(program())
+    assert proof.clean and proof.gouge_max < 1e-9
+    assert proof.zones["Z1"].coverage == proof.zones["Z2"].coverage == 1.0
+    assert proof.machining_time == pytest.approx(360.4, abs=5) and proof.minutes.keys() == {1}
+
+
+@pytest.mark.parametrize("kind", [StockKind.PART_OFFSET, StockKind.CYLINDER])
+def test_other_blanks_are_cut_as_well(kind):
+    assert run(program(), setup=replace(SETUP, stock_kind=kind, margin=0.5)).clean
+
+
+def test_gouge_of_a_fiftieth():
+    lines = program()
+    at = line_of(lines, "Y4.0", -1) + 1
+    lines[at - 1] += " Z-5.02"
+    lines.insert(at, "Z-5")
+    found = first(run(lines), FindingKind.GOUGE)
+    assert found.line == at and found.face == "F11" and found.depth == pytest.approx(0.02, abs=1e-3)
+
+
+def test_gouge_of_a_wall():
+    lines = program()
+    at = line_of(lines, "X8 Y4", -1)
+    lines[at - 1] = "X8.03 Y4"
+    proof = run(lines)
+    found = first(proof, FindingKind.GOUGE)
+    assert found.line in (at, at + 1) and found.depth == pytest.approx(0.03, rel=0.1)
+
+
+def test_gouge_within_the_tolerance_is_none():
+    lines = program()
+    at = line_of(lines, "X8 Y4", -1)
+    lines[at - 1] = "X8.008 Y4"
+    assert run(lines).clean
+
+
+def test_missing_retract():
+    lines = program()
+    at = line_of(lines, "G0 Z20", -1)
+    lines[at - 1] = "G0 X18"
+    found = first(run(lines), FindingKind.RAPID)
+    assert found.line == at
+
+
+def test_rapid_too_near_to_stock():
+    lines = program()
+    at = line_of(lines, "G0 Z20", -1)
+    lines.insert(at - 1, "G0 Z0.2")
+    lines.insert(at, "G0 X-7.5")
+    proof = run(lines)
+    assert first(proof, FindingKind.RAPID).line == at + 1
+    assert "brings" in first(proof, FindingKind.RAPID).message
+
+
+def test_shank_hit():
+    proof = run(program(), tools=(replace(TOOL, flute_length=4.0, neck_length=4.0),))
+    found = first(proof, FindingKind.COLLISION)
+    assert "shank" in found.message and found.line > line_of(program(), "(layer -4.000)")
+    assert found.depth == pytest.approx(1.0, abs=0.01)
+
+
+def test_holder_hit():
+    proof = run(program(), tools=(replace(TOOL, flute_length=4.0, neck_length=4.5, shank_diameter=4.0, stickout=4.8),))
+    found = first(proof, FindingKind.COLLISION)
+    assert "holder" in found.message and found.line > line_of(program(), "(layer -4.500)")
+
+
+def test_shank_near_the_wall_is_rubbing():
+    tool = replace(TOOL, flute_length=4.0, neck_diameter=4.0, neck_length=4.4, shank_diameter=4.0)
+    assert run(program(), tools=(tool,)).clean
+    part_way = replace(TOOL, flute_length=4.0, neck_length=4.5, shank_diameter=4.0002)
+    assert first(run(program(), tools=(part_way,)), FindingKind.RUBBING).depth < SETUP.clearance_shank
+
+
+def test_clamp_hit():
+    clamp = np.array([[-9.0, -15, 0], [-7, -3, 4]])
+    found = first(run(program(), setup=replace(SETUP, fixtures=(clamp,))), FindingKind.COLLISION)
+    assert "fixture" in found.message
+    held = np.array([[-40.0, -15, -10], [-32, 15, 4]])
+    assert run(program(), setup=replace(SETUP, fixtures=(held,))).clean
+
+
+def test_feed_plunge():
+    lines = program()
+    at = line_of(lines, "G1 X7 Y0 Z-2.000 F400")
+    lines[at - 1] = "G1 Z-2.0 F400"
+    found = first(run(lines), FindingKind.PLUNGE)
+    assert found.line == at and found.depth == pytest.approx(0.5, abs=1e-6)
+
+
+def test_descent_in_air_is_no_plunge():
+    lines = program()
+    at = line_of(lines, "G0 Z20", -1)
+    lines[at - 1:at - 1] = ["G1 Z3", "G1 Z-5"]
+    assert run(lines).clean
+
+
+def test_neck_in_stock_that_the_flutes_do_not_reach():
+    lines = program(step=0.5)
+    tool = replace(TOOL, flute_length=0.4)
+    assert "neck" in first(run(lines, tools=(tool,)), FindingKind.COLLISION).message
+
+
+def test_wrong_length_offset():
+    lines = program()
+    at = line_of(lines, "G0 G43 H1 Z20")
+    lines[at - 1] = "G0 G43 H2 Z20"
+    found = first(run(lines, tools=(TOOL, OTHER)), FindingKind.PROGRAM)
+    assert found.line == at and "H2" in found.message
+
+
+def test_no_length_offset():
+    lines = program()
+    at = line_of(lines, "G0 G43 H1 Z20")
+    lines[at - 1] = "G0 Z20"
+    assert first(run(lines), FindingKind.PROGRAM).line == at
+
+
+def test_missing_pass():
+    lines = program()
+    start = line_of(lines, "Y2.0", -2)
+    kept = [line for k, line in enumerate(lines, 1) if k < start or k > line_of(lines, "Y0.0", -1)]
+    cut = line_of(kept, "G1 X8 Y-4", -1)
+    proof = run([line for k, line in enumerate(kept, 1) if not cut <= k < cut + 5])
+    floor = [f for f in proof.findings if f.kind == FindingKind.RESIDUAL and f.zone == "Z1"]
+    assert floor and all(f.depth == pytest.approx(0.5, abs=1e-6) for f in floor)
+    assert proof.zones["Z1"].coverage < 0.9
+
+
+def test_inch_for_mm():
+    lines = program()
+    lines[1] = lines[1].replace("G21", "G20")
+    proof = run(lines, setup=replace(SETUP, travel=np.array([[-50.0, 50], [-50, 50], [-60, 100]])))
+    assert first(proof, FindingKind.LIMIT).line == line_of(lines, "X-7 Y0")
+    assert proof.counts["residual"] > 0
+
+
+def test_tool_that_is_not_in_the_table():
+    lines = program()
+    lines[2] = "T7 M6"
+    with pytest.raises(ProgramError, match="T7") as caught:
+        run(lines)
+    assert "line 3" in caught.value.subjects
+
+
+def test_wrong_tool_in_the_spindle_is_a_gouge():
+    lines = [line.replace("T1", "T2").replace("H1", "H2") for line in program()]
+    found = first(run(lines, tools=(TOOL, OTHER)), FindingKind.GOUGE)
+    assert found.depth > 0.9
+
+
+def test_below_the_table():
+    found = first(run(program(), setup=replace(SETUP, seat_z=-4.9)), FindingKind.COLLISION)
+    assert found.line == line_of(program(), "G1 X7 Y0 Z-5.000 F400") and found.depth == pytest.approx(0.1)
+
+
+def test_program_of_another_zero_meets_nothing():
+    lines = [line.replace("Z-", "Z3") if line.startswith("G1 X7") else line for line in program()]
+    assert first(run(lines), FindingKind.RESIDUAL).zone in ZONES
+
+
+def test_threads_do_not_change_a_byte():
+    lines = program()
+    lines[line_of(lines, "X8 Y4", -1) - 1] = "X8.03 Y4"
+    one, two = run(lines, threads=1), run(lines, threads=2)
+    assert one.as_dict() == two.as_dict()
+    assert one.residual.tobytes() == two.residual.tobytes() and one.line.tobytes() == two.line.tobytes()
+
+
+def test_a_program_without_zones_is_still_watched():
+    nobody = replace(SCORED, zone=np.zeros_like(SCORED.zone))
+    lines = program()
+    at = line_of(lines, "G0 Z20", -1)
+    lines[at - 1] = "G0 X18"
+    proof = prove([("foreign.nc", text(lines))], PART, [TOOL], SETUP, nobody, ())
+    assert first(proof, FindingKind.RAPID).line == at and "residual" not in proof.counts

@@ -1,0 +1,130 @@
+"""The NC reader: moves by hand, modal states, arcs, cycles."""
+
+import math
+
+import numpy as np
+import pytest
+
+from verify.reader import FEED, RAPID, read_program
+
+HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
+TAIL = "M30\n%\n"
+
+
+def read(body, **options):
+    return read_program(HEAD + body + TAIL, **options)
+
+
+def cuts(program):
+    keep = program.kind == FEED
+    return program.start[keep], program.end[keep]
+
+
+def test_modal_lines():
+    p = read("G1 Z-1 F200\nX10\nY5.5 F300\nN40 G1X0Y0Z-.5\nG0 Z10\n")
+    assert p.kind.tolist() == [RAPID, FEED, FEED, FEED, FEED, RAPID]
+    np.testing.assert_array_equal(p.end[1:], [[0, 0, -1], [10, 0, -1], [10, 5.5, -1], [0, 0, -0.5], [0, 0, 10]])
+    np.testing.assert_array_equal(p.feed[1:5], [200, 200, 300, 300])
+    assert p.line[1:].tolist() == [7, 8, 9, 10, 11] and (p.tool == 1).all() and p.remarks == ()
+
+
+def test_comments_words_run_together_and_several_g_words():
+    p = read("(one) G1 G17 Z-1 F200 ; tail\n; only\n(a)(b)\n\ng1x1y2z3f4\nG0G90X5\n")
+    np.testing.assert_array_equal(p.end[1:], [[0, 0, -1], [1, 2, 3], [5, 2, 3]])
+
+
+def test_relative_and_inch():
+    p = read("G1 F100\nG91 X1\nX1 Y1\nG90 G20 X1 F10\nG21 X2\n")
+    np.testing.assert_allclose(p.end[1:], [[1, 0, 10], [2, 1, 10], [25.4, 1, 10], [2, 1, 10]])
+    assert p.feed[3] == pytest.approx(254)
+
+
+@pytest.mark.parametrize("plane, i, j, k", [("G17", 0, 1, 2), ("G18", 2, 0, 1), ("G19", 1, 2, 0)])
+@pytest.mark.parametrize("word, sense", [("G2", -1), ("G3", 1)])
+def test_arcs_in_three_planes(plane, i, j, k, word, sense):
+    """A quarter from (r, 0) round the centre at the start minus r, with a rise along the third axis."""
+    r, rise = 5.0, 2.0
+    start = np.array([0.0, 0.0, 10.0])
+    end = start.copy()
+    end[i] -= r
+    end[j] += sense * r
+    end[k] += rise
+    xyz = " ".join(f"{a}{v:.4f}" for a, v in zip("XYZ", end, strict=True))
+    p = read(f"{plane} {word} {xyz} {'IJK'[i]}{-r} F100\nG17\n")
+    _, e = cuts(p)
+    centre = start[[i, j]] - [r, 0]
+    np.testing.assert_allclose(np.hypot(*(e[:, [i, j]] - centre).T), r, atol=1e-9)
+    angle = np.arctan2(e[:, j] - centre[1], e[:, i] - centre[0]) * sense
+    assert (np.diff(angle) > 0).all() and angle[-1] == pytest.approx(math.pi / 2)
+    np.testing.assert_allclose(e[:, k], start[k] + rise * angle / (math.pi / 2), atol=1e-9)
+    step = np.diff(angle).max()
+    assert r * (1 - math.cos(step / 2)) <= 1e-3
+
+
+@pytest.mark.parametrize("words", ["X10 Y0 R5", "X10 Y0 I5 J0", "G90.1 X10 Y0 I5 J0"])
+def test_half_circle_by_radius_and_centres(words):
+    _, e = cuts(read(f"G2 {words} F100\n"))
+    assert e[:, 1].max() == pytest.approx(5, abs=2e-3) and e[-1].tolist() == [10, 0, 10]
+
+
+@pytest.mark.parametrize("radius, top", [(10, 10 - math.sqrt(75)), (-10, 10 + math.sqrt(75))])
+def test_radius_sign_chooses_the_way(radius, top):
+    _, e = cuts(read(f"G2 X10 Y0 R{radius} F100\n"))
+    assert e[:, 1].max() == pytest.approx(top, abs=2e-3)
+
+
+def test_full_circle_is_closed_and_as_long_as_it_should_be():
+    s, e = cuts(read("G3 I3 F100\n"))
+    assert np.linalg.norm(e - s, axis=1).sum() == pytest.approx(6 * math.pi, rel=1e-3)
+    np.testing.assert_allclose(e[-1], s[0])
+
+
+def test_feed_modes():
+    p = read("G93 G1 X10 F2\nG95 X20 F0.1\nG94 X30 F50\n")
+    np.testing.assert_allclose(p.feed[1:], [20, 100, 50])
+
+
+def test_drilling_cycles():
+    p = read("G98 G81 X5 Y5 Z-3 R1 F80\nX9\nG80\nG0 X0\n")
+    np.testing.assert_array_equal(p.end[1:], [[5, 5, 10], [5, 5, 1], [5, 5, -3], [5, 5, 10], [9, 5, 10], [9, 5, 1],
+                                              [9, 5, -3], [9, 5, 10], [0, 5, 10]])
+    p = read("G99 G83 X0 Y0 Z-3 R1 Q2 F80\nG80\n")
+    down = p.end[p.kind == FEED][:, 2]
+    np.testing.assert_array_equal(down, [-1, -3])
+    assert p.end[-1, 2] == 1
+    p = read("G82 X0 Y0 Z-3 R1 P0.5 F80\nG80\nG4 P2\n")
+    assert p.dwell == 2.5
+    assert (read("G73 X0 Y0 Z-3 R1 Q1 F80\nG80\n").kind == FEED).sum() == 4
+
+
+def test_machine_moves_leave_axes_unknown_until_programmed():
+    p = read("G1 Z-1 F100\nG0 Z10\nG53 G0 Z0\nG0 X50\nG0 Z5\nG28\nG0 X1 Y1\nZ3\n")
+    np.testing.assert_array_equal(p.end[-2:], [[50, 0, 5], [1, 1, 3]])
+    assert p.start[-1].tolist() == [1, 1, 3]
+
+
+def test_tool_change_needs_its_length_again():
+    p = read("G1 Z1 F100\nG0 Z20\nT2 M6\nM3\nG0 X5\nG43 H2 Z9\nG1 Z-1\n")
+    assert p.tool.tolist()[-2:] == [2, 2] and p.remarks == ()
+    p = read("G1 Z1 F100\nG0 Z20\nT2 M6\nM3\nG0 X5 Z9\nG1 Z-1\n")
+    assert {"length offset H1 and tool T2" in r.message for r in p.remarks} >= {True}
+
+
+@pytest.mark.parametrize("body, word", [
+    ("G55 G0 X1\n", "G55"), ("G43 H3 Z5\n", "H3"), ("G49\nG1 Z1 F100\n", "G43"), ("M5\nG1 Z1 F100\n", "spindle"),
+    ("/G0 X1\n", "/"), ("M4\n", "M4")])
+def test_remarks_name_what_should_not_run(body, word):
+    p = read(body)
+    assert any(word in r.message for r in p.remarks) and all(r.line >= 7 for r in p.remarks)
+
+
+def test_file_without_percent_and_windows_lines():
+    assert len(read_program("G21 G90\r\nT1 M6\r\nG43 H1\r\nM3 S9\r\nG0 X0 Y0 Z5\r\nG1 X1 F9\r\nX2\r\nM2\r\n")) == 3
+
+
+def test_speed_of_plain_lines():
+    import time
+    body = "G1 Z-1 F200\n" + "".join(f"X{k % 60}.125 Y{k % 37}.5 Z-1.0625\n" for k in range(50_000))
+    begin = time.perf_counter()
+    assert len(read(body)) > 50_000
+    assert time.perf_counter() - begin < 2.0
