@@ -1,0 +1,159 @@
+"""Stock lines, bodies and distances against slow obvious twins."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import TriangleMesh
+from tests.pocket_case import TOOL, block
+from verify.guard import convex_edges, gouge_depths
+from verify.kernels.heights import lowest, overlap
+from verify.kernels.nearest import triangle2
+from verify.model import ProofSetup, StockKind
+from verify.removal import Moves
+from verify.stock import blank, descents, end_radii, run_stock, stock_on_normals
+
+
+def profile(rho, radius, corner, grow):
+    """Height of a cutting profile over the tip, inf outside."""
+    over = np.maximum(rho - (radius - corner + grow), 0.0)
+    return np.where(rho <= radius + grow, corner - np.sqrt(np.maximum(corner**2 - over**2, 0)), np.inf)
+
+
+@pytest.mark.parametrize("radius, corner, grow", [(1.5, 1.5, 0), (2, 0, 0), (2, 0.5, 0), (1.5, 1.5, 1.0), (2, 0, 0.7)])
+def test_lowest_is_the_least_of_many_standing_tools(radius, corner, grow):
+    rng = np.random.default_rng(2)
+    s = np.linspace(0, 1, 40_001)
+    met = 0
+    for case in range(60):
+        d = rng.normal(size=3) * np.array([[1, 1, 1], [1, 1, 0], [0, 0, 1]][case % 3])
+        a, (x, y) = rng.normal(size=3), rng.uniform(-2, 2, 2)
+        got, touch = lowest(x, y, *a, *d, radius, corner, grow)
+        rho = np.hypot(x - a[0] - s * d[0], y - a[1] - s * d[1])
+        want = (a[2] + s * d[2] + profile(rho, radius, corner, grow)).min()
+        if np.isinf(want):
+            continue
+        met += 1
+        assert got <= want + 1e-9 and got >= want - 1e-3
+        assert touch == pytest.approx(s[rho <= radius + grow].min(), abs=1e-4)
+    assert met > 20
+
+
+@pytest.mark.parametrize("r0, r1", [(3.0, 3.0), (2.0, 4.0), (4.0, 2.0)])
+@pytest.mark.parametrize("column", [True, False])
+def test_overlap_of_bodies_is_the_largest_of_many_standing_ones(r0, r1, column):
+    rng = np.random.default_rng(4)
+    s = np.linspace(0, 1, 4001)[:, None]
+    z0, z1 = 2.0, 6.0
+    h = np.linspace(z0, z1, 201)[None, :]
+    met = 0
+    for case in range(60):
+        d = rng.normal(size=3) * np.array([[2, 2, 2], [2, 2, 0], [0, 0, 2]][case % 3])
+        a, p = rng.normal(size=3), rng.uniform([-3, -3, 0], [3, 3, 8])
+        got = overlap(*p, *a, *d, z0, z1, r0, r1, column)
+        rho = np.hypot(p[0] - a[0] - s * d[0], p[1] - a[1] - s * d[1])
+        high = p[2] - a[2] - s * d[2]
+        if column:
+            value = np.where(high > h, r0 + (r1 - r0) * (h - z0) / (z1 - z0) - rho, -np.inf).max()
+        else:
+            inside = (high > z0) & (high < z1)
+            value = np.where(inside, r0 + (r1 - r0) * (high - z0) / (z1 - z0) - rho, -np.inf).max()
+        if np.isinf(value):
+            continue
+        met += 1
+        assert got == pytest.approx(value, abs=0.03) and got >= value - 1e-6
+    assert met > 20
+
+
+def test_offset_blank_is_the_union_of_spheres():
+    """Twin: spheres on a fine cloud of surface points; it lies below the truth by less than its spacing allows."""
+    part = block()
+    setup = ProofSetup(margin=1.0, uncertainty=0.2, line_spacing=0.7)
+    field = blank(part.mesh, setup)
+    f = np.linspace(0, 1, 241)
+    u, v = (g.ravel() for g in np.meshgrid(f, f))
+    keep = u + v <= 1
+    u, v = u[keep][:, None], v[keep][:, None]
+    cloud = np.concatenate([t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]) for t in part.mesh.triangles[2:]])
+    rng = np.random.default_rng(0)
+    for i, j in rng.integers((0, 0), field.height.shape, (60, 2)):
+        x, y = field.origin + (np.array([i, j]) + 0.5) * field.step
+        d2 = (cloud[:, 0] - x) ** 2 + (cloud[:, 1] - y) ** 2
+        near = d2 <= 1.1999**2
+        if not near.any():
+            assert field.height[i, j] < -1e20 or field.height[i, j] < part.mesh.bounds[1, 2]
+            continue
+        want = (cloud[near, 2] + np.sqrt(1.44 - d2[near])).max()
+        assert want - 1e-9 <= field.height[i, j] <= want + 0.2
+        if np.hypot(*(np.abs([x, y]) - [10, 6])) > 2 and d2.min() < 0.3:
+            assert field.height[i, j] <= want + 0.02
+
+
+def test_stock_lines_are_lowered_exactly_and_only_as_far_as_the_flutes_reach():
+    part = block()
+    setup = ProofSetup(stock_kind=StockKind.BOX, margin=0.0, uncertainty=0.0, line_spacing=0.25)
+    slot = np.array([[[-30.0, 1, -3], [30, 1, -3]]])
+    for flutes, expected in ((8.0, -3.0), (2.0, 0.0)):
+        tool = replace(TOOL, flute_length=flutes)
+        field = blank(part.mesh, setup)
+        run = run_stock(field, Moves(slot[:, 0], slot[:, 1], np.ones(1, bool), np.zeros(1, np.int32)), [tool], setup)
+        y = field.origin[1] + (np.arange(field.height.shape[1]) + 0.5) * field.step
+        i = field.height.shape[0] // 2
+        under = np.abs(y - 1) <= 2.0
+        assert (field.height[i, under] == expected).all() and (field.height[i, ~under & (np.abs(y) < 15)] == 0).all()
+        assert run.cut[0] == (expected < 0) and (len(run.events) > 0) == (expected == 0)
+
+
+def test_stock_on_normals_is_the_way_out_of_the_blank():
+    bounds = np.array([[-20.0, -15, -10], [20, 15, 0]])
+    p, n = np.array([[0.0, 0, -5], [0, 0, -5], [5, 0, -1]]), np.array([[1.0, 0, 0], [0, 0, 1], [0, 0.6, 0.8]])
+    box = ProofSetup(stock_kind=StockKind.BOX, margin=0.5, uncertainty=0.0)
+    np.testing.assert_allclose(stock_on_normals(p, n, bounds, box, 99.0), [20.5, 5.5, 1.5 / 0.8])
+    np.testing.assert_allclose(stock_on_normals(p, n, bounds, box, 2.0), [2, 2, 1.875])
+    bar = ProofSetup(stock_kind=StockKind.CYLINDER, margin=0.5, uncertainty=0.0)
+    np.testing.assert_allclose(stock_on_normals(p, n, bounds, bar, 99.0), [25.5, 5.5, 1.5 / 0.8])
+    np.testing.assert_array_equal(stock_on_normals(p, n, bounds, ProofSetup(), 1.0), 1.0)
+
+
+def test_descents_and_end_regions():
+    z = np.array([0.0, -1.0, -2.0, -2.0, -2.01, -3.0])
+    x = np.array([0.0, 0.0, 1.0, 2.0, 3.0, 3.0])
+    p = np.column_stack([x, np.zeros(6), z])
+    moves = Moves(p[:-1], p[1:], np.ones(5, bool), np.zeros(5, np.int32))
+    assert descents(moves, np.radians(3)).tolist() == [1, 1, 0, 0, 2]
+    assert end_radii([TOOL]).tolist() == [2.0]
+
+
+def test_nearest_point_of_a_triangle():
+    rng = np.random.default_rng(6)
+    f = np.linspace(0, 1, 301)
+    u, v = (g.ravel() for g in np.meshgrid(f, f))
+    keep = u + v <= 1 + 1e-12
+    u, v = u[keep][:, None], v[keep][:, None]
+    for _ in range(50):
+        t, p = rng.normal(size=(3, 3)), 2 * rng.normal(size=3)
+        cloud = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
+        want = np.linalg.norm(cloud - p, axis=1).min()
+        got = np.sqrt(triangle2(*p, t))
+        assert want - 0.02 <= got <= want + 1e-12
+
+
+def test_gouge_depth_is_measured_from_the_nearest_surface():
+    """A cut 5 µm under the top swallows the whole ray of a sample 2 µm under the edge: it is 2 µm deep there."""
+    mesh: TriangleMesh = block().mesh
+    tree = TriangleTree(mesh)
+    p, n = np.array([[20.0, 0, -0.002], [0, 0, -5], [20, 0, -5]]), np.array([[1.0, 0, 0], [0, 0, 1], [1, 0, 0]])
+    got = gouge_depths(tree, p, n, np.array([3.0, 0.02, 0.5]))
+    np.testing.assert_allclose(got, [0.002, 0.02, 0.5], atol=1e-9)
+    np.testing.assert_allclose(gouge_depths(tree, p[2:], n[2:], np.array([99.0])), [5.0], atol=0.1)
+
+
+def test_convex_edges_of_a_block_with_a_pocket():
+    points, bisector, face = convex_edges(block().mesh)
+    assert len(points) == pytest.approx(10 * (2 * 2 * (40 + 30) + 4 * 10 + 2 * (20 + 12)), abs=20)
+    top = np.abs(points[:, 2]) < 1e-9
+    assert (bisector[top, 2] > 0.7).all() and (face > 0).all()
+    rim = top & (np.abs(points[:, 0]) < 10.1) & (np.abs(points[:, 1]) < 6.1)
+    assert (np.einsum("ij,ij->i", bisector[rim, :2], points[rim, :2]) < 0).all()
