@@ -20,6 +20,10 @@ Blocked = Callable[[F64, F64], np.ndarray]
 """(n, 3) start and (n, 3) end of rays, mm -> (n,) bool, whether something that is no wall stands between."""
 
 
+ZOOMS = 3
+"""Times the grid is drawn again, eight times finer, round the shortest ray."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """A channel between two walls of a layout.
@@ -38,12 +42,13 @@ class Gap:
     area: float
 
 
-def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 241, n_v: int = 5) -> list[Gap]:
+def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 161, n_v: int = 5) -> list[Gap]:
     """All channels between the walls of a layout.
 
     walls    : the walls
     blocked  : tells which rays end in material that is no wall (a hub)
-    n_u, n_v : samples along and up each side; the gap is at most one sample pitch squared over 8 R too large
+    n_u, n_v : samples along and up each side, for the areas and as the start of the search for the shortest ray;
+               the gap is refined to 1/512 of that pitch, also where it ends at a border or a hub
     Returns Gap per pair with at least 1 % of a side facing, in order of the pair.
     """
     found: dict[tuple[int, int], Gap] = {}
@@ -61,11 +66,43 @@ def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int 
 
 
 def _facing(walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n_u: int, n_v: int) -> list[Gap]:
-    u, v = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, n_u), np.linspace(0, 1, n_v), indexing="ij"))
-    origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
+    grid = np.meshgrid(np.linspace(0, 1, n_u), np.linspace(0, 1, n_v), indexing="ij")
+    u, v = (g.ravel() for g in grid)
+    origin, first, reach = _cast(walls, i, side, u, v, blocked)
     du, dv = walls[i].side_derivatives(side, u, v)
     weight = np.linalg.norm(np.cross(du, dv), axis=1) / ((n_u - 1) * (n_v - 1))
-    border = (u == 0) | (u == 1) | (v == 0) | (v == 1)
+    out = []
+    for j in np.unique(first[np.isfinite(reach)]):
+        mine = np.flatnonzero(np.isfinite(reach) & (first == j))
+        best = mine[np.argmin(reach[mine])]
+        gap, at, border = float(reach[best]), origin[best], _on_border(u[best], v[best])
+        pitch = np.array([1.0 / (n_u - 1), 1.0 / (n_v - 1)])
+        centre = np.array([u[best], v[best]])
+        for _ in range(ZOOMS):
+            fine = [np.unique(np.clip(c + np.linspace(-h, h, 17), 0, 1)) for c, h in zip(centre, pitch, strict=True)]
+            fu, fv = (g.ravel() for g in np.meshgrid(*fine, indexing="ij"))
+            points, seen, far = _cast(walls, i, side, fu, fv, blocked)
+            far = np.where(seen == j, far, np.inf)
+            k = int(np.argmin(far))
+            if far[k] <= gap:
+                gap, at, border = float(far[k]), points[k], _on_border(fu[k], fv[k])
+                centre = np.array([fu[k], fv[k]])
+            pitch = pitch / 8.0
+        x, y, z = (float(c) for c in at)
+        pair = (min(i, int(j)), max(i, int(j)))
+        out.append(Gap(pair, gap, (x, y, z), border, float(weight[mine].sum())))
+    return out
+
+
+def _on_border(u: float, v: float) -> bool:
+    return bool(min(u, v) <= 0.0 or max(u, v) >= 1.0)
+
+
+def _cast(
+    walls: list[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None
+) -> tuple[F64, np.ndarray, F64]:
+    """Rays from points of one side: where they start, which wall they meet first, how far that is (inf: none)."""
+    origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
     distance = np.full((len(walls), len(u)), np.inf)
     for j, other in enumerate(walls):
         if j != i:
@@ -73,17 +110,10 @@ def _facing(walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n
                 distance[j] = np.minimum(distance[j], _ray_to_side(origin, normal, other, facing))
     first = np.argmin(distance, axis=0)
     reach = distance[first, np.arange(len(u))]
-    hit = np.isfinite(reach)
-    if blocked is not None and hit.any():
-        hit[hit] = ~blocked(origin[hit], origin[hit] + normal[hit] * reach[hit, None])
-    out = []
-    for j in np.unique(first[hit]):
-        mine = np.flatnonzero(hit & (first == j))
-        best = mine[np.argmin(reach[mine])]
-        x, y, z = (float(c) for c in origin[best])
-        pair = (min(i, int(j)), max(i, int(j)))
-        out.append(Gap(pair, float(reach[best]), (x, y, z), bool(border[best]), float(weight[mine].sum())))
-    return out
+    hit = np.flatnonzero(np.isfinite(reach))
+    if blocked is not None and len(hit):
+        reach[hit[blocked(origin[hit], origin[hit] + normal[hit] * reach[hit, None])]] = np.inf
+    return origin, first, reach
 
 
 def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:

@@ -25,7 +25,7 @@ def _plate_for(walls: list[WallSpec], thickness: float, margin: float = 3.5) -> 
 def _shift_to_gap(walls: list[WallSpec], k: int, gap: float) -> list[WallSpec]:
     """Move wall k and all after it along y until its channel to wall k - 1 is ``gap`` at the narrowest."""
     for _ in range(6):
-        found = [c for c in channels(walls[k - 1 : k + 1], n_u=201, n_v=3) if c.walls == (0, 1)]
+        found = [c for c in channels(walls[k - 1 : k + 1], n_u=61, n_v=3) if c.walls == (0, 1)]
         if not found:
             raise LayoutError("two neighbours do not face each other")
         d = gap - found[0].gap_min
@@ -146,7 +146,7 @@ def random(
         lanes = _shift_to_gap(lanes, k, float(least[k - 1]))
     layout = Layout("random", _plate_for(lanes, z), lanes)
     check(layout)
-    facing = {c.walls for c in channels(lanes, n_u=101, n_v=3) if c.gap_min <= 12.5}
+    facing = {c.walls for c in channels(lanes, n_u=61, n_v=3) if c.gap_min <= 12.5}
     pairs = [(k, k + 1) for k in range(count - 1) if (k, k + 1) in facing]
     drawn = try_connections(rng, layout, pairs, wanted, ALL_KINDS) if pairs and wanted else []
     return replace(layout, connections=drawn)
