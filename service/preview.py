@@ -186,19 +186,21 @@ def _tool_colours(steps: Sequence[Workingstep]) -> dict[int, RGB]:
 
 
 def _draw_paths(canvas: Canvas, camera: Camera, steps: Sequence[Workingstep], tools: Mapping[int, RGB]) -> None:
-    """Cuts as full lines, feed links thin, rapids dashed on top."""
+    """Links and rapids faint and first, the cuts over them."""
     for step in steps:
-        colour = tools[step.tool.number]
-        for motion, alpha in ((Motion.CUT, 0.75), (Motion.CONNECT, 0.45), (Motion.APPROACH, 0.45), (Motion.LIFT, 0.45)):
-            for lines in _of_motion(camera, step.trajectories, motion):
-                canvas.strokes(lines, colour, width=2, alpha=alpha, hidden=0.10, bias=4.0)
+        rapids = _of_motion(camera, step.trajectories, (Motion.RAPID,))
+        canvas.strokes(rapids, RAPID, width=1, alpha=0.35, hidden=0.04, bias=4.0, dash=8.0)
+        links = _of_motion(camera, step.trajectories, (Motion.CONNECT, Motion.APPROACH, Motion.LIFT))
+        canvas.strokes(links, tools[step.tool.number], width=1, alpha=0.30, hidden=0.04, bias=4.0)
     for step in steps:
-        for lines in _of_motion(camera, step.trajectories, Motion.RAPID):
-            canvas.strokes(lines, RAPID, width=1, alpha=0.7, hidden=0.15, bias=4.0, dash=8.0)
+        cuts = _of_motion(camera, step.trajectories, (Motion.CUT,))
+        canvas.strokes(cuts, tools[step.tool.number], width=2, alpha=0.75, hidden=0.10, bias=4.0)
 
 
-def _of_motion(camera: Camera, trajectories: Sequence[Trajectory], motion: Motion) -> list[F64]:
-    return [_segments(camera, t.points) for t in trajectories if t.motion is motion]
+def _of_motion(camera: Camera, trajectories: Sequence[Trajectory], motions: tuple[Motion, ...]) -> F64:
+    """(n, 2, 3) screen segments of all trajectories of these motions."""
+    lines = [np.stack([t.points[:-1], t.points[1:]], axis=1) for t in trajectories if t.motion in motions]
+    return camera.screen(np.concatenate(lines)) if lines else np.zeros((0, 2, 3))
 
 
 # --- words and signs -------------------------------------------------------------------------------------------
@@ -282,7 +284,7 @@ def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face
         surfaces.append((f"and {len(decomposition.walls) - 12} more walls", None))
     surfaces += [("connection", CONNECTION), ("floor", ROLES["floor"]), ("fillet", ROLES["fillet"]),
                  ("base", ROLES["base"])]
-    _swatches(pen, surfaces, 590, top, columns=4, step=140)
+    _swatches(pen, surfaces, 610, top, columns=4, step=140)
     lines: list[tuple[str, RGB | None]] = []
     for number, colour in tools.items():
         body = next(s.tool for s in steps if s.tool.number == number)
@@ -299,9 +301,9 @@ def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face
 def _pairs(pen: ImageDraw.ImageDraw, pairs: Sequence[tuple[str, str]], x: int, y: int) -> None:
     grey = _bytes((0.35, 0.38, 0.43))
     for i, (key, value) in enumerate(pairs[:10]):
-        left, line = x + 270 * (i // 5), y + 21 * (i % 5)
+        left, line = x + 285 * (i // 5), y + 21 * (i % 5)
         pen.text((left, line), ascii_text(key), font=_font(15), fill=grey)
-        pen.text((left + 125, line), ascii_text(value), font=_font(15), fill=_bytes(INK))
+        pen.text((left + 150, line), ascii_text(value), font=_font(15), fill=_bytes(INK))
 
 
 def _swatches(pen: ImageDraw.ImageDraw, entries: Sequence[tuple[str, RGB | None]], x: int, y: int, *, columns: int,
