@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -147,14 +147,21 @@ Labels = Annotated[dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,
                    Field(max_length=32, description="Passed through to job, report, program header and STEP-NC.")]
 
 
-class Setup(WireModel):
-    """A setup: tools, machine, stock and the quality asked for. Only ``tools`` has no default."""
-
-    model_config = {"json_schema_extra": {"examples": [{
+def _describe(schema: dict[str, Any]) -> None:
+    """Example, and defaults that generated clients can write down: an object for a union field they cannot."""
+    schema["examples"] = [{
         "tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 9, "neck_diameter_mm": 2.8,
                    "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 45,
                    "holder": [{"diameter_mm": 20, "length_mm": 30}]}],
-        "quality": {"scallop_height_mm": 0.01}, "material": "Ti-6Al-4V", "labels": {"order": "4711"}}]}}
+        "quality": {"scallop_height_mm": 0.01}, "material": "Ti-6Al-4V", "labels": {"order": "4711"}}]
+    schema["properties"]["machine"].pop("default")
+    schema["properties"]["material"]["default"] = "Ti-6Al-4V"
+
+
+class Setup(WireModel):
+    """A setup: tools, machine, stock and the quality asked for. Only ``tools`` has no default."""
+
+    model_config = {"json_schema_extra": lambda schema: _describe(schema)}
 
     part: Annotated[PartChoice, Field(description="Which solid of the STEP file.")] = PartChoice()
     placement: Annotated[Placement, Field(description="The setup frame in STEP coordinates.")] = Placement()

@@ -93,8 +93,15 @@ def run_server(settings: Settings) -> None:
         server.run(sockets=[listener])
     except KeyboardInterrupt:
         log.info("stopped")  # uvicorn raises the signal again when all is closed
-    if not server.started:
-        raise server.startup_error()
+    except SystemExit:
+        raise server.startup_error() from None  # uvicorn's way to say that the application did not start
+
+
+def _run_quietly(server: _Server, listener: socket.socket) -> None:
+    try:
+        server.run(sockets=[listener])
+    except SystemExit:
+        pass  # told to the caller by ``startup_error``
 
 
 @contextmanager
@@ -109,7 +116,7 @@ def background(settings: Settings, chain: str = "service.chain") -> Iterator[str
     settings.check_exposure()
     listener = _listen(settings.host, settings.port)
     server = _server(settings, chain)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="server", daemon=True)
+    thread = threading.Thread(target=_run_quietly, args=(server, listener), name="server", daemon=True)
     thread.start()
     try:
         while not server.started:

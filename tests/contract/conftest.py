@@ -1,6 +1,7 @@
 """The service with a chain that does what a label says, served in this process."""
 
 import json
+import runpy
 import time
 from pathlib import Path
 
@@ -10,9 +11,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.settings import Settings
 
-STEP = (b"ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
-        b"FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\n"
-        b"END-ISO-10303-21;\n")
+STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,12 @@
 """Bad input over HTTP: status, problem type, and nothing left behind."""
 
 import json
+import runpy
+from pathlib import Path
 
 import pytest
 
-from tests.contract.conftest import STEP
-
+STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 TOOL = {"id": "T1", "kind": "ball", "diameter_mm": 3}
 
 

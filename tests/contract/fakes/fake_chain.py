@@ -19,9 +19,10 @@ def _report(setup, state, findings):
 
 
 def _misbehave(what, progress):
-    if what == "sleep":
-        for i in range(400):
-            progress("asleep", i / 400)
+    if what in ("sleep", "nap"):
+        steps = 400 if what == "sleep" else 40
+        for i in range(steps):
+            progress("asleep", i / steps)
             time.sleep(0.05)
     elif what == "segfault":
         ctypes.string_at(0)

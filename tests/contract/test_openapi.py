@@ -1,0 +1,100 @@
+"""openapi.yaml stands for the running application."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from service.app import create_app
+from service.openapi import as_yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def document():
+    return create_app().openapi()
+
+
+def test_openapi_yaml_is_what_the_application_says(document):
+    assert (ROOT / "openapi.yaml").read_text() == as_yaml(document), "run: zonemill openapi > openapi.yaml"
+
+
+def test_the_setup_of_a_submission_is_typed(document):
+    for path in ("/v1/jobs", "/v1/zones", "/v1/verifications"):
+        form = document["paths"][path]["post"]["requestBody"]["content"]["multipart/form-data"]
+        assert form["schema"]["properties"]["setup"] == {"$ref": "#/components/schemas/Setup"}
+        assert form["encoding"]["setup"]["contentType"] == "application/json"
+        assert form["schema"]["properties"]["part"]["format"] == "binary"
+
+
+def test_every_reference_leads_somewhere_and_every_schema_is_used(document):
+    text = yaml.safe_dump(document)
+    schemas = document["components"]["schemas"]
+    used = {line.rsplit("/", 1)[1].strip("'\" ") for line in text.splitlines() if "$ref" in line}
+    assert used <= set(schemas)
+    assert set(schemas) - used <= {"JobEvent"}
+
+
+def test_errors_are_problems_and_operations_are_named(document):
+    names = []
+    for path, item in document["paths"].items():
+        for method, operation in item.items():
+            names.append(operation["operationId"])
+            for status, answer in operation["responses"].items():
+                if status >= "400" and path != "/readyz":
+                    assert list(answer["content"]) == ["application/problem+json"], (path, method, status)
+    assert len(set(names)) == len(names)
+
+
+def test_every_field_says_its_unit_or_has_a_description(document):
+    for name in ("Setup", "Tool", "Machine", "Quality", "Stock", "Access", "Placement", "Clearance", "Operations"):
+        schema = document["components"]["schemas"][name]
+        assert schema["description"]
+        for field, spec in schema["properties"].items():
+            assert "description" in spec or "$ref" in spec, f"{name}.{field}"
+
+
+@pytest.mark.slow
+def test_schemathesis_finds_no_answer_outside_the_document(client):
+    import schemathesis
+    from hypothesis import HealthCheck, Phase, given, settings
+
+    schema = schemathesis.openapi.from_asgi("/openapi.json", client.app)
+    probed = 0
+    for result in schema.exclude(path="/v1/jobs/{job_id}/events").get_all_operations():
+        operation = result.ok()
+
+        @settings(max_examples=8, deadline=None, database=None, derandomize=True, phases=[Phase.generate],
+                  suppress_health_check=list(HealthCheck))
+        @given(case=operation.as_strategy())
+        def probe(case):
+            nonlocal probed
+            probed += 1
+            answer = case.call()
+            told = case.operation.definition.raw["responses"]
+            assert answer.status_code < 500 and str(answer.status_code) in told, (
+                case.as_curl_command(), answer.status_code, answer.text)
+
+        probe()
+    assert probed > 50
+
+
+@pytest.mark.slow
+def test_a_generated_client_posts_a_job(tmp_path):
+    """openapi-python-client makes a package from openapi.yaml; that package posts a typed setup."""
+    made = subprocess.run([sys.executable, "-m", "openapi_python_client", "generate", "--path",
+                           str(ROOT / "openapi.yaml"), "--meta", "none", "--output-path", str(tmp_path / "zm")],
+                          capture_output=True, text=True, timeout=120,
+                          env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"})
+    assert made.returncode == 0, made.stdout + made.stderr
+    assert "arning" not in made.stdout + made.stderr, made.stdout + made.stderr
+    script = Path(__file__).parent / "fakes" / "use_client.py"
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}:{script.parent}"}
+    got = subprocess.run([sys.executable, str(script), str(tmp_path / "data")], capture_output=True, text=True,
+                         timeout=120, env=environment, cwd=ROOT)
+    assert got.returncode == 0, got.stdout + got.stderr
+    assert got.stdout.strip().splitlines()[-1] == "proved 1"

@@ -1,0 +1,92 @@
+"""What survives a crash and an orderly stop."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FAKES = Path(__file__).parent / "fakes"
+
+
+@pytest.fixture
+def serve(tmp_path):
+    """Start the service in a process; returns the process and a client."""
+    started = []
+
+    def start(attempts=3):
+        environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{FAKES}"}
+        process = subprocess.Popen([sys.executable, str(FAKES / "serve_fake.py"), str(tmp_path / "data"),
+                                    str(attempts)], stdout=subprocess.PIPE, text=True, env=environment, cwd=ROOT)
+        started.append(process)
+        return process, httpx.Client(base_url=process.stdout.readline().strip(), trust_env=False)
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def _asleep(client, job):
+    deadline = time.monotonic() + 10
+    while client.get(job["links"]["self"]).json()["stage"] != "asleep" and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+def _job_children(process):
+    return [p for p in psutil.Process(process.pid).children(recursive=True) if "service.child" in " ".join(p.cmdline())]
+
+
+def test_a_killed_service_leaves_no_child_and_resumes_its_job(serve, post, finish):
+    process, client = serve()
+    job = post(client, "nap", key="k").json()
+    _asleep(client, job)
+    (child,) = _job_children(process)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    gone, alive = psutil.wait_procs([child], timeout=2)
+    assert not alive
+    _, client = serve()
+    assert post(client, "nap", key="k").json()["id"] == job["id"]
+    job = finish(client, client.get(job["links"]["self"]).json())
+    assert (job["state"], job["attempt"]) == ("proved", 2)
+    assert client.get(job["links"]["report"]).json()["state"] == "proved"
+
+
+@pytest.mark.slow
+def test_a_job_that_takes_the_service_down_cannot_loop(serve, post, finish):
+    process, client = serve(attempts=1)
+    job = post(client, "sleep").json()
+    _asleep(client, job)
+    process.kill()
+    process.wait()
+    _, client = serve(attempts=1)
+    job = finish(client, client.get(job["links"]["self"]).json())
+    assert job["state"] == "failed" and job["error"]["code"] == "attempts_exhausted"
+
+
+def test_an_orderly_stop_counts_no_attempt(make_client, post, finish):
+    client = make_client()
+    job = post(client, "nap").json()
+    _asleep(client, job)
+    client.__exit__(None, None, None)
+    again = make_client()
+    job = finish(again, again.get(job["links"]["self"]).json())
+    assert (job["state"], job["attempt"]) == ("proved", 1)
+    client.__enter__ = client.__exit__ = lambda *_: None
+
+
+def test_two_services_cannot_share_a_data_folder(make_client, tmp_path):
+    make_client()
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", str(tmp_path / "data"), "--json"]
+    got = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    assert got.returncode == 2 and json.loads(got.stdout)["code"] == "data_dir_in_use"
