@@ -77,7 +77,8 @@ class WallSpec:
         return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
     def _nodes(self) -> F64:
-        return np.array([0.0, 1.0]) if self.kind == "straight" else np.linspace(0.0, 1.0, 25)
+        # The rails ARE the truth, so they need no more knots than the shape asks for; every knot costs triangles later.
+        return np.array([0.0, 1.0]) if self.kind == "straight" else np.linspace(0.0, 1.0, 13)
 
     def _rail(self, side: int, v: float) -> BSpline:
         u = self._nodes()
