@@ -1,0 +1,143 @@
+"""SETUP.json: defaults, refusals with sentences, canonical form."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from geometry.errors import SetupError
+from schemas.materials import MATERIALS, find_material
+from schemas.setup import Setup, canonical_json, content_hash, setup_sha256
+from service.convert import face_numbers, parse_setup, placement_frame, tool_bodies
+from service.materials import cutting_data, feed_per_tooth
+
+TOOL = {"id": "T1", "kind": "ball", "diameter_mm": 3}
+HOLDER = [{"diameter_mm": 20, "length_mm": 30}]
+
+
+def setup(**fields):
+    return {"tools": [TOOL], **fields}
+
+
+def tool(**fields):
+    return {"tools": [{**TOOL, **fields}]}
+
+
+def test_only_tools_are_needed_and_defaults_are_those_of_the_design():
+    found = Setup.model_validate(setup())
+    assert found.placement.z_axis == [0, 0, 1] and found.access[0].work_offset == "G54"
+    assert found.clearance_mm.model_dump() == {"neck": 0.05, "shank": 0.2, "holder": 1.0, "rapid": 1.0}
+    assert found.quality.model_dump() == {"scallop_height_mm": 0.01, "chordal_tolerance_mm": 0.002,
+                                          "gouge_tolerance_mm": 0.01, "stock_allowance_mm": 0, "coverage_min": 0}
+    assert (found.stock.kind, found.stock.margin_mm, found.stock.uncertainty_mm) == ("part_offset", 1, 0.5)
+    assert found.machine.dialects == ["linuxcnc"] and found.material.name == "Ti-6Al-4V"
+    assert found.operations.cut_direction == "climb" and found.labels == {}
+
+
+def test_a_tool_that_leaves_lengths_out_is_straight():
+    (body,) = tool_bodies(parse_setup(setup()))
+    assert (body.corner_radius, body.flute_length, body.neck_diameter, body.neck_length, body.shank_diameter,
+            body.stickout, body.number, body.kind) == (1.5, 9, 3, 9, 3, 30, 1, "ball")
+    (body,) = tool_bodies(parse_setup(tool(stickout_mm=5, holder=HOLDER)))
+    assert (body.flute_length, body.neck_length, body.holder[0].diameter_top) == (5, 5, 20)
+
+
+@pytest.mark.parametrize(("given_setup", "words"), [
+    ({}, "no tools"), ({"tools": []}, "no tools"),
+    (tool(diameter_mm=-3), "greater than 0"), (tool(stickout_mm=-1), "greater than 0"),
+    (tool(diameter_mm="3"), "valid number"), (tool(diameter_mm=True), "valid number"),
+    (tool(diameter_in=0.1), "unknown field"), (setup(units="inch"), "unknown field"),
+    (tool(flute_length_mm=30, neck_length_mm=10), "flute_length_mm <= neck_length_mm <= stickout_mm"),
+    (tool(neck_length_mm=40, stickout_mm=20), "neck_length_mm 40 is longer than stickout_mm 20"),
+    (tool(gauge_length_mm=20), "gauge_length_mm"),
+    (tool(neck_diameter_mm=4, neck_length_mm=20), "a neck is relieved"),
+    (tool(neck_diameter_mm=2.8), "without neck_length_mm"), (tool(holder=HOLDER), "needs stickout_mm"),
+    (tool(flute_length_mm=1), "shorter than the corner radius"),
+    (tool(corner_radius_mm=1), "half its diameter"), (tool(corner_radius_mm=2), "larger than half"),
+    (tool(kind="flat", corner_radius_mm=1), "call it bull"), (tool(kind="bull"), "call it flat"),
+    (tool(kind="barrel"), "not built yet"), (tool(kind="tapered_ball"), "not built yet"),
+    (tool(taper_angle_deg=3), "not built yet"), (tool(number=0), "greater than or equal to 1"),
+    (setup(quality={"scallop_height_mm": 1.5}), "radius 1.5 of the smallest tool T1"),
+    (setup(quality={"scallop_height_mm": 0}), "greater than 0"),
+    (setup(access=[{"direction": [1, 0, 0]}]), "placement"), (setup(access=[{"direction": [0, 0, -1]}]), "placement"),
+    (setup(access=[{"id": "A1"}, {"id": "A2"}]), "several access directions"), (setup(access=[]), "at least 1"),
+    (setup(machine={"kind": "5-axis"}), "not built yet"), (setup(machine={"dialects": ["heidenhain"]}), "not built"),
+    (setup(machine={"pivots_mm": [[0, 0, 0]]}), "5-axis machine"),
+    (setup(stock={"kind": "cylinder"}), "not built yet"), (setup(stock={"kind": "step"}), "not built yet"),
+    (setup(stock={"box_mm": [[0, 0, 0], [1, 1, 1]]}), "belongs to stock.kind 'box'"),
+    (setup(stock={"kind": "box", "box_mm": [[0, 0, 0], [1, 0, 1]]}), "above the first"),
+    (setup(fixtures=[{"box_mm": [[0, 0, 2], [1, 1, 1]]}]), "above the first"),
+    (setup(placement={"z_axis": [0, 0, 0]}), "zero length"), (setup(placement={"x_axis": [0, 1, 1]}), "right angles"),
+    (setup(operations={"roughing": False, "finishing": False}), "nothing to do"),
+    (setup(operations={"faces": ["F1"], "exclude_faces": ["F1"]}), "F1"),
+    (setup(operations={"faces": ["12"]}), "pattern"),
+    (setup(material="cheese"), "Inconel 718"), (setup(material="lib:x"), "no entry 'x'"),
+    (setup(labels={"a": "new\nline"}), "pattern"),
+    ({"tools": [TOOL, TOOL]}, "unique"), ({"tools": [TOOL, {**TOOL, "id": "X", "number": 1}]}, "own number"),
+])
+def test_what_is_wrong_is_said(given_setup, words):
+    with pytest.raises(SetupError) as caught:
+        parse_setup(json.dumps(given_setup))
+    assert any(words in p["problem"] for p in caught.value.measured), caught.value.measured
+    assert caught.value.subjects and caught.value.remedy
+
+
+def test_numbers_are_the_digits_of_the_id_where_unique_else_the_place():
+    def numbers(*ids):
+        return [t.number for t in parse_setup({"tools": [{**TOOL, "id": i} for i in ids]}).tools]
+
+    assert numbers("T7", "T3") == [7, 3]
+    assert numbers("A", "B") == [1, 2]
+    assert numbers("T1a", "T1b", "T9") == [1, 2, 9]
+
+
+def test_the_canonical_form_sees_meaning_only():
+    plain = parse_setup(setup())
+    written = parse_setup(setup(stock={"margin_mm": 1, "uncertainty_mm": 0.50}, material="ti6al4v", labels={}))
+    assert canonical_json(plain) == canonical_json(written)
+    again = parse_setup(canonical_json(plain))
+    assert setup_sha256(again) == setup_sha256(plain)
+    assert setup_sha256(parse_setup(setup(stock={"margin_mm": 2}))) != setup_sha256(plain)
+    assert content_hash(b"a", plain) != content_hash(b"b", plain)
+
+
+@given(st.permutations(["tools", "quality", "stock", "labels", "material"]))
+def test_the_order_of_keys_does_not_count(order):
+    whole = {**setup(), "quality": {"coverage_min": 0.5}, "stock": {}, "labels": {"b": "1", "a": "2"},
+             "material": "C45"}
+    assert setup_sha256(parse_setup({k: whole[k] for k in order})) == setup_sha256(parse_setup(whole))
+
+
+@given(st.floats(0.1, 50), st.floats(0.05, 1), st.floats(1, 4), st.floats(1, 4))
+def test_any_consistent_tool_is_taken_as_it_is(diameter, relief, neck, stickout):
+    lengths = {"flute_length_mm": diameter, "neck_length_mm": neck * diameter,
+               "stickout_mm": stickout * neck * diameter, "neck_diameter_mm": relief * diameter}
+    (body,) = tool_bodies(parse_setup({**tool(diameter_mm=diameter, **lengths),
+                                       "quality": {"scallop_height_mm": 0.01}}))
+    assert (body.flute_length, body.neck_length, body.stickout, body.neck_diameter) == tuple(lengths.values())
+
+
+def test_the_placement_becomes_a_right_handed_frame():
+    origin, axes = placement_frame(parse_setup(setup(
+        placement={"origin_mm": [1, 2, 3], "z_axis": [0, 2, 0], "x_axis": [0, 0, 5]})).placement)
+    assert origin.tolist() == [1, 2, 3]
+    assert np.allclose(axes, [[0, 0, 1], [1, 0, 0], [0, 1, 0]]) and np.isclose(np.linalg.det(axes), 1)
+    assert face_numbers(["F12", "F3"]) == (12, 3)
+
+
+def test_speeds_and_feeds_come_from_the_material_within_the_limits():
+    found = parse_setup(setup(material="C45"))
+    data = cutting_data(found.material, found.tools[0], found.machine)
+    assert data.spindle_rpm == 13793 and data.limited_by == "material"  # 130 m/min on 3 mm
+    assert data.feed == pytest.approx(13793 * 2 * 0.020)
+    slow = parse_setup(setup(material="C45", machine={"max_rpm": 4000, "max_feed_mm_min": 100}))
+    data = cutting_data(slow.material, slow.tools[0], slow.machine)
+    assert (data.spindle_rpm, data.feed, data.limited_by) == (4000, 100, "machine")
+    assert cutting_data(MATERIALS["AlMgSi1 6082"], found.tools[0], found.machine).limited_by == "default"
+    points = MATERIALS["C45"].feed_per_tooth
+    assert feed_per_tooth(points, 0.5) == pytest.approx(0.004) and feed_per_tooth(points, 40) == pytest.approx(0.2)
+    assert feed_per_tooth(points, 4.5) == pytest.approx(0.029)
+    assert find_material("EN AW-6082").name == "AlMgSi1 6082"
+    assert {m.source for m in MATERIALS.values()} == {"stated default, conservative"}
