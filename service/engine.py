@@ -122,9 +122,11 @@ class Engine:
 
     def _open_client(self) -> None:
         import dask
+
+        # Before the import: distributed sets up its own logging by this key when it is imported.
+        dask.config.set({"distributed.scheduler.allowed-failures": 2, "logging": {"distributed": "error"}})
         from distributed import Client, LocalCluster
 
-        dask.config.set({"distributed.scheduler.allowed-failures": 2})
         if self.settings.scheduler is not None:
             self._client = Client(self.settings.scheduler, set_as_default=False)
             return

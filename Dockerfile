@@ -1,0 +1,37 @@
+# One image for api, worker and scheduler. The numba kernels are compiled while it is built, so a container starts warm.
+FROM python:3.11-slim
+
+# OpenCASCADE's wheels want these two even where nothing is drawn.
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends libgl1 libxrender1 \
+    && rm -rf /var/lib/apt/lists/*
+
+ENV PYTHONUNBUFFERED=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
+WORKDIR /app
+
+COPY requirements.lock ./
+RUN pip install --requirement requirements.lock "psycopg[binary]>=3.2"
+
+COPY pyproject.toml README.md ./
+COPY geometry geometry
+COPY zones zones
+COPY toolpath toolpath
+COPY output output
+COPY verify verify
+COPY schemas schemas
+COPY service service
+COPY examples examples
+RUN pip install --no-deps --editable .
+
+RUN useradd --system --uid 10001 --home-dir /app zonemill \
+    && mkdir /data /app/numba && chown zonemill /data /app/numba
+USER zonemill
+
+# Plans the sample part once: a build that cannot prove it fails. The compiled kernels stay in a folder of the user's
+# own, for numba caches only where it may write.
+ENV NUMBA_CACHE_DIR=/app/numba
+RUN zonemill demo --out /tmp/demo && rm -rf /tmp/demo
+
+VOLUME /data
+EXPOSE 8000
+CMD ["zonemill", "serve", "--host", "127.0.0.1", "--data", "/data"]

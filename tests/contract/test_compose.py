@@ -1,0 +1,53 @@
+"""docker-compose.yml and Dockerfile, checked without a Docker engine."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def compose():
+    return yaml.safe_load((ROOT / "docker-compose.yml").read_text())
+
+
+def test_it_is_a_compose_file():
+    got = subprocess.run([sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec",
+                          str(ROOT / "docker-compose.yml")], capture_output=True, text=True)
+    assert got.returncode == 0, got.stdout + got.stderr
+
+
+def test_only_the_api_is_published_and_only_on_loopback(compose):
+    ports = {name: s.get("ports", []) for name, s in compose["services"].items()}
+    assert {n for n, p in ports.items() if p} == {"api"}
+    assert all(p.startswith("127.0.0.1:") for p in ports["api"])
+    assert compose["networks"]["inside"]["internal"] is True
+    assert compose["services"]["scheduler"]["networks"] == ["inside"]
+
+
+def test_everything_comes_back_and_says_how_it_is(compose):
+    for name, service in compose["services"].items():
+        assert service["restart"] == "unless-stopped", name
+        assert service["healthcheck"]["test"][0] in ("CMD", "CMD-SHELL"), name
+    assert {"api", "worker", "scheduler", "postgres"} == set(compose["services"])
+
+
+def test_no_password_or_token_is_written_down(compose):
+    for service in compose["services"].values():
+        for key, value in service["environment"].items():
+            if "PASSWORD" in key or "TOKEN" in key:
+                assert value.startswith("${") and ":?" in value
+
+
+def test_the_image_runs_as_nobody_in_particular_and_copies_what_is_there():
+    lines = (ROOT / "Dockerfile").read_text().splitlines()
+    assert lines[1].startswith("FROM python:3.11-slim")
+    assert [line for line in lines if line.startswith("USER ")] == ["USER zonemill"]
+    for line in (x for x in lines if x.startswith("COPY ")):
+        for source in line.split()[1:-1]:
+            if source not in ("requirements.lock", "README.md"):
+                assert (ROOT / source).exists(), source
