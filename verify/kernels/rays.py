@@ -50,10 +50,31 @@ def _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
 
 
 @njit(cache=True, nogil=True)
+def _flank_bound(x, y, nx, ny, ax, ay, dx, dy, plan2, radius):
+    """A lower bound of t at which the ray can enter the upright sweep of the full radius (0 inside).
+
+    Distance to a convex set is convex along the ray, so its tangent at t = 0 bounds the way to it.
+    """
+    wx, wy = x - ax, y - ay
+    s = 0.0
+    if plan2 > 0.0:
+        s = min(max((wx * dx + wy * dy) / plan2, 0.0), 1.0)
+    wx -= s * dx
+    wy -= s * dy
+    rho = math.sqrt(wx * wx + wy * wy)
+    if rho <= radius:
+        return 0.0
+    closing = -(wx * nx + wy * ny) / rho
+    return (rho - radius) / closing if closing > 1e-12 else 1e300
+
+
+@njit(cache=True, nogil=True)
 def _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
     """Lower the residual of sample i by move m."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
     left = residual[i]
+    if _flank_bound(x, y, normals[i, 0], normals[i, 1], ax, ay, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
+        return
     if _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
         return
     nz = normals[i, 2]
