@@ -18,11 +18,11 @@ from geometry.sampling import sample_surface
 from zones.facegraph import FaceGraph, cast
 
 FACING_DOT = -0.3
-FACING_SHARE = 0.05
+FACING_SHARE = 0.02
 SAMPLES_PER_WALL = 3000
 # Local refinement: starts, points a round, rounds, and how much the neighbourhood shrinks each round.
-STARTS, POINTS, ROUNDS, SHRINK = 6, 160, 8, 0.5
-NEAREST, RIM_SAMPLES, FIT_FACETS = 200, 600, 16
+STARTS, POINTS, ROUNDS, SHRINK = 4, 160, 7, 0.5
+NEAREST, RIM_SAMPLES, FIT_FACETS, TRIANGLES = 200, 600, 16, 300
 # Points stay this share of a triangle away from its corners, so that rays do not leave through a border.
 INSET = 1e-3
 
@@ -87,6 +87,7 @@ class _Field:
         self.rim = [_rim_nodes(graph, f) for f in sides]
         self.side_area = np.array([graph.area[f].sum() for f in sides])
         self.count = len(sides)
+        self.patches: dict[int, tuple[F64, F64, F64, np.ndarray]] = {}
 
     def look(self, points: F64, normals: F64) -> tuple[F64, np.ndarray]:
         """Outward ray length from points of sides, and the wall whose side is met (inf and -1: none)."""
@@ -136,7 +137,7 @@ class _Field:
         chosen: list[Start] = []
         result: tuple[float, F64, F64, int] = (np.inf, np.zeros(3), np.zeros(3), pair[0])
         for start in found:
-            if len(chosen) >= STARTS or start.distance > 1.5 * found[0].distance:
+            if len(chosen) >= STARTS or start.distance > 1.2 * found[0].distance:
                 break
             pitch = float(np.sqrt(self.side_area[start.wall] / SAMPLES_PER_WALL))
             if any(start.near(c, 4.0 * pitch) for c in chosen):
@@ -150,15 +151,15 @@ class _Field:
 
     def _descend(self, start: Start, radius: float) -> tuple[float, F64, F64]:
         """Search ever smaller neighbourhoods of a start on its own B-rep face: least length, point, foot."""
-        face = np.flatnonzero(self.mesh.face_ids == self.mesh.face_ids[start.triangle])
-        corners = self.mesh.triangles[face]
-        low, high = corners.min(axis=1), corners.max(axis=1)
+        low, high, middle, face = self._patch(int(self.mesh.face_ids[start.triangle]))
         best = (np.inf, start.point, start.point)
         for turn in range(ROUNDS):
             centre = best[1]
             close = np.flatnonzero(((low <= centre + radius) & (high >= centre - radius)).all(axis=1))
+            # a regular choice where there are many; later rounds see them all
+            close = close[np.unique(np.linspace(0, len(close) - 1, min(len(close), TRIANGLES)).astype(int))]
             points = np.concatenate([centre[None], _points_near(self.mesh, face[close], centre, radius, turn)])
-            normals = _smooth_normals(self.mesh, face, centre, points)
+            normals = _smooth_normals(self.mesh, face, middle, centre, points)
             distance, met = self.look(points, normals)
             distance = np.where(met == start.other, distance, np.inf)
             k = int(distance.argmin())
@@ -167,6 +168,15 @@ class _Field:
             radius *= SHRINK
         return best if np.isfinite(best[0]) else (start.distance, start.point, start.point)
 
+    def _patch(self, number: int) -> tuple[F64, F64, F64, np.ndarray]:
+        """Boxes, centres and indices of the triangles of a B-rep face."""
+        if number not in self.patches:
+            face = np.flatnonzero(self.mesh.face_ids == number)
+            t = self.mesh.triangles[face]
+            middle = (t[:, 0] + t[:, 1] + t[:, 2]) / 3.0
+            self.patches[number] = (t.min(axis=1), t.max(axis=1), middle, face)
+        return self.patches[number]
+
 
 def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
     """Mesh vertices on the B-rep edges of faces."""
@@ -174,14 +184,14 @@ def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
     return np.unique(np.concatenate(nodes)) if nodes else np.zeros(0, np.int64)
 
 
-def _smooth_normals(mesh: TriangleMesh, face: np.ndarray, centre: F64, points: F64) -> F64:
+def _smooth_normals(mesh: TriangleMesh, face: np.ndarray, middle: F64, centre: F64, points: F64) -> F64:
     """Normals that vary linearly, fitted to the facets of one B-rep face round a centre.
 
     Facet normals are right in the middle of a facet only; at the border of a bent face they are half a facet off.
     Returns (n, 3) float64, unit, at points (n, 3).
     """
-    middle = mesh.triangles[face].mean(axis=1)
-    order = np.argsort(((middle - centre) ** 2).sum(axis=1), kind="stable")[:FIT_FACETS]
+    square = ((middle - centre) ** 2).sum(axis=1)
+    order = np.argpartition(square, FIT_FACETS)[:FIT_FACETS] if len(face) > FIT_FACETS else np.arange(len(face))
     near, weight = face[order], np.sqrt(mesh.areas[face[order]])
     offset = middle[order] - centre
     scale = max(float(np.abs(offset).max()), 1e-12)
@@ -198,7 +208,6 @@ def _points_near(mesh: TriangleMesh, triangles: np.ndarray, centre: F64, radius:
     t = mesh.triangles[triangles]
     corner = (t + INSET * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
     rng = np.random.default_rng(seed)
-    # a regular choice where there are many: their corners are searched anyway
     pick = np.unique(np.linspace(0, len(t) - 1, min(len(t), 64)).astype(int))
     spread = _onto_triangles(t[pick], centre + radius * rng.uniform(-1.0, 1.0, (POINTS, 3)))
     points = np.concatenate([corner, spread])

@@ -89,14 +89,16 @@ def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
     bridging = set()
     for x in sorted(floating):
         ends = _ends(graph, [x], borders, thin - {x})
-        if len(ends) >= 2 and _open_below(graph, x, ends, borders, void[x], floating - thin):
+        if len(ends) >= 2 and _open_below(graph, {x}, ends, borders, void[x], floating - thin):
             bridging.add(x)
     groups = _groups(floating, thin, bridging, borders, void)
     out, out_ends = [], []
     walls = thin - bridging
     for group in groups:
         ends = _ends(graph, group, borders, walls)
-        if len(ends) >= 2:
+        below = np.concatenate([void[x] for x in group])
+        proved = not bridging.isdisjoint(group)
+        if len(ends) >= 2 and (proved or _open_below(graph, set(group), ends, borders, below, floating - thin)):
             out.append(group)
             out_ends.append(ends)
     return Bridges(body, out, out_ends, base)
@@ -204,9 +206,9 @@ def _looks_up(graph: FaceGraph, faces: np.ndarray) -> bool:
     return bool(mean[2] > STEEP_NZ * np.linalg.norm(mean))
 
 
-def _open_below(graph: FaceGraph, x: int, ends: list[End], borders: list[Border], void: F64,
+def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: list[Border], void: F64,
                 unsupported: set[int]) -> bool:
-    """Whether a body leaves void below some part of its span, where no floor or rib carries it either.
+    """Whether a group of bodies leaves void below some part of its span, where no floor or rib carries it either.
 
     unsupported : bodies that carry nothing (bars and the like)
     """
@@ -220,8 +222,8 @@ def _open_below(graph: FaceGraph, x: int, ends: list[End], borders: list[Border]
     along = (b - a) / span
     covered = []
     for border in borders:
-        if x in (border.a, border.b):
-            other = border.b if border.a == x else border.a
+        if (border.a in group) != (border.b in group):
+            other = border.b if border.a in group else border.a
             if other not in unsupported and all(other != e.at for e in ends):
                 u = v[border.nodes][:, :2] @ along
                 covered.append((float(u.min()), float(u.max())))

@@ -17,6 +17,10 @@ from zones.facegraph import STEEP_NZ, FaceGraph
 from zones.model import Channel, Connection, Decomposition, Wall
 from zones.walls import SEAT, Sheets, find_sheets
 
+# Part of its side area that must be steep for a thin body to be a wall: the blades of an inducer twist from upright
+# at the hub to lying at the tip, so most of their area may be less steep.
+STEEP_SHARE = 0.25
+
 
 def decompose(part: Part) -> Decomposition:
     """Find walls, connections and channels of a part.
@@ -52,9 +56,10 @@ def decompose(part: Part) -> Decomposition:
 
 
 def _stands(graph: FaceGraph, sheets: Sheets, bridges: Bridges, label: int) -> bool:
-    """Whether a thin body is mostly steep and stands on the base, the seat, or a floor."""
+    """Whether a thin body holds enough steep area and stands on the base, the seat, or a floor."""
     sides = sheets.sides(label)
-    if graph.area[sides[graph.steep[sides]]].sum() < 0.5 * graph.area[sides].sum():
+    steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= STEEP_NZ)[sides]
+    if (graph.area[sides] * steep).sum() < STEEP_SHARE * graph.area[sides].sum():
         return False
     for link in graph.links:
         for f, g in ((link.a, link.b), (link.b, link.a)):
@@ -76,7 +81,8 @@ def _wall(graph: FaceGraph, sheets: Sheets, body: np.ndarray, label: int, name: 
     thin = sheets.sides(label)
     rows = graph.face_rows(np.isin(np.arange(graph.n), thin))
     low, high = graph.z_range[faces, 0].min(), graph.z_range[faces, 1].max()
-    return Wall(name, tuple(int(f) + 1 for f in faces), tuple(int(f) + 1 for f in faces[graph.steep[faces]]),
+    sides = faces[graph.steep[faces] | sheets.thin[faces]]
+    return Wall(name, tuple(int(f) + 1 for f in faces), tuple(int(f) + 1 for f in sides),
                 float(np.median(graph.inward[rows])), float(low), float(high))
 
 

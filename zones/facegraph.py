@@ -127,7 +127,7 @@ class FaceGraph:
     @cached_property
     def area(self) -> F64:
         """(n,) float64, mm²."""
-        return np.bincount(self.face_of, weights=self.mesh.areas, minlength=self.n)
+        return np.asarray(np.bincount(self.face_of, weights=self.mesh.areas, minlength=self.n), dtype=np.float64)
 
     @cached_property
     def normal(self) -> F64:
@@ -162,6 +162,13 @@ class FaceGraph:
         count = np.bincount(self.face, minlength=self.n)
         return np.asarray(np.bincount(self.face, weights=of_samples.astype(float), minlength=self.n)
                           / np.maximum(count, 1))
+
+    def strip_share(self, of_samples: np.ndarray) -> F64:
+        """(n,) float64: like ``sample_share`` but by area over all faces of one surface (``strip``)."""
+        strip, weight = self.strip[self.face], self.samples.area
+        total = np.bincount(strip, weights=weight, minlength=self.n)
+        found = np.bincount(strip, weights=weight * of_samples, minlength=self.n)
+        return np.asarray((found / np.maximum(total, 1e-30))[self.strip])
 
     def face_rows(self, of_faces: np.ndarray) -> np.ndarray:
         """(k,) int: samples that lie on the faces selected by a mask (n,) bool."""
@@ -202,7 +209,7 @@ class FaceGraph:
         keys, inverse = np.unique(key, return_inverse=True)
         w = np.repeat(self.mesh.normals * self.mesh.areas[:, None], 3, axis=0)
         total = np.column_stack([np.bincount(inverse, weights=w[:, k], minlength=len(keys)) for k in range(3)])
-        return keys, total
+        return keys, np.asarray(total, dtype=np.float64)
 
     def _links(self) -> list[Link]:
         from scipy.spatial import cKDTree
@@ -283,7 +290,7 @@ class FaceGraph:
     def _corner_patches(self, fillet: np.ndarray) -> np.ndarray:
         """Small faces that only continue fillets: every tangent neighbour but at most one is a fillet."""
         out = np.zeros(self.n, bool)
-        for face in np.flatnonzero(~fillet & ~self.sliver):
+        for face in np.flatnonzero(~fillet & ~self.sliver).tolist():
             smooth = {k.other(face) for k in self.at[face] if k.kind == EdgeKind.SMOOTH}
             near = [g for g in smooth if fillet[g]]
             if len(near) >= 2 and len(near) >= len(smooth) - 1 and self.area[face] < max(self.area[near]):
@@ -293,7 +300,7 @@ class FaceGraph:
     def _chamfers(self, fillet: np.ndarray) -> np.ndarray:
         """Narrow faces between two concave edges, leaning half way between their neighbours (a weld, a chamfer)."""
         out = np.zeros(self.n, bool)
-        for face in np.flatnonzero(~fillet & ~self.sliver):
+        for face in np.flatnonzero(~fillet & ~self.sliver).tolist():
             links = sorted((k for k in self.at[face] if k.kind == EdgeKind.CONCAVE), key=lambda k: -k.length)[:2]
             if len(links) < 2 or self.area[face] > 0.15 * self.height * links[1].length:
                 continue

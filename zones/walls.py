@@ -66,7 +66,8 @@ def find_sheets(graph: FaceGraph) -> Sheets:
     body = _join_through_material(graph, thin, _join_across_edges(graph, thin))
     body = _continue_across_junctions(graph, thin, body)
     for label in np.unique(body[thin]):
-        if _is_pillar(graph, np.flatnonzero(thin & (body == label))):
+        faces = thin & (body == label)
+        if _is_pillar(graph, np.flatnonzero(faces)) or not _has_two_sides(graph, faces):
             thin = thin & (body != label)
     body = np.where(thin, body, NO_WALL)
     return Sheets(thin, grow(graph, thin, body))
@@ -74,13 +75,25 @@ def find_sheets(graph: FaceGraph) -> Sheets:
 
 def thin_faces(graph: FaceGraph) -> np.ndarray:
     """(n,) bool: faces that are, over most of their area, a side of material thinner than half its height."""
-    slanted = graph.share(np.abs(graph.mesh.normals[:, 2]) < 0.87) >= 0.5
-    candidate = (graph.steep | slanted) & ~graph.fillet & ~graph.sliver & ~graph.seat
+    candidate = _side_like(graph) & ~graph.fillet & ~graph.sliver & ~graph.seat
     height = _side_heights(graph)
     bore = _bores(graph)
     backed = (graph.back >= 0) & (graph.back_dot < OPPOSED_DOT) & ~bore[graph.back]
     backed &= graph.inward <= 0.5 * height[graph.face]
-    return np.asarray(candidate & ~bore & (graph.sample_share(backed) >= THIN_SHARE))
+    return np.asarray(candidate & ~bore & (graph.strip_share(backed) >= THIN_SHARE))
+
+
+def _side_like(graph: FaceGraph) -> np.ndarray:
+    """(n,) bool: at least 30 degrees off horizontal over half of the face."""
+    return np.asarray(graph.steep | (graph.share(np.abs(graph.mesh.normals[:, 2]) < 0.87) >= 0.5))
+
+
+def _has_two_sides(graph: FaceGraph, faces: np.ndarray) -> bool:
+    """Whether inward rays from faces ((n,) bool) end on another side rather than on a floor (as from a bore)."""
+    rows = graph.face_rows(faces)
+    back = graph.back[rows]
+    two = (back >= 0) & _side_like(graph)[back] & ~graph.seat[back]
+    return float(graph.samples.area[rows][two].sum()) >= 0.5 * float(graph.samples.area[rows].sum())
 
 
 def _side_heights(graph: FaceGraph) -> F64:
@@ -105,12 +118,10 @@ def _bores(graph: FaceGraph) -> np.ndarray:
     for link in graph.links:
         if link.joins and (graph.seat[link.a] or graph.seat[link.b]):
             reaches_seat[[link.a, link.b]] = True
+    reaches_seat = np.isin(graph.strip, graph.strip[reaches_seat])
     hollow = np.array([f.surface in ("cylinder", "cone") and f.curvature_min < -1e-9 for f in graph.part.faces])
-    outside_reaches = np.zeros(graph.n)
-    backs = np.flatnonzero(graph.back >= 0)
-    np.add.at(outside_reaches, graph.face[backs], reaches_seat[graph.back[backs]])
-    count = np.maximum(np.bincount(graph.face, minlength=graph.n), 1)
-    return np.asarray(hollow & reaches_seat & (outside_reaches / count < 0.5))
+    outside_reaches = graph.strip_share((graph.back >= 0) & reaches_seat[graph.back])
+    return np.asarray(hollow & reaches_seat & (outside_reaches < 0.5))
 
 
 def _join_across_edges(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
@@ -209,8 +220,8 @@ def grow(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
         if share > 0:
             heapq.heappush(queue, (-share, face, wanted))
 
-    for face in np.flatnonzero(waiting):
-        offer(int(face))
+    for face in np.flatnonzero(waiting).tolist():
+        offer(face)
     while queue:
         share, face, wanted = heapq.heappop(queue)
         if not waiting[face] or _best_label(graph, face, label, touching) != (-share, wanted):
