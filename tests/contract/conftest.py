@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.logs import configure
 from service.settings import Settings
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
@@ -18,6 +19,7 @@ STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["ST
 def fake_path():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(Path(__file__).parent / "fakes"))
+        configure("error", "console")
         yield
 
 

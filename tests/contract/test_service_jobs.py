@@ -1,18 +1,26 @@
 """The life of a job over HTTP."""
 
 import hashlib
+import runpy
 import time
+from pathlib import Path
 
 import psutil
 import pytest
 
+from schemas.setup import content_hash
+from service.convert import parse_setup
 
-def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish):
+STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
+
+
+def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish, setup_json):
     answer = post(client, "")
     assert answer.status_code == 202
     job = answer.json()
     assert answer.headers["Location"] == job["links"]["self"] == f"/v1/jobs/{job['id']}"
     assert job["state"] in ("queued", "running") and job["kind"] == "plan"
+    assert job["content_sha256"] == content_hash(STEP, parse_setup(setup_json()))
     job = finish(client, job)
     assert (job["state"], job["progress"], job["error"]) == ("proved", 1.0, None)
     assert job["finished_at"] >= job["created_at"]
