@@ -64,3 +64,50 @@ def sample_surface(mesh: TriangleMesh, density: float, *, seed: int = 0,
     pts = (1 - r1)[:, None] * t[:, 0] + (r1 * (1 - r2))[:, None] * t[:, 1] + (r1 * r2)[:, None] * t[:, 2]
     return SurfaceSamples(np.ascontiguousarray(pts), np.ascontiguousarray(mesh.normals[tri]),
                           np.full(n, total / max(n, 1)), mesh.face_ids[tri], tri)
+
+
+def sample_borders(mesh: TriangleMesh, spacing: float, inset: float, triangles: np.ndarray) -> SurfaceSamples:
+    """Samples on or just inside the borders between faces; they stand for no area.
+
+    mesh      : TriangleMesh
+    spacing   : mm along a border
+    inset     : mm, how far inside the triangle a sample lies at most
+    triangles : (k,) int indices of the triangles looked at
+
+    Returns
+    -------
+    SurfaceSamples
+        Along every edge of the chosen triangles whose other triangle belongs to another face.
+    """
+    f = mesh.faces
+    ends = np.sort(np.stack([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+    key = ends[:, 0].astype(np.int64) * len(mesh.vertices) + ends[:, 1]
+    _, group = np.unique(key, return_inverse=True)
+    face = np.repeat(mesh.face_ids, 3).astype(np.int64)
+    least = np.full(group.max() + 1, np.iinfo(np.int64).max)
+    most = np.full(group.max() + 1, np.iinfo(np.int64).min)
+    np.minimum.at(least, group, face)
+    np.maximum.at(most, group, face)
+    border = (least != most)[group].reshape(-1, 3)
+    chosen = np.zeros(len(f), np.bool_)
+    chosen[triangles] = True
+    tri, side = np.nonzero(border & chosen[:, None])
+    a, b = mesh.vertices[f[tri, side]], mesh.vertices[f[tri, (side + 1) % 3]]
+    apex = mesh.vertices[f[tri, (side + 2) % 3]]
+    count = np.maximum(1, np.ceil(np.linalg.norm(b - a, axis=1) / spacing)).astype(np.int64)
+    row = np.repeat(np.arange(len(tri)), count)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((place + 0.5) / count[row])[:, None]
+    on = a[row] + t * (b[row] - a[row])
+    inward = apex[row] - on
+    length = np.linalg.norm(inward, axis=1, keepdims=True)
+    points = on + inward * np.minimum(inset / np.maximum(length, 1e-12), 0.3)
+    return SurfaceSamples(np.ascontiguousarray(points), np.ascontiguousarray(mesh.normals[tri[row]]),
+                          np.zeros(len(row)), mesh.face_ids[tri[row]], tri[row].astype(np.int32))
+
+
+def joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
+    """Several sets of samples as one, in order."""
+    return SurfaceSamples(np.concatenate([p.points for p in parts]), np.concatenate([p.normals for p in parts]),
+                          np.concatenate([p.area for p in parts]), np.concatenate([p.face for p in parts]),
+                          np.concatenate([p.triangle for p in parts]))

@@ -26,11 +26,11 @@ from service.convert import tool_bodies
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare
 from service.preview import draw_preview
-from service.scoring import claims, proof_samples
+from service.scoring import score
 from service.version import VERSION
 from toolpath.plan import CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
-from verify.model import Proof, ProofSetup, ScoredSamples
+from verify.model import ProofSetup, ScoredSamples
 from verify.prove import prove
 
 Progress = Callable[[str, float], None]
@@ -61,13 +61,14 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
     ready = prepare(part_path, setup, progress)
     stock = planning_stock(ready)
     settings = plan_settings(ready, stock)
-    made = plan_job(ready.zones, ready.samples, ready.fields, cut_table(setup), stock, settings,
+    scored = score(ready)
+    dense = scored.samples
+    made = plan_job(ready.zones, scored.checks(ready), ready.fields, cut_table(setup), stock, settings,
                     lambda f: progress("plan", 0.28 + 0.37 * f))
     progress("write", 0.66)
     work = workplan(ready, made, settings)
     program = write_linuxcnc(work) if made.steps else ""
-    dense = proof_samples(ready)
-    zone, given_up = claims(ready, made, dense)
+    zone, given_up = scored.without(made)
     proof = prove([(PROGRAM_NAME, program)] if made.steps else [], ready.part, tool_bodies(setup), proof_setup(ready),
                   ScoredSamples(dense, zone), [z.id for z in ready.zones],
                   lambda f: progress("prove", 0.68 + 0.27 * f))
@@ -117,7 +118,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         As ``plan``; ``ProgramError`` where the program cannot be read.
     """
     ready = prepare(part_path, setup, progress)
-    dense = proof_samples(ready)
+    dense = score(ready).samples
     proof = prove([("program", program_text)], ready.part, tool_bodies(setup), proof_setup(ready),
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f))
     progress("done", 1.0)

@@ -13,7 +13,7 @@ from geometry.errors import SetupError
 from geometry.frames import Placement
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
-from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface
 from geometry.step import read_part
 from schemas.setup import Setup
 from service.convert import face_numbers, tool_bodies
@@ -24,6 +24,10 @@ from zones.zoning import ZoneArea, build_zones, face_regions, machinable_faces
 
 PLANNING_DENSITY = 25.0  # samples a mm²
 MOST_SAMPLES = 1_500_000
+LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
+MOST_DENSITY = 150.0
+BORDER_SPACING = 0.2  # mm
+BORDER_INSET = 0.0  # mm: on the border itself
 AIR = 4.0  # mm beyond the cutter's radius that the planning lattice covers round the part
 
 Progress = Callable[[str, float], None]
@@ -104,7 +108,7 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     tree = TriangleTree(part.mesh)
     obstacles = TriangleTree(obstacle_mesh(part, setup)) if setup.fixtures else tree
     decomposition = decompose(part)
-    samples = machinable_samples(part, decomposition, setup, PLANNING_DENSITY, 0)
+    samples = planning_samples(part, decomposition, setup)
     lift = max(0.1 * setup.quality.scallop_height_mm, 1.5 * part.chord)
     fields = {}
     for k, body in enumerate(tool_bodies(setup)):
@@ -119,12 +123,32 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
                     (*part.warnings, *decomposition.warnings))
 
 
-def machinable_samples(part: Part, decomposition: Decomposition, setup: Setup, density: float,
-                       seed: int) -> SurfaceSamples:
-    """Samples of the machinable area Ma.
+def planning_samples(part: Part, decomposition: Decomposition, setup: Setup) -> SurfaceSamples:
+    """What zones are built of and passes are measured at.
 
-    density : samples a mm², less where the whole surface would take more than ``MOST_SAMPLES`` at seed 0
-    seed    : planning and proof use different ones
+    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
+    every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them.
+    """
+    triangles = machinable_triangles(part, decomposition, setup)
+    ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
+    thin = min(1.0, MOST_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
+    sets = []
+    for face in np.unique(ids):
+        mine = triangles[ids == face]
+        area = float(part.mesh.areas[mine].sum())
+        density = max(PLANNING_DENSITY * thin, min(LEAST_SAMPLES / max(area, 1e-9), MOST_DENSITY))
+        sets.append(sample_surface(part.mesh, density, seed=int(face), triangles=mine))
+    sets.append(sample_borders(part.mesh, BORDER_SPACING, BORDER_INSET, triangles))
+    return joined(sets)
+
+
+def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup) -> np.ndarray:
+    """Indices of the mesh triangles of the machinable area Ma.
+
+    Raises
+    ------
+    SetupError
+        The setup names faces the part does not have.
     """
     wanted = None if setup.operations.faces is None else set(face_numbers(setup.operations.faces))
     excluded = set(face_numbers(setup.operations.exclude_faces))
@@ -135,8 +159,4 @@ def machinable_samples(part: Part, decomposition: Decomposition, setup: Setup, d
                          limit=len(part.faces), remedy="name faces of zones.json")
     coarse = sample_surface(part.mesh, 4.0, seed=1234)
     faces = machinable_faces(coarse, decomposition, wanted, excluded)
-    triangles = np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))
-    if seed == 0:
-        area = float(part.mesh.areas[triangles].sum())
-        density = min(density, MOST_SAMPLES / max(area, 1e-9))
-    return sample_surface(part.mesh, density, seed=seed, triangles=triangles)
+    return np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))

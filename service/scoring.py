@@ -1,19 +1,22 @@
 """Which samples of the proof a zone answers for.
 
-The proof has samples of its own, four times as dense as the planner's. Each is handed to the zone of a planning
-sample of the same face and form near it, if that zone's tool can touch it: judged by the exact reach of the
-tool, not by what the planner did.
+The proof has samples of its own, four times as dense as those zones are built of. Each is handed to the zone of a
+planning sample of the same face and form near it, if that zone's tool can touch it: judged by the exact reach of
+the tool before any pass is laid. The planner then measures its passes at the same places, by a formula of its own
+(``toolpath.residual``); the proof measures there what the program it reads back leaves (``verify.removal``).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from geometry.sampling import SurfaceSamples
-from service.prepare import Prepared, machinable_samples
-from toolpath.plan import Plan
+from geometry.sampling import SurfaceSamples, sample_surface
+from service.prepare import Prepared, machinable_triangles
+from toolpath.plan import Checks, Plan
 from zones.reach import touchable
 from zones.zoning import forms_of
 
@@ -22,43 +25,68 @@ PROOF_SEED = 20_011
 NEIGHBOURS = 4
 
 
-def proof_samples(ready: Prepared) -> SurfaceSamples:
-    """Samples of the machinable area for the proof, ``PROOF_DENSITY`` a mm²."""
-    return machinable_samples(ready.part, ready.decomposition, ready.setup, PROOF_DENSITY, PROOF_SEED)
+@dataclass(frozen=True, eq=False)
+class Score:
+    """The samples of the proof and who answers for them.
 
-
-def claims(ready: Prepared, plan: Plan | None, dense: SurfaceSamples) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Zone of every proof sample, and which ones the plan gave up.
-
-    Returns
-    -------
-    zone     : (n,) int32, 0 for none, else the place of the zone in ``ready.zones`` from 1
-    given_up : (n,) bool, a tool could touch it but the plan's own measure says no pass does
+    samples : SurfaceSamples of the machinable area
+    zone    : (n,) int32, 0 for none, else the place of the zone in ``ready.zones`` from 1
+    tips    : (n, 3) float64, mm, an admissible tip that touches each claimed sample
     """
+
+    samples: SurfaceSamples
+    zone: NDArray[np.int32]
+    tips: NDArray[np.float64]
+
+    def checks(self, ready: Prepared) -> list[Checks]:
+        """Per zone, what its passes are measured at: its samples here, and the borders of its faces."""
+        out = []
+        for k, z in enumerate(ready.zones, start=1):
+            mine = self.zone == k
+            border = ready.samples.area[z.samples] == 0
+            edge = z.samples[border]
+            out.append(Checks(np.vstack([self.samples.points[mine], ready.samples.points[edge]]),
+                              np.vstack([self.samples.normals[mine], ready.samples.normals[edge]]),
+                              np.vstack([self.tips[mine], z.tips[border]])))
+        return out
+
+    def without(self, plan: Plan) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """Zone of every sample less those the plan gave up, and which these are.
+
+        A sample is given up where a tool could touch it but the plan's own measure says that no pass does. It
+        then stands in the remainder, reason 'pass'.
+        """
+        zone, lost = self.zone.copy(), np.zeros(len(self.zone), np.bool_)
+        for k, p in enumerate(plan.zones, start=1):
+            mine = np.flatnonzero(self.zone == k)
+            lost[mine if p.step is None else mine[p.left[p.left < len(mine)]]] = True
+        zone[lost] = 0
+        return zone, lost
+
+
+def score(ready: Prepared) -> Score:
+    """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
+    triangles = machinable_triangles(ready.part, ready.decomposition, ready.setup)
+    dense = sample_surface(ready.part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles)
     owner = np.zeros(len(ready.samples), np.int32)
     for k, z in enumerate(ready.zones, start=1):
         owner[z.samples] = k
-    lost = np.zeros(len(ready.samples), np.bool_)
-    for p in plan.zones if plan is not None else ():
-        gone = p.zone.samples if p.step is None else p.zone.samples[p.left]
-        lost[gone] = True
-    zone, nearest = _neighbours(ready, owner, dense)
+    zone = _neighbours(ready, owner, dense)
+    tips = np.zeros((len(dense), 3))
     for k, z in enumerate(ready.zones, start=1):
         mine = np.flatnonzero(zone == k)
         if not len(mine):
             continue
-        _, whole, _ = touchable(ready.fields[z.tool.id], dense.points[mine], dense.normals[mine], ready.lift)
+        _, whole, tip = touchable(ready.fields[z.tool.id], dense.points[mine], dense.normals[mine], ready.lift)
+        tips[mine] = tip
         zone[mine[~(whole & (dense.points[mine, 2] >= z.plane))]] = 0
-    given_up = (zone > 0) & lost[nearest]
-    zone[given_up] = 0
-    return zone, given_up
+    return Score(dense, zone, tips)
 
 
 def _neighbours(ready: Prepared, owner: NDArray[np.int32],
-                dense: SurfaceSamples) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Zone of the nearest owned of a few planning samples of the same face and form, and the nearest of all."""
+                dense: SurfaceSamples) -> NDArray[np.int32]:
+    """Zone of the nearest owned of a few planning samples of the same face and form."""
     zone = np.zeros(len(dense), np.int32)
-    nearest = np.zeros(len(dense), np.int64)
     codes = {"level": 0, "shallow": 1, "steep": 2}
     key = ready.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(ready.samples.normals)])
     wanted = dense.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(dense.normals)])
@@ -71,8 +99,7 @@ def _neighbours(ready: Prepared, owner: NDArray[np.int32],
         k = min(NEIGHBOURS, len(pool))
         _, near = cKDTree(ready.samples.points[pool]).query(dense.points[rows], k=k, workers=2)
         near = pool[near.reshape(len(rows), k)]
-        nearest[rows] = near[:, 0]
         owners = owner[near]
         first = np.argmax(owners > 0, axis=1)
         zone[rows] = owners[np.arange(len(rows)), first]
-    return zone, nearest
+    return zone

@@ -58,10 +58,12 @@ def thinned(points: F64, tolerance: float) -> F64:
 
 
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
-    """A (ny, nx) mask grown by ``cells`` lattice steps, Euclidean."""
-    if not mask.any() or cells <= 0:
+    """A (ny, nx) mask grown by ``cells`` lattice steps in each direction, a square round every node."""
+    size = 2 * int(np.ceil(cells)) + 1
+    if size <= 1:
         return mask
-    return np.asarray(ndimage.distance_transform_edt(~mask) <= cells)
+    out = ndimage.maximum_filter1d(mask.view(np.uint8), size, axis=0)
+    return np.asarray(ndimage.maximum_filter1d(out, size, axis=1).view(np.bool_))
 
 
 def _window(active: NDArray[np.bool_], grow: int) -> tuple[slice, slice]:
@@ -85,7 +87,7 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
     """
     if not active.any():
         return []
-    lat, tool = field.lattice, field.tool
+    lat = field.lattice
     rows, cols = _window(active, 1)
     blocked = np.ascontiguousarray(field.height[rows, cols] > z + LEVEL_TOLERANCE)
     ids, starts, closed = trace(blocked, np.ascontiguousarray(active[rows, cols]), SEGMENTS)

@@ -13,7 +13,8 @@ clearance beside a wall.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as fresh
 
 import numpy as np
 
@@ -55,10 +56,10 @@ class Linker:
     field: TipField
     stock: StockMap
     motions: Motions
-    trajectories: list[Trajectory] = field(default_factory=list)
+    trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
-    skipped: list[Line] = field(default_factory=list)
+    skipped: list[Line] = fresh(default_factory=list)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found."""
@@ -126,7 +127,7 @@ class Linker:
         ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
         left = np.array([-ahead[1], ahead[0]])
         ways = [left, -ahead, (left - ahead) / math.sqrt(2), -left, (left + ahead) / math.sqrt(2)]
-        for far in np.array([0.5, 1.0, 1.5, 2.0, 3.0]) * tool.diameter:
+        for far in (2.5 * self.stock.lattice.step, *(np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0]) * tool.diameter)):
             for side in ways:
                 q = np.array([*(start[:2] + far * side), start[2]])
                 if bool(self.stock.in_air(q[None, :], tool)[0]) and self._free_move(q[:2], start[:2], start[2]):
@@ -139,10 +140,8 @@ class Linker:
         return None
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
-        over = float(self.stock.overlap(points, self.field.tool).max()) + 0.1
-        if not math.isfinite(over):
-            over = 0.1
-        ramp = self._ramp(points, closed, max(over, 0.1))
+        over = max(float(self.stock.overlap(points, self.field.tool).max()), self.motions.step_down) + 0.1
+        ramp = self._ramp(points, closed, over)
         return None if ramp is None else (ramp[:1], ramp, False)
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:

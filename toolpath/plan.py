@@ -8,26 +8,26 @@ never sets the step for a whole zone.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
 from toolpath.levels import Line, dilated
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
 from toolpath.stock import StockMap
-from toolpath.strategies import floor, layers, zigzag, zlevel
+from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach import TipField
 from zones.zoning import Form, ZoneArea
 
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off
 
 Progress = Callable[[float], None]
 
@@ -67,13 +67,26 @@ class PlanSettings:
 
 
 @dataclass(frozen=True, eq=False)
+class Checks:
+    """Where a zone is measured: the samples it will be judged on.
+
+    points, normals : (k, 3) float64, mm and unit
+    tips            : (k, 3) float64, mm, an admissible tip that touches each
+    """
+
+    points: F64
+    normals: F64
+    tips: F64
+
+
+@dataclass(frozen=True, eq=False)
 class ZonePlan:
     """What was planned for a zone.
 
     step     : id of its finishing workingstep, None where nothing could be planned
     side_step: mm between passes as laid out
     passes   : cutting passes between links
-    left     : (k,) indices into ``zone.samples`` the planner's own measure finds above the budget
+    left     : (k,) indices into the zone's checks that the planner's own measure finds above the budget
     """
 
     zone: ZoneArea
@@ -92,13 +105,13 @@ class Plan:
     zones: tuple[ZonePlan, ...]
 
 
-def plan_job(zones: Sequence[ZoneArea], samples: SurfaceSamples, fields: dict[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: dict[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
-    samples  : of the machinable area, what the zones index
+    checks   : what each zone is measured at, in the order of the zones
     fields   : TipField by tool id
     cut_data : CutData by tool id
     stock    : StockMap, lowered as the plan grows
@@ -111,6 +124,7 @@ def plan_job(zones: Sequence[ZoneArea], samples: SurfaceSamples, fields: dict[st
     steps: list[Workingstep] = []
     plans: list[ZonePlan] = []
     order = list(dict.fromkeys(z.tool.id for z in zones))
+    check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     done = 0
     for tid in order:
         mine = [z for z in zones if z.tool.id == tid]
@@ -121,7 +135,7 @@ def plan_job(zones: Sequence[ZoneArea], samples: SurfaceSamples, fields: dict[st
                 steps.append(step)
         for zone in mine:
             if settings.finishing:
-                step, plan = _finish(zone, samples, field, cut, stock, settings, f"S{len(steps) + 1:02d}")
+                step, plan = _finish(zone, check_of[zone.id], field, cut, stock, settings, f"S{len(steps) + 1:02d}")
                 if step is not None:
                     steps.append(step)
                 plans.append(plan)
@@ -141,11 +155,10 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     """One workingstep that takes the stock above all zones of a tool off in depth layers."""
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
-    area = dilated(lat.mask(tips[:, :2]), max(0.5 * tool.radius / lat.step, 1.5))
-    allowance = 0.1 * cut.step_down
+    allowance = max(0.1 * cut.step_down, 1.2 * lat.step)
     linker = Linker(field, stock, _motions(cut, settings))
     bottom = float(tips[:, 2].min()) + allowance
-    top = _stock_top(stock, lat, area, tool)
+    top = stock.highest
     if top <= bottom:
         return None
     for z in layers.layer_heights(top, bottom, 0.85 * cut.step_down):
@@ -160,30 +173,26 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
                  0.8 * tool.radius, linker, settings)
 
 
-def _stock_top(stock: StockMap, lat: object, area: NDArray[np.bool_], tool: ToolBody) -> float:
-    del lat, area, tool
-    return stock.highest
-
-
-def _finish(zone: ZoneArea, samples: SurfaceSamples, field: TipField, cut: CutData, stock: StockMap,
+def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock: StockMap,
             settings: PlanSettings, step_id: str) -> tuple[Workingstep | None, ZonePlan]:
     """The finishing workingstep of one zone."""
-    points, normals = samples.points[zone.samples], samples.normals[zone.samples]
-    residual = ResidualMap(points + settings.stock_allowance * normals)
+    points, normals = checks.points, checks.normals
+    residual = ResidualMap(points + settings.stock_allowance * normals, normals)
     linker = Linker(field, stock, _motions(cut, settings))
-    name, spacing, rounds = _strategy(zone, normals, field, cut, settings)
+    name, spacing, rounds = _strategy(zone, checks, field, cut, settings)
     budget = PASS_SHARE * settings.scallop_height
     failing = np.arange(len(points))
-    for k in range(REFINEMENTS + 1):
-        for lines in rounds(k, zone.tips[failing]):
-            either = settings.either_way or name == "zigzag"
+    for k in range(REFINEMENTS + 2 if len(points) else 0):
+        groups = rounds(k, checks.tips[failing]) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
+        for lines in groups:
             if name != "zigzag":
-                lines = nearest_order(lines, linker.at, either)
+                lines = nearest_order(lines, linker.at, settings.either_way)
             for line in lines:
-                if not settings.climb and name == "zlevel" and not settings.either_way:
+                if name == "zlevel" and not settings.climb and not settings.either_way:
                     line = line.reversed()
                 before = len(linker.trajectories)
-                linker.add(line)
+                for layer in zigzag.skimmed(line, stock, field.tool, SKIN * field.tool.diameter):
+                    linker.add(layer)
                 for t in linker.trajectories[before:]:
                     if t.motion is Motion.CUT:
                         residual.cut(t.points, field.tool)
@@ -202,10 +211,10 @@ def _finish(zone: ZoneArea, samples: SurfaceSamples, field: TipField, cut: CutDa
 Rounds = Callable[[int, F64], list[list[Line]]]
 
 
-def _strategy(zone: ZoneArea, normals: F64, field: TipField, cut: CutData,
+def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
               settings: PlanSettings) -> tuple[str, float, Rounds]:
     """Name, distance between passes, and the passes of round k for the tips that still need some."""
-    tool, chord = field.tool, 0.5 * settings.chordal_tolerance
+    tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
     cusp = CUSP_SHARE * settings.scallop_height
     if zone.form is Form.STEEP:
         step = zlevel.level_step(tool, normals, cusp, cut.step_down)
@@ -215,10 +224,8 @@ def _strategy(zone: ZoneArea, normals: F64, field: TipField, cut: CutData,
                 levels, window = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
             else:
                 window = step / 2.0 ** k
-                top = float(zone.tips[:, 2].max())
-                levels = np.unique(np.round((top - tips[:, 2]) / window)) * -window + top
-                levels = levels[::1]
-            return zlevel.waterlines(field, tips, np.sort(levels)[::-1], 1.001 * window, chord)
+                levels = zlevel.lowest_of_groups(tips[:, 2], window)
+            return zlevel.waterlines(field, tips, levels, 1.001 * window, chord)
 
         return "zlevel", step, waterlines
     flat = tool.radius - tool.corner_radius
@@ -231,7 +238,7 @@ def _strategy(zone: ZoneArea, normals: F64, field: TipField, cut: CutData,
 
         return "floor", 1.6 * flat, planes
     side = zigzag.side_step(tool.corner_radius, normals, cusp)
-    x_first = zigzag.along_x(dilated(field.lattice.mask(zone.tips[:, :2]), 3.0))
+    x_first = zigzag.along_x(dilated(field.lattice.mask(checks.tips[:, :2]), 3.0))
 
     def parallel(k: int, tips: F64) -> list[list[Line]]:
         if k == 0:
@@ -251,8 +258,3 @@ def _step(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], 
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
                        settings.scallop_height, settings.chordal_tolerance, linker.finish(), outline,
                        max(z.top for z in zones), min(z.bottom for z in zones), settings.climb)
-
-
-def renumbered(plan: Plan, steps: Sequence[Workingstep]) -> Plan:
-    """The plan with other workingsteps, ids unchanged."""
-    return replace(plan, steps=tuple(steps))

@@ -14,12 +14,13 @@ UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
 class ResidualMap:
     """Residual material at samples, lowered pass by pass.
 
-    points   : (n, 3) float64, mm, moved out by nothing: on the surface
+    points   : (n, 3) float64, mm; normals : (n, 3) float64 unit
     residual : (n,) float64, mm, distance to the nearest swept cutting part so far
     """
 
-    def __init__(self, points: F64, cell: float = 0.6) -> None:
+    def __init__(self, points: F64, normals: F64, cell: float = 0.6) -> None:
         self.points = np.ascontiguousarray(points)
+        self.level = np.ascontiguousarray(normals[:, 2] > 1.0 - 1e-6)
         self.residual = np.full(len(points), UNTOUCHED)
         self.cell = cell
         lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
@@ -35,5 +36,5 @@ class ResidualMap:
 
     def cut(self, path: F64, tool: ToolBody) -> None:
         """Lower the residual by one polyline of tips (m, 3), mm."""
-        lower(self.points, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx, self.ncy,
+        lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx, self.ncy,
               np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.residual)

@@ -16,6 +16,9 @@ from geometry.toolbody import ToolBody
 from toolpath.kernels.stock import overlaps, stamp
 from zones.reach import Lattice
 
+SURE_RIM = 0.7  # lattice steps: half a cell diagonal
+AIR_TOLERANCE = 0.01  # mm
+
 
 class StockMap:
     """Top of the stock over a lattice.
@@ -48,16 +51,21 @@ class StockMap:
         lat = self.lattice
         stamp(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius, tool.corner_radius)
 
-    def overlap(self, tips: F64, tool: ToolBody) -> F64:
-        """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air."""
+    def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
+        """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.
+
+        rim : lattice steps added to the radius looked at; -0.8 overlooks the walls a cutter touches, 0.7 sees
+              everything that may be there
+        """
         out = np.empty(len(tips))
         lat = self.lattice
-        overlaps(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius, out)
+        overlaps(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
+                 rim * lat.step, out)
         return out
 
-    def in_air(self, tips: F64, tool: ToolBody, tolerance: float = 0.02) -> NDArray[np.bool_]:
-        """(n,) bool: the cutting part would touch no stock at tips (n, 3), mm."""
-        return np.asarray(self.overlap(tips, tool) <= tolerance)
+    def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:
+        """(n,) bool: the cutting part is sure to touch neither stock nor part at tips (n, 3), mm."""
+        return np.asarray(self.overlap(tips, tool, SURE_RIM) <= AIR_TOLERANCE)
 
     @property
     def highest(self) -> float:

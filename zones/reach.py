@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
+from geometry.kernels.drop import blocked_range, drop_range
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
@@ -30,6 +31,8 @@ from zones.kernels.lattice import noncut_blocked, noncut_lookup
 LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
 FRUSTUM_SLICES = 6
+FEW = 4000  # queries below this are not worth waking a second thread for
+EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
 
 
@@ -176,7 +179,12 @@ class TipField:
     def tips(self, xy: F64) -> F64:
         """Tip limit (n,) mm of the whole assembly at xy (n, 2) mm; exact for the cutting part."""
         xy = np.ascontiguousarray(xy, dtype=np.float64)
-        out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
+        if len(xy) < FEW:
+            out = np.empty(len(xy))
+            drop_range(self.tree.arrays, xy, self.grown_radius, self.grown_corner, 0, len(xy), out)
+        else:
+            out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner)
+        out += self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse_row, xy)))
 
     @property
@@ -188,7 +196,11 @@ class TipField:
         """(n,) bool: the cutting part would enter the obstacles at tips (n, 3) mm."""
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
-        return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
+        if len(lowered) >= FEW:
+            return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
+        out = np.empty(len(lowered), np.bool_)
+        blocked_range(self.tree.arrays, lowered, self.grown_radius, self.grown_corner, 0, len(lowered), out)
+        return out
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: shank or holder would come nearer than their clearance at tips (n, 3) mm."""
@@ -220,7 +232,8 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
     return np.ascontiguousarray(out)
 
 
-def touchable(field: TipField, points: F64, normals: F64, lift: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+def touchable(field: TipField, points: F64, normals: F64,
+              lift: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
     """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
 
     Beside a wall the tool must also have room to move away from it by ``PLAY_STEPS`` lattice steps: a channel that
@@ -245,7 +258,7 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float) -> tuple[
     flat = tool.radius - tool.corner_radius
     if flat > 0:
         level = normals[:, 2] > 1.0 - 1e-6
-        for reach in (0.5 * flat, 0.999 * flat):
+        for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)):
             for side in FLAT_RING:
                 todo = np.flatnonzero(level & ~whole)
                 if not len(todo):
@@ -257,5 +270,6 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float) -> tuple[
                 cutter[todo] |= free
                 whole[todo[ok]] = True
                 tips[todo[ok]] = trial[ok]
+    tips[:, 2] -= LEVEL_TOLERANCE
     seen = normals[:, 2] > -0.02
     return cutter & seen, whole & seen, tips

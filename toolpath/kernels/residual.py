@@ -3,7 +3,8 @@
 For a tip at c the cutter (corner r, radius R, endless upwards) is as far from a point p as
     sqrt(u^2 + w^2) - r,   u = max(rho - (R - r), 0),  w = max(c_z + r - p_z, 0),
 rho the distance of p from the axis in plan. The least over all tips of the passes is what remains at p to within
-the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). Along a
+the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). On a level
+plane, where a sharp-cornered end passes beside p or over it, the height above p is taken instead. Along a
 straight move the least lies at the nearest point in plan, at the nearest point in space to the corner's centre,
 or at an end; all are tried.
 """
@@ -14,36 +15,44 @@ import numpy as np
 from numba import njit
 
 
+FAR = 1e3
+
+
 @njit(cache=True, nogil=True, inline="always")
-def _gap(px, py, pz, cx, cy, cz, radius, corner):
+def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
+    if level:
+        u = np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner)
+        if u > corner:
+            return FAR
+        return cz - pz + (corner - np.sqrt(corner * corner - u * u) if u > 0.0 else 0.0)
     u = max(np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner), 0.0)
     w = max(cz + corner - pz, 0.0)
     return np.sqrt(u * u + w * w) - corner
 
 
 @njit(cache=True, nogil=True)
-def _segment_gap(p, a, b, radius, corner):
+def _segment_gap(p, a, b, radius, corner, level):
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    best = min(_gap(p[0], p[1], p[2], a[0], a[1], a[2], radius, corner),
-               _gap(p[0], p[1], p[2], b[0], b[1], b[2], radius, corner))
+    best = min(_gap(p[0], p[1], p[2], a[0], a[1], a[2], radius, corner, level),
+               _gap(p[0], p[1], p[2], b[0], b[1], b[2], radius, corner, level))
     d2 = dx * dx + dy * dy
     if d2 > 0.0:
         s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / d2
         if 0.0 < s < 1.0:
-            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner))
+            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner, level))
     d3 = d2 + dz * dz
     if d3 > 0.0 and dz != 0.0:
         s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy + (p[2] - a[2] - corner) * dz) / d3
         if 0.0 < s < 1.0:
-            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner))
+            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner, level))
     return best
 
 
 @njit(cache=True, nogil=True)
-def lower(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
+def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell; gx, gy, cell: corner and size of the cells.
+    level (n,): the sample lies on a level plane. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell; gx, gy, cell: corner and size of the cells.
     """
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
@@ -60,6 +69,6 @@ def lower(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, r
                     s = cell_items[q]
                     if residual[s] <= 0.0 or points[s, 2] < z_lo or points[s, 2] > z_hi:
                         continue
-                    d = _segment_gap(points[s], a, b, radius, corner)
+                    d = _segment_gap(points[s], a, b, radius, corner, level[s])
                     if d < residual[s]:
                         residual[s] = d

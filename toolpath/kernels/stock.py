@@ -45,14 +45,14 @@ def stamp(top, x0, y0, step, points, radius, corner):
 
 
 @njit(cache=True, nogil=True)
-def overlap(top, x0, y0, step, tip, radius, corner):
+def overlap(top, x0, y0, step, tip, radius, corner, margin):
     """How far the stock stands above the cutter's bottom at a tip (3,), mm: greatest over the disc; <= 0 is air.
 
-    The outermost ring of 0.8 lattice steps is left out: there a node cannot tell a wall the cutter touches from
-    stock.
+    margin : mm added to the radius of the disc that is looked at. Below zero it leaves out the rim, where a node
+             cannot tell a wall the cutter touches from stock; above zero it is sure to see every stock, and walls.
     """
     ny, nx = top.shape
-    inner = max(radius - 0.8 * step, 0.35 * radius)
+    inner = max(radius + margin, 0.35 * radius)
     n_r = int(np.ceil(inner / step))
     jc, ic = int(np.rint((tip[0] - x0) / step)), int(np.rint((tip[1] - y0) / step))
     worst = -np.inf
@@ -60,14 +60,14 @@ def overlap(top, x0, y0, step, tip, radius, corner):
         for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
             rho = np.sqrt((x0 + j * step - tip[0]) ** 2 + (y0 + i * step - tip[1]) ** 2)
             if rho <= inner:
-                over = top[i, j] - tip[2] - _bottom(rho, radius, corner)
+                over = top[i, j] - tip[2] - _bottom(min(rho, radius), radius, corner)
                 if over > worst:
                     worst = over
     return worst
 
 
 @njit(cache=True, nogil=True)
-def overlaps(top, x0, y0, step, tips, radius, corner, out):
+def overlaps(top, x0, y0, step, tips, radius, corner, margin, out):
     """``overlap`` for tips (n, 3)."""
     for k in range(len(tips)):
-        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner)
+        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner, margin)

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from geometry.toolbody import ToolBody
 from toolpath.kernels.follow import follow
-from toolpath.levels import Line, dilated, thinned, true_runs
+from toolpath.levels import Line, dilated, pieces_where, thinned, true_runs
+from toolpath.stock import StockMap
 from zones.reach import TipField
 
 SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
@@ -91,3 +93,44 @@ def _joined(runs: list[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
         else:
             out.append((a, b))
     return out
+
+
+def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float) -> list[Line]:
+    """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
+
+    line  : Line; level ones are returned alone
+    stock : StockMap as it stands
+    skin  : mm, the most that is taken off in a descent
+
+    Returns
+    -------
+    list of Line
+        Highest first; the pass itself is last.
+    """
+    rise = np.ptp(line.points[:, 2])
+    if rise < 1e-6:
+        return [line]
+    points = _dense(line.points, 0.3 * tool.radius)
+    over = stock.overlap(points, tool, -0.3)
+    over[~np.isfinite(over)] = 0.0
+    steep = _descends(points)
+    if not steep.any() or float(over[steep].max()) <= skin:
+        return [line]
+    out: list[Line] = []
+    for k in range(int(float(over[steep].max()) / skin), 0, -1):
+        lifted = Line(points + np.array([0.0, 0.0, k * skin]), False)
+        out.extend(pieces_where(lifted, (over > k * skin) & steep, tool.radius, 4.0 * tool.radius))
+    return [*out, line]
+
+
+def _dense(points: F64, spacing: float) -> F64:
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
+    return np.column_stack([np.interp(more, s, points[:, c]) for c in range(3)])
+
+
+def _descends(points: F64) -> NDArray[np.bool_]:
+    """(n,) bool: one of the moves at a point is steeper than 3 degrees, either way."""
+    move = np.diff(points, axis=0)
+    steep = np.abs(move[:, 2]) > 0.05 * np.hypot(move[:, 0], move[:, 1])
+    return np.concatenate([steep, [False]]) | np.concatenate([[False], steep])

@@ -43,6 +43,15 @@ def heights(top: float, bottom: float, step: float) -> F64:
     return np.linspace(top, bottom, n + 1)
 
 
+def lowest_of_groups(z: F64, window: float) -> F64:
+    """Levels that serve heights z (n,): each group no higher than ``window`` mm gets its lowest; descending."""
+    out: list[float] = []
+    for v in np.unique(z).tolist():
+        if not out or v > out[-1] + window:
+            out.append(v)
+    return np.array(out[::-1])
+
+
 def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance: float) -> list[list[Line]]:
     """Level lines that touch an area, level by level.
 

@@ -1,0 +1,39 @@
+"""Single touches: what no pass got to although the tool can, place by place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.mesh import F64
+from toolpath.levels import Line, moves_free
+from zones.reach import LEVEL_TOLERANCE, TipField
+
+MOST = 400  # places; a zone with more has another problem than a missed spot
+APART = 0.1  # mm, places nearer than this are one
+SHORT = 0.02  # mm, length of a touch
+
+
+def touches(field: TipField, tips: F64) -> list[Line]:
+    """Short level moves that end on tips which touch what is left.
+
+    field : TipField
+    tips  : (n, 3) float64, mm, admissible
+
+    Returns
+    -------
+    list of Line
+        One for every place, at most ``MOST``; a place with no free direction is left out.
+    """
+    out: list[Line] = []
+    _, first = np.unique(np.round(tips / APART).astype(np.int64), axis=0, return_index=True)
+    around = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(12) * np.pi / 6]) * SHORT
+    for tip in tips[np.sort(first)[:MOST]]:
+        starts = tip + around
+        at = starts + np.array([0.0, 0.0, LEVEL_TOLERANCE])
+        free = np.flatnonzero(~(field.blocked_by_cutter(at) | field.blocked_by_body(at)))
+        for k in free:
+            line = np.vstack([starts[k], tip])
+            if moves_free(field, line).all():
+                out.append(Line(line, False))
+                break
+    return out
