@@ -60,7 +60,20 @@ def _on_line_s(s, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
 
 @njit(cache=True, nogil=True)
 def _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz):
-    """Extent in t of the region on the line of constant height h (a ray that is not flat)."""
+    """Extent in t of the region on the line of constant height h.
+
+    The line is walked in s where the ray is steeper than the move and in t where it is flatter: the slope of the
+    one over the other then never exceeds 1 (a nearly level ray and a plunge would cost all digits in s).
+    """
+    if abs(dz) > abs(nz):
+        s0, s1 = (qz - h) / dz, nz / dz
+        lo, hi = _below_zero(max(att + 2.0 * ats * s1 + ass * s1 * s1, 0.0), bt + ats * s0 + (bs + ass * s0) * s1,
+                             c + 2.0 * bs * s0 + ass * s0 * s0)
+        if s1 == 0.0:
+            return (lo, hi) if 0.0 < s0 < 1.0 else (INF, -INF)
+        ta, tb = -s0 / s1, (1.0 - s0) / s1
+        lo, hi = max(lo, min(ta, tb)), min(hi, max(ta, tb))
+        return (lo, hi) if lo <= hi else (INF, -INF)
     t0, t1 = (h - qz) / nz, dz / nz
     a = att * t1 * t1 + 2.0 * ats * t1 + ass
     b = att * t0 * t1 + ats * t0 + bt * t1 + bs
@@ -85,15 +98,9 @@ def quadric_interval(att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
     lo, hi = min(lo, u), max(hi, v)
     for k in range(2):
         h = h0 if k == 0 else h1
-        if abs(nz) > FLAT_RAY:
+        if abs(nz) > FLAT_RAY or abs(dz) > 1e-12:
             u, v = _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz)
             lo, hi = min(lo, u), max(hi, v)
-        elif abs(dz) > 1e-12:
-            s = (qz - h) / dz
-            if 0.0 < s < 1.0:
-                u, v = _below_zero(att, bt + ats * s, c + 2.0 * bs * s + ass * s * s)
-                if u <= v:
-                    lo, hi = min(lo, u), max(hi, v)
     if ats * ats < att * ass * (1.0 - 1e-12):
         u, v = _below_zero(att - ats * ats / ass, bt - ats * bs / ass, c - bs * bs / ass)
         if u <= v:
