@@ -18,6 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry.arrays import finite_points
 from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
@@ -134,24 +135,6 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
 
 def _one_thread() -> bool:
     return bool(numba.get_num_threads() == 1)
-
-
-def finite_points(values: ArrayLike, width: int, name: str) -> F64:
-    """``values`` as a C-contiguous (n, width) float64 array; GeometryError, naming ``name``, where it is none."""
-    try:
-        points = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"{name} must be numbers of shape (n, {width}): {error}", code="bad_array",
-                            subjects=(name,)) from error
-    if points.shape == (0,):
-        return points.reshape(0, width)
-    if points.ndim != 2 or points.shape[1] != width:
-        raise GeometryError(f"{name} must have shape (n, {width}), got {points.shape}", code="bad_array",
-                            subjects=(name,))
-    if not np.isfinite(points).all():
-        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise GeometryError(f"{name}[{row}] is not finite", code="bad_array", subjects=(f"{name}[{row}]",))
-    return points
 
 
 def _check_radii(radius: float, corner_radius: float) -> None:

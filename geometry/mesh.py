@@ -24,7 +24,7 @@ class TriangleMesh:
 
     vertices: F64
     faces: I32
-    face_ids: I32 = field(default=None)  # type: ignore[assignment]
+    face_ids: I32 = field(default=None)  # type: ignore[assignment,arg-type]
 
     def __post_init__(self) -> None:
         v = np.ascontiguousarray(self.vertices, dtype=np.float64)

@@ -103,7 +103,8 @@ class Part:
         """Serialise without pickle (an .npz in memory)."""
         meta = {
             "faces": [asdict(f) for f in self.faces],
-            "edges": [{"faces": e.faces, "kind": str(e.kind), "length": e.length, "angle": e.angle} for e in self.edges],
+            "edges": [{"faces": e.faces, "kind": str(e.kind), "length": e.length, "angle": e.angle}
+                      for e in self.edges],
             "volume": self.volume, "unit": self.unit, "chord": self.chord, "angle": self.angle,
             "deviation": self.deviation, "warnings": list(self.warnings), "sha256": self.sha256,
         }

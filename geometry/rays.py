@@ -1,4 +1,4 @@
-"""First hits of rays on a mesh, and its height seen from above."""
+"""First hits of rays on a mesh."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
+from geometry.arrays import finite_points
 from geometry.bvh import TriangleTree
-from geometry.drop import drop_grid, drop_tips, finite_points
 from geometry.errors import GeometryError
 from geometry.kernels import ray as kernels
 from geometry.mesh import F64, I32
@@ -55,18 +55,3 @@ def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_
     else:
         kernels.hits_parallel(tree.arrays, start, way, float(t_min), float(t_max), t, triangle)
     return t, triangle
-
-
-def heights(tree: TriangleTree, xy: ArrayLike) -> F64:
-    """Top z of the mesh over each point (n, 2), mm; -inf where there is nothing. Errors as ``drop_tips``."""
-    return drop_tips(tree, xy, 0.0, 0.0)
-
-
-def height_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int) -> F64:
-    """Top z of the mesh over a grid of points.
-
-    Element [j, i] of the (ny, nx) float64 result, mm, is the height at (x0 + i step, y0 + j step), -inf where
-    there is nothing. Parameters and errors are those of ``drop_grid``. A facet steeper than 1e-9 rad from
-    vertical counts as its edges only, which have no height over a point.
-    """
-    return drop_grid(tree, x0, y0, step, nx, ny, 0.0, 0.0)

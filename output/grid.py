@@ -43,7 +43,7 @@ def to_grid(points: F64) -> I64:
 def without_repeats(points: I64) -> I64:
     """The points without those equal to the one before them; the first stays.
 
-    points : (n, k) int64
+    points : (n, k) int64, grid units
     Returns (m, k) int64, 1 <= m <= n for n >= 1.
     """
     if len(points) < 2:
@@ -88,7 +88,7 @@ def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:
 def link(here: I64, start: I64, clearance: int) -> I64:
     """The rapid between two steps that do not join: up to the clearance plane, across, down.
 
-    here, start : (3,) int64, grid points;  clearance : grid height
+    here, start : (3,) int64, grid units;  clearance : int, grid units
     Returns (k, 3) int64 from ``here`` to ``start``, k <= 4, without repeats; k is 1 where they are equal.
     """
     if (here == start).all():

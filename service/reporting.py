@@ -90,6 +90,14 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     """report.json without its files, and which proof samples stay uncut.
 
     A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
+
+    dense    : SurfaceSamples of the proof, n of them
+    zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
+    given_up : (n,) bool, the plan's own measure says that no pass touches the sample though a tool could
+
+    Returns
+    -------
+    dict, and (n,) bool: the samples that stay uncut
     """
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
@@ -125,7 +133,7 @@ def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[st
     """Findings that no program can have: nothing could be cut, or less than the setup demands."""
     least = ready.setup.quality.coverage_min
     if not made.steps:
-        would = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
+        would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
         return [{"kind": "nothing_cut", "message": "no tool of the setup can cut anything of what was asked for",
                  "would_need": would}]
     if coverage < least:

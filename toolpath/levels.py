@@ -113,8 +113,10 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
 def rings(field: TipField, z: float, active: NDArray[np.bool_], distance: float) -> list[Line]:
     """Lines of tip positions ``distance`` mm inside the boundary of the free region at height z.
 
-    Parameters as in ``contours``. Distances are right to one lattice step. A move that the exact cutter does
-    not allow is left out, which opens the line there.
+    active   : (ny, nx) bool, cells of the lattice that are looked at, as in ``contours``
+    distance : mm, right to one lattice step
+
+    A move that the exact cutter does not allow is left out, which opens the line there.
     """
     if not active.any():
         return []
@@ -152,7 +154,7 @@ def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
 
 
 def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
-    """The pieces of a level line (n, 3) whose points and moves are free."""
+    """The pieces of a level line of tips (n, 3), mm, whose points and moves are free."""
     ok = moves_free(field, points)
     at = points.copy()
     at[:, 2] += LEVEL_TOLERANCE
@@ -164,7 +166,7 @@ def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
 
 
 def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Half-open ranges [a, b) of consecutive True values."""
+    """Half-open ranges [a, b) of indices with consecutive True values of flags (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
 

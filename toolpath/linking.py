@@ -248,6 +248,7 @@ def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:
 def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:
     """Lines in the order a tool meets them going each time to the nearest start.
 
+    at     : (2,) or (3,) float64, mm, where the tool is; None lets the first line begin
     either : open lines may be walked both ways; closed ones begin at their nearest point in any case
     """
     left = list(lines)

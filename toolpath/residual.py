@@ -36,5 +36,5 @@ class ResidualMap:
 
     def cut(self, path: F64, tool: ToolBody) -> None:
         """Lower the residual by one polyline of tips (m, 3), mm."""
-        lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx, self.ncy,
-              np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.residual)
+        lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
+              self.ncy, np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.residual)

@@ -42,7 +42,7 @@ def chains(program: I32, line: I32, points: F64, key: I32) -> NDArray[np.int64]:
 
 
 def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
-    """Rows of each group, deepest first (first row first among equals)."""
+    """Row indices of each group, deepest first (first row first among equals); groups (n,) int64, depth (n,) mm."""
     order = np.lexsort((np.arange(len(groups)), -depth, groups))
     cuts = np.flatnonzero(np.diff(groups[order])) + 1
     return [rows for rows in np.split(order, cuts) if len(rows)]
@@ -105,8 +105,13 @@ def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, so
 
 def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64, zone_ids: Sequence[str],
                       scallop: float) -> list[Finding]:
-    """Findings of claimed samples outside the budget, by zone, face and 5 mm cell; ``excess`` is mm left over
-    the allowance (negative where the part is cut too deep)."""
+    """Findings of claimed samples outside the budget, by zone, face and 5 mm cell.
+
+    points     : (n, 3) float64, mm
+    zone, face : (n,) int32, row of ``zone_ids`` from 1, and face number
+    excess     : (n,) float64, mm left over the allowance, negative where the part is cut too deep
+    area       : (n,) float64, mm²
+    """
     if len(points) == 0:
         return []
     cell = np.floor(points / NEAR).astype(np.int64)

@@ -104,7 +104,7 @@ def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
 
 
 def blank_cylinder(bounds: F64, setup: ProofSetup) -> tuple[float, float, float, float, float]:
-    """x, y, z_bottom, radius, height of a cylinder blank, mm; round the part where the setup gives none."""
+    """x, y, z_bottom, radius, height of a cylinder blank, mm; round the part, bounds (2, 3), without one."""
     if setup.stock_cylinder is not None:
         return setup.stock_cylinder
     grow = setup.margin + setup.uncertainty

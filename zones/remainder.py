@@ -73,8 +73,8 @@ def explain(samples: SurfaceSamples, regions: dict[int, str], fields: dict[str, 
         for k in np.flatnonzero(given_up[asked] & np.isin(reason, ("gap", "corner", "sharp corner"))):
             reason[k], need[k] = "pass", {}
     groups: dict[tuple[str, str], list[int]] = {}
-    for k in range(len(few)):
-        groups.setdefault((regions[int(few.face[k])], str(reason[k])), []).append(k)
+    for row in range(len(few)):
+        groups.setdefault((regions[int(few.face[row])], str(reason[row])), []).append(row)
     out = []
     for (_, why), members in groups.items():
         m = np.array(members)

@@ -82,7 +82,7 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
 
 
 def forms_of(normals: F64) -> NDArray[np.object_]:
-    """Form of each sample by its normal (n, 3)."""
+    """Form of each sample by its outward unit normal (n, 3)."""
     out = np.full(len(normals), Form.SHALLOW, dtype=object)
     out[normals[:, 2] > LEVEL] = Form.LEVEL
     out[normals[:, 2] < STEEP] = Form.STEEP

@@ -136,7 +136,7 @@ def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
 
 @njit(**KERNEL)
 def build_nodes(triangles: F64, leaf_size: int):
-    """Boxes, topology and leaf order of the hierarchy over (m, 3, 3) corner points, m > 0."""
+    """Boxes, topology and leaf order of the hierarchy over (m, 3, 3) corner points, mm, m > 0."""
     m = triangles.shape[0]
     lower, upper = np.empty((m, 3)), np.empty((m, 3))
     _boxes(triangles, lower, upper)
@@ -193,7 +193,7 @@ def build_nodes(triangles: F64, leaf_size: int):
 
 @njit(**KERNEL)
 def facet_rows(corners: F64):
-    """(m, 5) upward normals, orientation and quality of each triangle."""
+    """(m, 5) upward unit normals, orientation and quality of each triangle (m, 3, 3), mm."""
     m = corners.shape[0]
     out = np.zeros((m, 5))
     for i in range(m):

@@ -7,9 +7,9 @@ from naive_drop import drop, lift_of_points
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_contacts, drop_grid, drop_tips
+from geometry.heights import heights
 from geometry.kernels.drop import drop_tip_below
 from geometry.mesh import TriangleMesh
-from geometry.rays import heights
 from geometry.sampling import sample_surface
 
 

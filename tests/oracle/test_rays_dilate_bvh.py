@@ -8,8 +8,9 @@ from naive_drop import dilate, first_hit
 from geometry.bvh import TriangleTree
 from geometry.dilate import Rounding, dilate_disc
 from geometry.errors import GeometryError
+from geometry.heights import height_grid, heights
 from geometry.mesh import TriangleMesh
-from geometry.rays import first_hits, height_grid, heights
+from geometry.rays import first_hits
 
 
 @pytest.mark.parametrize("shape", ["smooth", "walls", "soup"])

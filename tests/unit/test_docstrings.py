@@ -29,12 +29,6 @@ def array_parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
     return [a.arg for a in every if a.annotation is not None and ARRAY.search(ast.unparse(a.annotation))]
 
 
-# Modules that still owe a shape or a unit; they show up as expected failures until they pay.
-OWING = {
-    "geometry.kernels.bvh", "zones.walls", "zones.zoning", "toolpath.levels", "toolpath.linking", "output.grid",
-    "verify.findings", "verify.stock", "service.reporting",
-}
-
 CASES = [(name, tree) for name, tree in modules() if "migrations" not in name]
 
 
@@ -56,8 +50,6 @@ def test_array_parameters_come_with_shape_and_unit(name, tree):
             wrong.append(f"{node.name} (line {node.lineno}): no shape such as (n, 3)")
         elif not UNIT.search(text):
             wrong.append(f"{node.name} (line {node.lineno}): no unit")
-    if wrong and name in OWING:
-        pytest.xfail("; ".join(wrong))
     assert not wrong, f"{name}: {'; '.join(wrong)}"
 
 

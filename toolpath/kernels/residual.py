@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-
 FAR = 1e3
 
 
@@ -52,7 +51,8 @@ def _segment_gap(p, a, b, radius, corner, level):
 def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    level (n,): the sample lies on a level plane. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell; gx, gy, cell: corner and size of the cells.
+    level (n,): the sample lies on a level plane. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell;
+    gx, gy, cell: corner and size of the cells, mm.
     """
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]

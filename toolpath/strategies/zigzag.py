@@ -36,7 +36,7 @@ def along_x(mask: NDArray[np.bool_]) -> bool:
     """Whether passes along x are fewer than passes along y over a mask (ny, nx)."""
     rows = np.count_nonzero(np.diff(mask.astype(np.int8), axis=1) == 1)
     cols = np.count_nonzero(np.diff(mask.astype(np.int8), axis=0) == 1)
-    return rows <= cols
+    return bool(rows <= cols)
 
 
 def passes(field: TipField, tips: F64, step: float, shift: float, tolerance: float, x_first: bool,

@@ -66,7 +66,7 @@ def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance
     list of lists of Line, one list a level
     """
     lat = field.lattice
-    out = []
+    out: list[list[Line]] = []
     reach = max(2.5, 0.5 * field.tool.radius / lat.step)
     for z in levels.tolist():
         near = np.abs(tips[:, 2] - z) <= window
