@@ -76,13 +76,16 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F
     Notes
     -----
     A cut grazing the top of a wall swallows whole rays of samples just below the top edge; the depth of a
-    gouge is how deep it goes under the surface. Read at 64 places: at most along / 128 too small.
+    gouge is how deep it goes under the surface. Read at 64 places: at most along / 128 too small. A ray that
+    leaves the part within 1e-4 mm counts 0.
     """
     n = len(points)
     if n == 0:
         return np.zeros(0)
-    through, _ = first_hits(tree, points, -normals, t_min=1e-4)
-    stretch = np.minimum(along, through)
+    through, hit = first_hits(tree, points, -normals, t_min=1e-4)
+    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it
+    leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
+    stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
     share = np.arange(1, DEPTH_STEPS + 1) / DEPTH_STEPS
     where = points[:, None, :] - (stretch[:, None] * share)[:, :, None] * normals[:, None, :]
     out, t = np.empty(n * DEPTH_STEPS), tree.arrays

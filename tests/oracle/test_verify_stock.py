@@ -150,6 +150,18 @@ def test_gouge_depth_is_measured_from_the_nearest_surface():
     np.testing.assert_allclose(gouge_depths(tree, p[2:], n[2:], np.array([99.0])), [5.0], atol=0.1)
 
 
+def test_gouge_depth_of_a_ray_that_is_out_of_the_part_at_once_is_nothing():
+    """Beside a razor edge: the air behind it is not part, however far the ray then runs through it."""
+    v = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0], [5, 0, 8], [5, 10, 8]], float)
+    f = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [3, 5, 2], [1, 2, 5], [1, 5, 4], [0, 4, 5], [0, 5, 3]])
+    tree = TriangleTree(TriangleMesh(v, f))
+    p = np.array([[5.0, 5.0, 8.0], [5.0, 5.0, 8.0 - 1e-5]])
+    n = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    got = gouge_depths(tree, p, n, np.array([13.0, 4.0]))
+    assert got[0] == 0.0
+    assert got[1] == pytest.approx(4.0 * 5.0 / np.hypot(5.0, 8.0), rel=0.01)
+
+
 def test_convex_edges_of_a_block_with_a_pocket():
     points, bisector, face = convex_edges(block().mesh)
     assert len(points) == pytest.approx(10 * (2 * 2 * (40 + 30) + 4 * 10 + 2 * (20 + 12)), abs=20)
