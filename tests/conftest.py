@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,3 +26,24 @@ def demo_files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     from examples.demo import write_demo
 
     return write_demo(tmp_path_factory.mktemp("demo"))
+
+
+@dataclass(frozen=True)
+class PlannedJob:
+    """One run of the whole chain: the report as returned, and where part, setup and files lie."""
+
+    report: dict[str, Any]
+    part: Path
+    setup: Path
+    out: Path
+
+
+@pytest.fixture(scope="session")
+def demo_job(demo_files: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> PlannedJob:
+    """The demo part planned and proved once per run (half a minute or so)."""
+    from service.chain import plan
+    from service.convert import read_setup
+
+    part, setup = demo_files
+    out = tmp_path_factory.mktemp("demo-out")
+    return PlannedJob(plan(part, read_setup(setup), out, lambda stage, fraction: None), part, setup, out)
