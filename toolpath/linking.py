@@ -140,7 +140,7 @@ class Linker:
         return None
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
-        over = max(float(self.stock.overlap(points, self.field.tool).max()), self.motions.step_down) + 0.1
+        over = max(float(self.stock.overlap(points, self.field.tool, -0.3).max()), self.motions.step_down) + 0.1
         ramp = self._ramp(points, closed, over)
         return None if ramp is None else (ramp[:1], ramp, False)
 

@@ -157,6 +157,8 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, 1.2 * lat.step)
     linker = Linker(field, stock, _motions(cut, settings))
+    walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
+    chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance
     top = stock.highest
     if top <= bottom:
@@ -166,6 +168,9 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(line, 0.25 * lat.step)
+        finished = lat.mask(walls[np.abs(walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
+        for line in nearest_order(layers.rim(field, stock, z, below, finished, allowance, chord), linker.at, False):
+            linker.add(line)
     if not linker.passes:
         return None
     ids = " ".join(z.id for z in zones)

@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.residual import lower
+from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
 
 UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
 
@@ -20,7 +20,8 @@ class ResidualMap:
 
     def __init__(self, points: F64, normals: F64, cell: float = 0.6) -> None:
         self.points = np.ascontiguousarray(points)
-        self.level = np.ascontiguousarray(normals[:, 2] > 1.0 - 1e-6)
+        upright = np.abs(normals[:, 2]) < 0.5
+        self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
         self.cell = cell
         lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)

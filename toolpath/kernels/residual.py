@@ -4,7 +4,8 @@ For a tip at c the cutter (corner r, radius R, endless upwards) is as far from a
     sqrt(u^2 + w^2) - r,   u = max(rho - (R - r), 0),  w = max(c_z + r - p_z, 0),
 rho the distance of p from the axis in plan. The least over all tips of the passes is what remains at p to within
 the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). On a level
-plane, where a sharp-cornered end passes beside p or over it, the height above p is taken instead. Along a
+plane, where a sharp-cornered end passes beside p or over it, the height above p is taken instead,
+and a wall below such an end counts as untouched. Along a
 straight move the least lies at the nearest point in plan, at the nearest point in space to the corner's centre,
 or at an end; all are tried.
 """
@@ -15,17 +16,20 @@ import numpy as np
 from numba import njit
 
 FAR = 1e3
+LEVEL_PLANE, UPRIGHT = 1, 2
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
-    if level:
+    if level == LEVEL_PLANE:
         u = np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner)
         if u > corner:
             return FAR
         return cz - pz + (corner - np.sqrt(corner * corner - u * u) if u > 0.0 else 0.0)
     u = max(np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner), 0.0)
     w = max(cz + corner - pz, 0.0)
+    if level == UPRIGHT and corner == 0.0 and w > 1e-4:
+        return FAR
     return np.sqrt(u * u + w * w) - corner
 
 
@@ -51,7 +55,7 @@ def _segment_gap(p, a, b, radius, corner, level):
 def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    level (n,): the sample lies on a level plane. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell;
+    level (n,): 1 on a level plane, 2 on a wall, else 0. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell;
     gx, gy, cell: corner and size of the cells, mm.
     """
     for k in range(len(path) - 1):

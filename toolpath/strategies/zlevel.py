@@ -13,6 +13,7 @@ from toolpath.levels import Line, contours, dilated, pieces_where
 from zones.reach import TipField
 
 LEAST_STEP = 0.02  # mm, levels are never closer
+SHARP_DIP = 1.5e-4  # mm a sharp-cornered end goes below its level: rounding in the program must not lift it off
 
 
 def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> float:
@@ -76,7 +77,9 @@ def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance
         wanted = dilated(lat.mask(tips[near, :2]), reach)
         active = dilated(wanted, 2.0 * field.tool.radius / lat.step + 3)
         lines: list[Line] = []
+        dip = np.array([0.0, 0.0, SHARP_DIP if field.tool.corner_radius == 0 else 0.0])
         for line in contours(field, z, active, tolerance):
+            line = Line(line.points - dip, line.closed)
             lines.extend(pieces_where(line, _on(field, wanted, line.points), 0.5 * field.tool.radius,
                                       2.0 * field.tool.radius))
         out.append(lines)
