@@ -154,7 +154,8 @@ def test_one_lowered_move_is_found_on_its_line(demo_job, report, program, tmp_pa
     text, line = lowered(program, report)
     file = tmp_path / "lowered.ngc"
     file.write_text(text)
-    got = CliRunner().invoke(app, ["verify", str(demo_job.part), "--setup", str(demo_job.setup), "--program", str(file)])
+    got = CliRunner().invoke(app, ["verify", str(demo_job.part), "--setup", str(demo_job.setup), "--program",
+                                   str(file)])
     assert got.exit_code == 3, got.stderr
     answer = json.loads(got.stdout)
     assert answer["state"] == "unproved"
