@@ -7,14 +7,17 @@ peer that the coverage of a job is held against, and shares nothing with the pla
 2. H(c) = max over nodes p of h(p) - f(|p - c|), the lowest tip over node c; f(d) is the height of the cutter's
    bottom at distance d from its axis. Shank and holder, grown by their clearances, do the same on a grid twice as
    coarse whose cells hold the highest h in them.
-3. A sample p with normal n is touched where the tool's own geometry puts the axis, p + r n + (R - r) n_xy/|n_xy|,
-   and the tip, p_z + r (n_z - 1). It counts as reachable if on one of the four nodes round that axis, so within one
-   cell of it, the tip may go down to that height. Under a flat or bull end a level facet is touched by the whole
-   bottom: there any node within R - r of the sample will do.
-4. coverage = area of the reachable samples / area of the faces the access sees, less the seat.
+3. A sample p with normal n is *touched* where the tool's own geometry puts the axis, p + r n + (R - r) n_xy/|n_xy|,
+   and the tip, p_z + r (n_z - 1): if on one of the four nodes round that axis, so within one cell of it, the tip may
+   go down to that height. Under a flat or bull end a level facet is touched by the whole bottom: there any node
+   within R - r of the sample will do. A sharp-cornered end counts only on level facets and on walls so upright that
+   steps of 0.1 mm keep the scallop; elsewhere it leaves steps.
+4. A sample is *clean* if it is touched, or if all but the allowed scallop can be taken off it: the point
+   q = p + (scallop + one cell) n lies under no tool position, that is, min over c of H(c) + f(|q - c|) <= q_z.
+5. The area of either, over the area of the faces the access sees less the seat, is a coverage. A program proved to
+   the scallop must come to lie between the two: touched areas can all be cut, what is not clean cannot.
 
-A sharp-cornered end counts only on level facets and on walls so upright that steps of 0.1 mm keep the scallop;
-elsewhere it leaves steps. Fixtures are obstacles grown by the rapid clearance.
+Fixtures are obstacles grown by the rapid clearance.
 
 Error: every place is off by at most a cell diagonal, towards reach, so the border between reachable and not lies
 within that of the truth and the coverage is high by an amount that falls with the step. ``estimate`` computes it at
@@ -74,15 +77,15 @@ class BruteTool:
 class Reach:
     """What was found at one step.
 
-    coverage : reachable area / machinable area
-    area     : mm², machinable
-    reached  : (n,) bool, per sample
-    by_tool  : share of the machinable area each tool reaches, by tool id
+    area    : mm², machinable
+    touched : (n,) bool, per sample; every sample stands for the same area
+    clean   : (n,) bool, touched or within the scallop
+    by_tool : share of the machinable area each tool touches, by tool id
     """
 
-    coverage: float
     area: float
-    reached: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+    clean: NDArray[np.bool_]
     by_tool: dict[str, float]
 
 
@@ -166,6 +169,36 @@ def disc_extreme(field: F64, reach: int, half: NDArray[np.int64], sign: float) -
     return sign * out
 
 
+@njit(cache=True, parallel=True)
+def swept(limit: F64, height: F64, x0: float, y0: float, step: float, radius: float, corner: float,
+          points: F64) -> NDArray[np.bool_]:
+    """(n,) bool: a tool on some node, its tip at the limit there or above, holds the point of points (n, 3), mm."""
+    ny, nx = limit.shape
+    out = np.zeros(len(points), np.bool_)
+    for k in prange(len(points)):
+        x, y, z = points[k]
+        j, i = int((x - x0) / step), int((y - y0) / step)
+        if min(height[i, j], height[i, j + 1], height[i + 1, j], height[i + 1, j + 1]) > z:
+            continue  # under material
+        i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
+        j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
+        for a in range(i0, i1 + 1):
+            if out[k]:
+                break
+            for b in range(j0, j1 + 1):
+                room = z - limit[a, b]
+                if room < 0.0:
+                    continue
+                d = math.hypot(x0 + b * step - x, y0 + a * step - y)
+                if d > radius:
+                    continue
+                beyond = max(d - (radius - corner), 0.0)
+                if room >= corner - math.sqrt(max(corner * corner - beyond * beyond, 0.0)):
+                    out[k] = True
+                    break
+    return out
+
+
 def cutter_profile(radius: float, corner: float, step: float) -> tuple[int, F64]:
     """Height of a cutter's bottom over the nodes within its radius; (reach in nodes, square array, mm)."""
     reach = int(radius / step + 1e-9)
@@ -207,6 +240,12 @@ def tip_limit(height: F64, tool: BruteTool, step: float) -> F64:
     return limit
 
 
+def able(tool: BruteTool, normals: F64, scallop: float) -> NDArray[np.bool_]:
+    """(n,) bool: the end leaves no steps on facets with these normals (n, 3); see the head of this file, 3."""
+    upright = np.abs(normals[:, 2]) <= 0.5 * scallop / UPRIGHT_STEP
+    return np.full(len(normals), tool.corner > 0) | upright | (normals[:, 2] > LEVEL)
+
+
 def reaches(tool: BruteTool, limit: F64, grid: Grid, points: F64, normals: F64, scallop: float) -> NDArray[np.bool_]:
     """(n,) bool: the tool touches samples with points (n, 3) mm and normals (n, 3)."""
     r, flat = tool.corner, tool.radius - tool.corner
@@ -222,8 +261,7 @@ def reaches(tool: BruteTool, limit: F64, grid: Grid, points: F64, normals: F64, 
     for di in (0, 1):
         for dj in (0, 1):
             found |= limit[i + di, j + dj] <= allowed
-    if r == 0:
-        found &= np.abs(normals[:, 2]) <= 0.5 * scallop / UPRIGHT_STEP
+    found &= able(tool, normals, scallop)
     if flat > 0:
         lowest = disc_extreme(limit, *disc_rows(flat, grid.step), -1.0)
         j = np.rint((points[level, 0] - grid.x0) / grid.step).astype(np.int64)
@@ -293,10 +331,18 @@ def brute_reach(mesh: Any, setup: dict[str, Any], step: float) -> Reach:
     height = np.full((grid.ny, grid.nx), -np.inf)
     rasterise(mesh.triangles, grid.x0, grid.y0, step, height)
     _fixtures(height, grid, setup)
-    got = {t.id: reaches(t, tip_limit(height, t, step), grid, points, normals,
-                         setup["quality"]["scallop_height_mm"]) for t in tools}
-    reached = np.any(list(got.values()), axis=0)
-    return Reach(float(reached.mean()), area, reached, {k: float(v.mean()) for k, v in got.items()})
+    scallop = setup["quality"]["scallop_height_mm"]
+    near = points + (scallop + step) * normals
+    touched, clean, by_tool = np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_), {}
+    for t in tools:
+        limit = tip_limit(height, t, step)
+        found = reaches(t, limit, grid, points, normals, scallop)
+        by_tool[t.id] = float(found.mean())
+        touched |= found
+        left = np.flatnonzero(~(clean | touched) & able(t, normals, scallop))
+        if len(left):
+            clean[left] = swept(limit, height, grid.x0, grid.y0, step, t.radius, t.corner, near[left])
+    return Reach(area, touched, clean | touched, by_tool)
 
 
 def _fixtures(height: F64, grid: Grid, setup: dict[str, Any]) -> None:
@@ -316,14 +362,15 @@ def default_step(mesh: Any) -> float:
 
 
 def estimate(mesh: Any, setup: dict[str, Any], step: float | None = None) -> dict[str, Any]:
-    """Coverage at ``step`` and at twice that, and the line through both extended to a step of nothing."""
+    """Both coverages at ``step`` and at twice that, and the line through both extended to a step of nothing."""
     step = step or default_step(mesh)
     coarse, fine = brute_reach(mesh, setup, 2 * step), brute_reach(mesh, setup, step)
-    limit = 2 * fine.coverage - coarse.coverage
-    return {"coverage": round(limit, 5), "error": round(abs(fine.coverage - limit), 5), "step_mm": round(step, 4),
-            "coverage_at_step": round(fine.coverage, 5), "coverage_at_twice_step": round(coarse.coverage, 5),
-            "machinable_area_mm2": round(fine.area, 3),
-            "by_tool": {k: round(v, 5) for k, v in fine.by_tool.items()}}
+    out: dict[str, Any] = {"step_mm": round(step, 4), "machinable_area_mm2": round(fine.area, 3)}
+    for name in ("touched", "clean"):
+        at, twice = float(getattr(fine, name).mean()), float(getattr(coarse, name).mean())
+        out[name] = {"coverage": round(2 * at - twice, 5), "area_mm2": round((2 * at - twice) * fine.area, 3),
+                     "error": round(abs(twice - at), 5), "at_step": round(at, 5), "at_twice_step": round(twice, 5)}
+    return out | {"touched_by_tool": {k: round(v, 5) for k, v in fine.by_tool.items()}}
 
 
 def reach_of_files(part_path: Path, setup_path: Path, step: float | None = None) -> dict[str, Any]:

@@ -31,8 +31,8 @@ def test_flat_end_leaves_the_corner_strips_and_the_corners_of_the_floor():
     left = 8 * R * DEEP + 4 * (1 - math.pi / 4) * R**2
     found = brute_reach.estimate(block().mesh, setup("flat"), STEP)
     assert found["machinable_area_mm2"] == pytest.approx(ALL)
-    assert found["coverage"] == pytest.approx(1 - left / ALL, abs=0.002)
-    assert 0 <= found["coverage_at_step"] - (1 - left / ALL) < 16 * DEEP * STEP / ALL
+    assert found["touched"]["coverage"] == pytest.approx(1 - left / ALL, abs=0.002)
+    assert 0 <= found["touched"]["at_step"] - (1 - left / ALL) < 16 * DEEP * STEP / ALL
 
 
 def test_ball_end_leaves_a_strip_all_round_the_floor_as_well():
@@ -40,7 +40,19 @@ def test_ball_end_leaves_a_strip_all_round_the_floor_as_well():
     floor = LENGTH * WIDTH - (LENGTH - 2 * R) * (WIDTH - 2 * R)
     walls = WALLS - 2 * (LENGTH + WIDTH - 4 * R) * (DEEP - R)
     found = brute_reach.estimate(block().mesh, setup("ball"), STEP)
-    assert found["coverage"] == pytest.approx(1 - (floor + walls) / ALL, abs=0.004)
+    assert found["touched"]["coverage"] == pytest.approx(1 - (floor + walls) / ALL, abs=0.004)
+
+
+def test_what_a_ball_leaves_within_the_scallop_is_clean():
+    """Beside a wall the ball stands within h of the floor for sqrt(2 R h - h²) beyond its last touch."""
+    h = 0.05
+    given = setup("ball") | {"quality": {"scallop_height_mm": h}}
+    strip = R - math.sqrt(2 * R * h - h * h)
+    floor = LENGTH * WIDTH - (LENGTH - 2 * strip) * (WIDTH - 2 * strip)
+    walls = WALLS - 2 * (LENGTH + WIDTH - 4 * strip) * (DEEP - strip)
+    found = brute_reach.estimate(block().mesh, given, 0.5 * STEP)
+    assert found["clean"]["coverage"] == pytest.approx(1 - (floor + walls) / ALL, abs=0.006)
+    assert found["clean"]["coverage"] > found["touched"]["coverage"] + 0.01
 
 
 def test_holder_keeps_a_short_tool_out():
@@ -48,10 +60,10 @@ def test_holder_keeps_a_short_tool_out():
     mesh = block().mesh
     found = brute_reach.brute_reach(mesh, setup("flat", holder_gap=3.0), STEP)
     chosen = brute_reach.machinable(mesh)
-    points, _ = brute_reach.scattered(mesh, chosen, len(found.reached))
+    points, _ = brute_reach.scattered(mesh, chosen, len(found.touched))
     inside = (np.abs(points[:, 0]) <= 10.001) & (np.abs(points[:, 1]) <= 6.001)
-    assert not found.reached[inside & (points[:, 2] < -3.1)].any()
-    assert found.reached[inside & (points[:, 2] > -2.9) & (points[:, 2] < -0.1)].mean() > 0.6
+    assert not found.touched[inside & (points[:, 2] < -3.1)].any()
+    assert found.touched[inside & (points[:, 2] > -2.9) & (points[:, 2] < -0.1)].mean() > 0.6
 
 
 def test_dilation_of_a_disc_is_the_slow_one():
