@@ -130,8 +130,9 @@ class TipField:
                  step: float, allowance: float = 0.0) -> None:
         self.tree, self.tool, self.allowance = tree, tool, allowance
         self.lattice = Lattice.over(bounds, margin, step)
-        self.coarse = Lattice.over(bounds, margin + LOOKUP_STEP, LOOKUP_STEP)
-        self.noncut, self.owner = self._noncut(discs_of(tool, clear))
+        self.coarse = Lattice.over(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
+        self.discs = discs_of(tool, clear)
+        self.noncut, self.owner = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
 
@@ -142,10 +143,21 @@ class TipField:
         grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
         owner = np.zeros(grid.shape, np.int8)
         for d in discs:
-            limit = self._grid(self.coarse, d.radius + LOOKUP_STEP * math.sqrt(0.5), 0.0) - d.height
+            limit = self.disc_limit(d, self._grid(self.coarse, self.disc_radius(d, 0.5), 0.0))
             owner[limit > grid] = 1 if d.name == "shank" else 2
             grid = np.maximum(grid, limit)
+        if discs:  # what stands beyond the grid is not known here, so the tool does not go there
+            for edge in (grid[:1], grid[-1:], grid[:, :1], grid[:, -1:]):
+                edge[:] = np.inf
         return grid, owner
+
+    def disc_radius(self, disc: Disc, diagonals: float) -> float:
+        """Radius of a disc with the allowance and this many cell diagonals of the shank and holder grid, mm."""
+        return disc.radius + self.allowance + diagonals * LOOKUP_STEP * math.sqrt(2.0)
+
+    def disc_limit(self, disc: Disc, height: F64) -> F64:
+        """Tip limit for a disc whose underside stands at ``height``, mm."""
+        return np.asarray(height + self.allowance - disc.height)
 
     @property
     def grown_radius(self) -> float:
@@ -243,7 +255,8 @@ def touchable(field: TipField, points: F64, normals: F64,
     -------
     by_cutter  : (n,) bool, the cutting part alone gets there
     by_tool    : (n,) bool, shank and holder stay clear as well
-    tips       : (n, 3) float64, mm, the admissible tip (the first tried where none is)
+    tips       : (n, 3) float64, mm, the admissible tip; else one at which the cutting part alone gets there; else
+                 the first tried
     """
     tool = field.tool
     tips = contact_tips(tool, points, normals, lift + field.allowance)
@@ -267,9 +280,10 @@ def touchable(field: TipField, points: F64, normals: F64,
                 trial[:, :2] = points[todo, :2] + reach * side
                 free = ~field.blocked_by_cutter(trial)
                 ok = free & ~field.blocked_by_body(trial)
+                better = ok | (free & ~cutter[todo])
                 cutter[todo] |= free
                 whole[todo[ok]] = True
-                tips[todo[ok]] = trial[ok]
+                tips[todo[better]] = trial[better]
     tips[:, 2] -= LEVEL_TOLERANCE
     seen = normals[:, 2] > -0.02
     return cutter & seen, whole & seen, tips

@@ -1,25 +1,28 @@
 """What no tool of the setup reaches, why, and which tool would.
 
-A sample nobody took is asked, in this order: is something above it (undercut); could a cutter of the setup
-touch it if shank and holder were out of the way (then how much longer a neck it needs); would a thinner ball or
-a sharp-cornered end fit (then how thick it may be). What is left after that is a corner no rotating tool makes.
+A sample nobody took is asked, in this order: is something above it (undercut); can a tool at hand touch it after
+all (then it was too little for a zone, or no pass got there); could a cutter of the setup touch it if shank and
+holder were out of the way (then how much longer a tool it needs); would a thinner ball or a sharp-cornered end fit
+(then how thick it may be). What is left after that is a corner no rotating tool makes.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.bvh import TriangleTree
+from geometry.drop import drop_tips
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
 from zones.model import Decomposition
-from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, contact_tips, lattice_step, touchable
+from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
 from zones.zoning import SEEN
 
 SHARES = (0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of the thinnest cutter at hand, tried from stout to thin
@@ -29,7 +32,7 @@ ASKED_AT_MOST = 6000  # samples that are asked one by one; the rest follow the n
 
 @dataclass(frozen=True)
 class Remainder:
-    """Area of one region that stays, for one reason.
+    """Area of one region that stays, for one reason, and the one tool that would do.
 
     faces      : face numbers; area : mm²
     reason     : 'undercut', 'undercut behind connection C2', 'shank', 'holder', 'gap', 'corner', 'sharp corner'
@@ -72,11 +75,12 @@ def explain(samples: SurfaceSamples, regions: dict[int, str], fields: dict[str, 
     if given_up is not None:
         for k in np.flatnonzero(given_up[asked] & np.isin(reason, ("gap", "corner", "sharp corner"))):
             reason[k], need[k] = "pass", {}
-    groups: dict[tuple[str, str], list[int]] = {}
+    groups: dict[tuple[str, str, str], list[int]] = {}
     for row in range(len(few)):
-        groups.setdefault((regions[int(few.face[row])], str(reason[row])), []).append(row)
+        kind = str(need[row].get("kind"))  # a ball and a flat end are two tools to buy
+        groups.setdefault((regions[int(few.face[row])], str(reason[row]), kind), []).append(row)
     out = []
-    for (_, why), members in groups.items():
+    for (_, why, _), members in groups.items():
         m = np.array(members)
         out.append(Remainder(tuple(int(f) for f in np.unique(few.face[m])), float(few.area[m].sum()) * weight, why,
                              _strictest([need[k] for k in members]), tuple(few.points[m[len(m) // 2]].tolist())))
@@ -95,7 +99,8 @@ def _strictest(needs: Needs) -> dict[str, object]:
     for key, quantile in (("diameter_mm", 0.02), ("neck_length_mm", 0.98), ("stickout_mm", 0.98)):
         values = [float(str(n[key])) for n in some if key in n]
         if values:
-            out[key] = round(float(np.quantile(values, quantile)), 3)
+            exact = 1e3 * float(np.quantile(values, quantile))
+            out[key] = (math.floor(exact + 1e-6) if key == "diameter_mm" else math.ceil(exact - 1e-6)) / 1e3
     return out
 
 
@@ -113,33 +118,47 @@ def _reasons(few: SurfaceSamples, fields: dict[str, TipField], part: Part, tree:
         c = owner.get(int(part.mesh.face_ids[above[k]])) if above[k] >= 0 else None
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
         need[k] = {"kind": "other access"}
-    for tid in sorted(fields, key=lambda t: (fields[t].tool.diameter, t)):
-        left = np.flatnonzero(reason == "")
-        if len(left):
-            _too_short(fields[tid], few, left, lift, reason, need)
+    open_to = np.flatnonzero(reason == "")
+    asked = [(fields[t], *touchable(fields[t], few.points[open_to], few.normals[open_to], lift))
+             for t in sorted(fields, key=lambda t: (fields[t].tool.diameter, t))]
+    cuts = [np.full(len(open_to), f.tool.corner_radius > 0) | _upright(few.normals[open_to]) for f, *_ in asked]
+    for (_, _, by_tool, _), able in zip(asked, cuts, strict=True):
+        reason[open_to[by_tool & able]] = "pass"
+    for (field, by_cutter, _, tips), able in zip(asked, cuts, strict=True):
+        stopped = np.flatnonzero(by_cutter & able & (reason[open_to] == ""))
+        _too_short(field, tips[stopped], open_to[stopped], reason, need)
     thinnest = min((f.tool for f in fields.values()), key=lambda t: t.diameter)
     _too_thick(thinnest, few, tree, part, lift, reason, need)
     reason[reason == ""] = "sharp corner"
     return reason, need
 
 
-def _too_short(field: TipField, few: SurfaceSamples, left: NDArray[np.int64], lift: float,
-               reason: NDArray[np.object_], need: Needs) -> None:
-    by_cutter, by_tool, _ = touchable(field, few.points[left], few.normals[left], lift)
-    tips = contact_tips(field.tool, few.points[left], few.normals[left], lift)
-    who = field.blocker(tips)
-    limit = field.noncut[field.coarse.cells(tips[:, :2])]
-    for k in np.flatnonzero(by_cutter & ~by_tool):
-        short = float(limit[k] - tips[k, 2]) + 2 * LEVEL_TOLERANCE
-        i = int(left[k])
-        if who[k] == 2:
-            reason[i] = "holder"
-            need[i] = {"kind": field.tool.kind, "diameter_mm": field.tool.diameter,
-                       "stickout_mm": field.tool.stickout + max(short, 0.0)}
-        else:
-            reason[i] = "shank"
-            need[i] = {"kind": field.tool.kind, "diameter_mm": field.tool.diameter,
-                       "neck_length_mm": field.tool.neck_length + max(short, 0.0)}
+def _too_short(field: TipField, tips: F64, rows: NDArray[np.int64], reason: NDArray[np.object_],
+               need: Needs) -> None:
+    """Shank or holder stop a tool whose cutting part gets to samples ``rows`` at tips (n, 3)."""
+    tool, short = field.tool, _shortfall(field, tips)
+    for k, shank, holder in zip(rows.tolist(), short["shank"].tolist(), short["holder"].tolist(), strict=True):
+        neck = tool.neck_length + max(shank, 0.0)
+        reason[k] = "holder" if holder >= shank else "shank"
+        need[k] = {"kind": tool.kind, "diameter_mm": tool.diameter, "neck_length_mm": neck,
+                   "stickout_mm": max(tool.stickout + max(holder, 0.0), neck)}
+
+
+def _shortfall(field: TipField, tips: F64) -> dict[str, F64]:
+    """How much higher above the tip shank and holder would have to begin at tips (n, 3), mm; -inf where free.
+
+    Seen from a cell diagonal around, so that the tool that is asked for also passes the coarse look-up.
+    """
+    out = {name: np.full(len(tips), -np.inf) for name in ("shank", "holder")}
+    for d in field.discs:
+        limit = field.disc_limit(d, drop_tips(field.tree, tips[:, :2], field.disc_radius(d, 1.0), 0.0))
+        out[d.name] = np.maximum(out[d.name], limit - tips[:, 2] + 2 * LEVEL_TOLERANCE)
+    return out
+
+
+def _upright(normals: F64) -> NDArray[np.bool_]:
+    """(n,) bool: level or so steep that a sharp-cornered end cuts it without steps."""
+    return np.asarray((normals[:, 2] > 1 - 1e-6) | (np.abs(normals[:, 2]) < 0.05))
 
 
 def _too_thick(thinnest: ToolBody, few: SurfaceSamples, tree: TriangleTree, part: Part, lift: float,
@@ -159,8 +178,7 @@ def _too_thick(thinnest: ToolBody, few: SurfaceSamples, tree: TriangleTree, part
         body = replace(thinnest, diameter=d, corner_radius=corner, shank_diameter=d, neck_diameter=d, holder=())
         field = TipField(tree, body, Clearances(), part.bounds, d, lattice_step(body))
         fits, _, tips = touchable(field, few.points[left], few.normals[left], lift)
-        upright = (few.normals[left, 2] > 1 - 1e-6) | (np.abs(few.normals[left, 2]) < 0.05)
-        for k in np.flatnonzero(fits & (upright | (kind == "ball"))):
+        for k in np.flatnonzero(fits & (_upright(few.normals[left]) | (kind == "ball"))):
             i = int(left[k])
             reason[i] = "gap" if float(ahead[i]) < thinnest.diameter * 1.5 else "corner"
             need[i] = {"kind": kind, "diameter_mm": d, "neck_length_mm": top - float(tips[k, 2])}

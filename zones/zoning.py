@@ -5,7 +5,8 @@
    free surface. Every sample has a *form*: level, steep or shallow.
 3. Tools are tried from the stoutest on. A tool takes the samples its cutting part can touch, down to the
    cutting plane where its shank or holder first meets the surroundings (the neck rule); what lies deeper, or
-   where it does not fit, is left to the next tool.
+   where it does not fit, is left to the next tool. What no other tool takes either is then given to the stoutest
+   one that stands clear of it, below its cutting plane or not.
 4. Samples of one region, form and tool are one zone.
 """
 
@@ -215,34 +216,37 @@ def _split(samples: SurfaceSamples, members: NDArray[np.int64], name: str, form:
     area = samples.area
     least = max(LEAST_ZONE_MM2, LEAST_ZONE_SHARE * float(area[members].sum()))
     tried: list[dict[str, object]] = []
-    out = []
+    out: dict[str, ZoneArea] = {}
     order = sorted(fields, key=lambda t: (*preference(fields[t].tool, form), t))
     if float(area[members].sum()) < SMALL_REGION_MM2:
         gets = {t: float(area[members[can[t][members] & reach[t][1][members]]].sum()) for t in order}
         most = max(gets.values())
         order.sort(key=lambda t: gets[t] < ONE_TOOL_SHARE * most)
-    for tid in order:
+    for tid, ruled in [*((t, True) for t in order), *((t, False) for t in order)]:
+        if float(area[left].sum()) < least:
+            break
         tool = fields[tid].tool
         by_cutter, by_tool, tips = reach[tid]
         usable = can[tid][left]
-        stopped = left[usable & by_cutter[left] & ~by_tool[left]]
+        stopped = left[usable & by_cutter[left] & ~by_tool[left]] if ruled else left[:0]
         plane = float(samples.points[stopped, 2].max()) + PLANE_MARGIN if len(stopped) else -np.inf
         take = left[usable & by_tool[left] & (samples.points[left, 2] >= plane)]
         got = float(area[take].sum())
         if got < least:
-            tried.append(_refusal(tool, form, usable, by_cutter[left], got, least, plane))
+            if ruled:
+                tried.append(_refusal(tool, form, usable, by_cutter[left], got, least, plane))
             continue
-        pts = samples.points[take]
-        kind = "SCZI" if name.startswith("C") else "SCZ"
-        out.append(ZoneArea("", kind, name, form, tool, take, tips[take],
-                            tuple(int(f) for f in np.unique(samples.face[take])), float(pts[:, 2].max()),
-                            float(pts[:, 2].min()), plane, tuple(tried)))
         left = left[~np.isin(left, take)]
+        before = out.get(tid)
+        if before is not None:
+            take = np.sort(np.concatenate([before.samples, take]))
+        pts = samples.points[take]
+        out[tid] = ZoneArea("", "SCZI" if name.startswith("C") else "SCZ", name, form, tool, take, tips[take],
+                            tuple(int(f) for f in np.unique(samples.face[take])), float(pts[:, 2].max()),
+                            float(pts[:, 2].min()), plane, before.rejected if before is not None else tuple(tried))
         tried.append({"tool": tid, "reason": "cuts another part of this region",
                       "value": round(got, 3), "limit": round(float(area[members].sum()), 3)})
-        if float(area[left].sum()) < least:
-            break
-    return out
+    return list(out.values())
 
 
 def _refusal(tool: ToolBody, form: Form, usable: NDArray[np.bool_], by_cutter: NDArray[np.bool_], got: float,

@@ -1,7 +1,8 @@
 """Look-ups of the coarse shank and holder limits.
 
 Notation: grid (ny, nx) tip limits at nodes x0 + j*s, y0 + i*s; the nearest node decides, which is safe
-because its limit was taken with the radius grown by half a cell diagonal. Outside the grid nothing stands.
+because its limit was taken with the radius grown by half a cell diagonal. The outermost nodes speak for everything
+beyond the grid.
 """
 
 from __future__ import annotations
@@ -15,9 +16,7 @@ def noncut_at(grid, row, x, y):
     """Tip limit of shank and holder at one place, mm."""
     j = int(np.floor((x - row[0]) / row[2] + 0.5))
     i = int(np.floor((y - row[1]) / row[2] + 0.5))
-    if i < 0 or j < 0 or i >= grid.shape[0] or j >= grid.shape[1]:
-        return -np.inf
-    return grid[i, j]
+    return grid[min(max(i, 0), grid.shape[0] - 1), min(max(j, 0), grid.shape[1] - 1)]
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,198 @@
+"""Small parts meshed by hand, tools, and plans of them: what the tests of reach and tool paths stand on.
+
+No CAD import: every mesh is vertices and triangles written out, so its true dimensions are known exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
+from geometry.part import FaceInfo, Part
+from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
+from geometry.toolbody import HolderSegment, ToolBody
+from toolpath.motion import Motion
+from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
+from toolpath.stock import StockMap
+from zones.model import Decomposition
+from zones.reach import Clearances, TipField, lattice_step
+from zones.zoning import ZoneArea, build_zones, face_regions, machinable_faces
+
+RAMP = math.radians(3.0)
+
+
+def terraces(xs, ys, heights, base: float = 0.0) -> TriangleMesh:
+    """Upright blocks: cell (i, j) between ys[i:i+2] and xs[j:j+2] is filled from ``base`` to heights[i][j], mm.
+
+    One face id per plane and side; 1 is the bottom. Cells no higher than ``base`` are empty.
+    """
+    h = np.maximum(np.asarray(heights, float), base)
+    ids: dict[tuple, int] = {("z", base, -1): 1}
+    quads: list[np.ndarray] = []
+    face: list[int] = []
+
+    def add(key, corners):
+        ids.setdefault(key, len(ids) + 1)
+        quads.append(np.asarray(corners, float))
+        face.append(ids[key])
+
+    grown = np.pad(h, 1, constant_values=base)
+    for i in range(h.shape[0]):
+        for j in range(h.shape[1]):
+            z, (x0, x1), (y0, y1) = h[i, j], xs[j:j + 2], ys[i:i + 2]
+            if z <= base:
+                continue
+            add(("z", z, 1), [(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])
+            add(("z", base, -1), [(x0, y0, base), (x0, y1, base), (x1, y1, base), (x1, y0, base)])
+            lo = grown[i + 1, j]
+            if lo < z:
+                add(("x", x0, -1), [(x0, y0, lo), (x0, y0, z), (x0, y1, z), (x0, y1, lo)])
+            lo = grown[i + 1, j + 2]
+            if lo < z:
+                add(("x", x1, 1), [(x1, y0, lo), (x1, y1, lo), (x1, y1, z), (x1, y0, z)])
+            lo = grown[i, j + 1]
+            if lo < z:
+                add(("y", y0, -1), [(x0, y0, lo), (x1, y0, lo), (x1, y0, z), (x0, y0, z)])
+            lo = grown[i + 2, j + 1]
+            if lo < z:
+                add(("y", y1, 1), [(x0, y1, lo), (x0, y1, z), (x1, y1, z), (x1, y1, lo)])
+    start = 4 * np.arange(len(quads))[:, None]
+    faces = np.concatenate([start + [0, 1, 2], start + [0, 2, 3]])
+    return TriangleMesh(np.concatenate(quads), faces, np.tile(np.array(face, np.int32), 2))
+
+
+def walls() -> TriangleMesh:
+    """Two walls 2 mm thick and 7 high, 8 apart, on a plate 22 x 14 x 3."""
+    return terraces([0, 5, 7, 15, 17, 22], [0, 2, 12, 14], [[3] * 5, [3, 10, 3, 10, 3], [3] * 5])
+
+
+def corner() -> TriangleMesh:
+    """An L of two walls 4 mm high that meet at (6, 6), on a plate 14 x 14 x 2."""
+    return terraces([0, 4, 6, 14], [0, 4, 6, 14], [[2, 2, 2], [2, 6, 6], [2, 6, 2]])
+
+
+def slope_field(height, size: float = 12.0, n: int = 60, base: float = -3.0) -> TriangleMesh:
+    """A block with the top z = height(x, y) over the square from -size/2 to size/2; face 2 is the top."""
+    g = np.linspace(-size / 2, size / 2, n + 1)
+    x, y = np.meshgrid(g, g)
+    top = np.stack([x, y, height(x, y)], -1).reshape(-1, 3)
+    cell = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    tri = [np.stack([cell, cell + 1, cell + n + 2], 1), np.stack([cell, cell + n + 2, cell + n + 1], 1)]
+    rim = np.concatenate([np.arange(n), n + (n + 1) * np.arange(n), (n + 1) ** 2 - 1 - np.arange(n),
+                          (n + 1) * np.arange(n, 0, -1)])
+    low = top[rim].copy()
+    low[:, 2] = base
+    m, k = len(rim), np.arange(len(rim))
+    nxt, below = (k + 1) % m, len(top)
+    sides = [np.stack([rim, below + k, below + nxt], 1), np.stack([rim, below + nxt, rim[nxt]], 1)]
+    centre = len(top) + m
+    floor = np.stack([np.full(m, centre), below + nxt, below + k], 1)
+    faces = np.concatenate([*tri, *sides, floor])
+    ids = np.concatenate([np.full(2 * n * n, 2), np.full(2 * m, 3), np.full(m, 1)]).astype(np.int32)
+    return TriangleMesh(np.vstack([top, low, [[0.0, 0.0, base]]]), faces, ids)
+
+
+def dome(radius: float = 15.0, size: float = 12.0, n: int = 60) -> TriangleMesh:
+    """A spherical dome of the given radius with its summit at the origin."""
+    return slope_field(lambda x, y: np.sqrt(radius**2 - x**2 - y**2) - radius, size, n)
+
+
+def ball(diameter: float = 4.0, id: str = "T1", **changes) -> ToolBody:
+    """A ball-end tool with a thin neck and a shank that reaches nothing, unless told otherwise."""
+    return tool(diameter, diameter / 2, id, **changes)
+
+
+def tool(diameter: float, corner_radius: float, id: str = "T1", *, neck: float = 60.0, shank: float | None = None,
+         stickout: float = 80.0, holder: tuple[HolderSegment, ...] = ()) -> ToolBody:
+    """A tool assembly, mm."""
+    shank = diameter if shank is None else shank
+    return ToolBody(id, 1, diameter, corner_radius, 2.0 * diameter, 0.95 * diameter, neck, shank, stickout, holder)
+
+
+def as_part(mesh: TriangleMesh) -> Part:
+    """The mesh as a Part without edges."""
+    faces = tuple(FaceInfo(int(f), "plane", float(mesh.areas[mesh.face_ids == f].sum()), False, 0.0, 0.0)
+                  for f in range(1, int(mesh.face_ids.max()) + 1))
+    return Part(mesh, faces, (), mesh.volume, mesh.bounds, "mm", 0.001, 0.1, 0.0, (), "0" * 64)
+
+
+def box_mesh(lower, upper) -> TriangleMesh:
+    """A closed box, face id 0."""
+    m = terraces([lower[0], upper[0]], [lower[1], upper[1]], [[upper[2]]], lower[2])
+    return TriangleMesh(m.vertices, m.faces)
+
+
+def joined(*meshes: TriangleMesh) -> TriangleMesh:
+    """All triangles of several meshes."""
+    start = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+    return TriangleMesh(np.concatenate([m.vertices for m in meshes]),
+                        np.concatenate([m.faces + s for m, s in zip(meshes, start[:-1], strict=True)]),
+                        np.concatenate([m.face_ids for m in meshes]))
+
+
+def field_of(mesh: TriangleMesh | TriangleTree, body: ToolBody, allowance: float = 0.0,
+             clear: Clearances | None = None, margin: float = 4.0) -> TipField:
+    """The tip limit of a tool over a mesh."""
+    tree = mesh if isinstance(mesh, TriangleTree) else TriangleTree(mesh)
+    return TipField(tree, body, clear or Clearances(), tree.mesh.bounds, body.radius + margin, lattice_step(body),
+                    allowance)
+
+
+def samples_of(mesh: TriangleMesh, density: float, faces: set[int] | None = None) -> SurfaceSamples:
+    """Even samples of the faces asked for and samples without area along their borders."""
+    tri = np.flatnonzero(np.isin(mesh.face_ids, sorted(faces)) if faces else np.ones(len(mesh.faces), bool))
+    even, edge = sample_surface(mesh, density, seed=1, triangles=tri), sample_borders(mesh, 0.4, 0.004, tri)
+    return SurfaceSamples(*(np.concatenate([getattr(even, f), getattr(edge, f)])
+                            for f in ("points", "normals", "area", "face", "triangle")))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A planned part and all that went into the plan."""
+
+    part: Part
+    tree: TriangleTree
+    samples: SurfaceSamples
+    regions: dict[int, str]
+    fields: dict[str, TipField]
+    zones: list[ZoneArea]
+    settings: PlanSettings
+    stock_before: StockMap
+    plan: Plan
+
+    def moves(self, *motions: Motion) -> list[tuple[ToolBody, F64]]:
+        """The tool and the points of every trajectory of these motions, all but rapids where none is named."""
+        wanted = motions or tuple(m for m in Motion if m is not Motion.RAPID)
+        return [(s.tool, t.points) for s in self.plan.steps for t in s.trajectories if t.motion in wanted]
+
+
+def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.02, chord: float = 0.004,
+              allowance: float = 0.0, climb: bool = True, either: bool = False, roughing: bool = True,
+              near_net: bool = True, faces: set[int] | None = None, fixtures: tuple = (), density: float = 30.0,
+              step_down: float = 0.3) -> Case:
+    """Zones and plan of a part; ``step_down`` in tool diameters, ``fixtures`` as (lower, upper) boxes."""
+    part = as_part(mesh)
+    tree = TriangleTree(mesh)
+    obstacles = TriangleTree(joined(mesh, *(box_mesh(*f) for f in fixtures))) if fixtures else tree
+    nothing = Decomposition((), (), ())
+    everything = samples_of(mesh, density, None)
+    samples = everything.subset(np.isin(everything.face, sorted(
+        machinable_faces(everything, nothing, faces, {1}))))
+    fields = {t.id: TipField(obstacles, t, Clearances(), mesh.bounds, t.radius + 4.0, lattice_step(t), allowance)
+              for t in tools}
+    regions = face_regions(part, nothing, samples, tree)
+    lift = max(0.1 * scallop, 0.002)
+    zones = build_zones(samples, regions, fields, scallop, lift)
+    lo, hi = mesh.bounds[0] - 1.0, mesh.bounds[1] + 1.0
+    stock = StockMap.around(tree, mesh.bounds, 1.0, 0.12) if near_net else StockMap.box(lo, hi, 0.12)
+    before = StockMap(stock.lattice, stock.top.copy())
+    floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0
+    settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either)
+    cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
+    checks = [Checks(samples.points[z.samples], samples.normals[z.samples], z.tips) for z in zones]
+    plan = plan_job(zones, checks, fields, cut, stock, settings)
+    return Case(part, tree, samples, regions, fields, zones, settings, before, plan)

@@ -1,0 +1,159 @@
+"""What stays, why, and whether the tool that is asked for would really do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from geometry.toolbody import HolderSegment
+from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool
+from zones.model import Connection, Decomposition
+from zones.reach import touchable
+from zones.remainder import explain
+
+NOTHING = Decomposition((), (), ())
+LIFT = 0.002
+
+
+def stays(mesh, tools, samples, decomposition=NOTHING, given_up=None):
+    fields = {t.id: field_of(mesh, t) for t in tools}
+    regions = dict.fromkeys(range(int(mesh.face_ids.max()) + 1), "free")
+    return explain(samples, regions, fields, as_part(mesh), TriangleTree(mesh), decomposition, LIFT, given_up)
+
+
+def out_of_reach(mesh, tools, samples):
+    """The samples none of the tools touches."""
+    got = np.zeros(len(samples), bool)
+    for t in tools:
+        got |= touchable(field_of(mesh, t), samples.points, samples.normals, LIFT)[1]
+    return samples.subset(~got)
+
+
+def bought(body, need):
+    """The tool with the dimensions that were asked for."""
+    d = float(need.get("diameter_mm", body.diameter))
+    return replace(body, diameter=d, corner_radius=d / 2 if need["kind"] == "ball" else 0.0, neck_diameter=0.95 * d,
+                   neck_length=float(need.get("neck_length_mm", body.neck_length)),
+                   stickout=float(need.get("stickout_mm", max(body.stickout, need.get("neck_length_mm", 0.0)))))
+
+
+def block(depth=10.0):
+    return terraces([0, 10, 24], [0, 12], [[2 + depth, 2]])
+
+
+def wall_of_block(mesh, density=6.0):
+    s = samples_of(mesh, density)
+    return s.subset((s.normals[:, 0] > 0.9) & (np.abs(s.points[:, 0] - 10) < 1e-9) & (s.area > 0))
+
+
+def test_nothing_left_is_an_empty_list():
+    mesh = block()
+    assert stays(mesh, [ball(3)], samples_of(mesh, 1.0).subset(np.zeros(0, int))) == []
+
+
+@pytest.mark.parametrize("body, reason", [
+    (ball(3.0, neck=4.0, shank=6.0), "shank"),
+    (ball(3.0, neck=60.0, stickout=5.0, holder=(HolderSegment(12, 30, 10), HolderSegment(30, 30, 20))), "holder"),
+    (ball(3.0, neck=5.0, shank=5.0, stickout=6.0, holder=(HolderSegment(20, 20, 20),)), "shank"),
+    (tool(4.0, 0.0, neck=3.0, shank=8.0, stickout=9.0, holder=(HolderSegment(20, 20, 20),)), "shank"),
+])
+def test_a_longer_tool_that_is_asked_for_reaches(body, reason):
+    mesh = block()
+    left = out_of_reach(mesh, [body], wall_of_block(mesh))
+    found = stays(mesh, [body], left)
+    assert sum(r.area for r in found) == pytest.approx(left.area.sum())
+    assert {r.reason for r in found} & {reason}
+    for r in found:
+        if r.reason not in ("shank", "holder"):
+            continue
+        longer = bought(body, r.would_need)
+        assert longer.stickout >= longer.neck_length or longer.neck_length == body.neck_length
+        high = left.subset(left.points[:, 2] > 2 + body.radius + 0.1)
+        reached = touchable(field_of(mesh, longer), high.points, high.normals, LIFT)[1]
+        assert reached.mean() >= 0.98 - 1e-9
+
+
+def test_a_floor_beside_a_wall_asks_for_length_at_the_tip_that_fits():
+    # the axis cannot stand over these samples: the length counts from the place beside them where it can
+    mesh = block()
+    body = tool(4.0, 0.0, neck=4.0, shank=8.0)
+    s = samples_of(mesh, 8.0)
+    floor = s.subset((s.normals[:, 2] > 0.9) & (np.abs(s.points[:, 2] - 2) < 1e-9) & (s.points[:, 0] < 11.5)
+                     & (s.area > 0))
+    left = out_of_reach(mesh, [body], floor)
+    found = stays(mesh, [body], left)
+    assert [r.reason for r in found] == ["shank"]
+    reached = touchable(field_of(mesh, bought(body, found[0].would_need)), left.points, left.normals, LIFT)[1]
+    assert reached.mean() >= 0.98
+
+
+def test_a_narrow_gap_asks_for_a_thinner_ball():
+    mesh = terraces([0, 5, 6.2, 11], [0, 12], [[10, 2, 10]])
+    s = samples_of(mesh, 8.0)
+    inside = s.subset((s.points[:, 0] >= 5) & (s.points[:, 0] <= 6.2) & (s.points[:, 2] < 9.9)
+                      & (np.abs(s.normals[:, 1]) < 0.5) & (s.area > 0))
+    found = stays(mesh, [ball(3.0)], inside)
+    gap = [r for r in found if r.reason == "gap"]
+    assert gap and sum(r.area for r in found) == pytest.approx(inside.area.sum())
+    for r in gap:
+        assert r.would_need["diameter_mm"] < 1.2
+        thin = field_of(mesh, bought(ball(3.0), r.would_need))
+        reached = touchable(thin, inside.points, inside.normals, LIFT)[1]
+        assert inside.area[reached].sum() >= 0.97 * r.area
+    assert {r.would_need["kind"] for r in gap} == {"ball", "flat"}  # the foot of the wall needs a sharp corner
+
+
+def test_an_inner_corner_is_for_a_smaller_radius_and_its_line_for_none():
+    mesh = terraces([0, 4, 14], [0, 4, 14], [[8, 8], [8, 2]])
+    s = samples_of(mesh, 40.0)
+    upright = s.subset((np.abs(s.normals[:, 2]) < 0.1) & (s.points[:, 2] > 4) & (s.points[:, 0] >= 4)
+                       & (s.points[:, 1] >= 4) & (s.points[:, 0] < 13.9) & (s.points[:, 1] < 13.9) & (s.area > 0))
+    left = out_of_reach(mesh, [ball(4.0)], upright)
+    found = stays(mesh, [ball(4.0)], left)
+    assert {r.reason for r in found} <= {"corner", "gap", "sharp corner"} and found
+    assert sum(r.area for r in found) == pytest.approx(left.area.sum())
+    assert all(r.would_need == {} for r in found if r.reason == "sharp corner")
+
+
+def test_what_hangs_over_is_undercut_and_names_the_connection():
+    plate = terraces([0, 20], [0, 12], [[2]])
+    bar = box_mesh([8, -1, 6], [12, 13, 8])
+    bar = type(bar)(bar.vertices, bar.faces, np.full(len(bar.faces), 9, np.int32))
+    mesh = joined(plate, bar)
+    s = samples_of(mesh, 5.0, {2})
+    below = s.subset((s.normals[:, 2] > 0.9) & (s.points[:, 0] > 8.1) & (s.points[:, 0] < 11.9) & (s.area > 0))
+    named = Decomposition((), (Connection("C1", (9,), ("W1", "W2"), 6, 8),), ())
+    assert [r.reason for r in stays(mesh, [ball(3.0)], below)] == ["undercut"]
+    found = stays(mesh, [ball(3.0)], below, named)
+    assert [r.reason for r in found] == ["undercut behind connection C1"]
+    assert found[0].would_need == {"kind": "other access"} and found[0].area == pytest.approx(below.area.sum())
+
+
+def test_what_a_tool_at_hand_touches_asks_for_no_other_tool():
+    mesh = block()
+    s = wall_of_block(mesh)
+    high = s.subset(s.points[:, 2] > 6)
+    found = stays(mesh, [ball(3.0), tool(2.0, 0.0, "T2", neck=1.0, shank=9.0)], high)
+    assert [(r.reason, r.would_need) for r in found] == [("pass", {})]
+
+
+def test_given_up_is_not_blamed_on_a_corner():
+    mesh = terraces([0, 4, 14], [0, 4, 14], [[8, 8], [8, 2]])
+    s = samples_of(mesh, 40.0)
+    near = s.subset((np.abs(s.normals[:, 0] - 1) < 0.1) & (s.points[:, 0] < 4.1) & (s.points[:, 1] > 4)
+                    & (s.points[:, 1] < 4.3) & (s.points[:, 2] > 5) & (s.area > 0))
+    assert {r.reason for r in stays(mesh, [ball(4.0)], near)} <= {"corner", "gap", "sharp corner"}
+    found = stays(mesh, [ball(4.0)], near, given_up=np.ones(len(near), bool))
+    assert [(r.reason, r.would_need) for r in found] == [("pass", {})]
+
+
+def test_many_samples_are_asked_by_a_share_and_areas_still_sum():
+    mesh = block()
+    s = wall_of_block(mesh, 80.0)
+    assert len(s) > 6000
+    found = stays(mesh, [ball(3.0, neck=1.0, shank=9.0)], s)
+    assert sum(r.area for r in found) == pytest.approx(s.area.sum())
+    assert found == sorted(found, key=lambda r: -r.area)

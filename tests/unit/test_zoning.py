@@ -1,0 +1,171 @@
+"""Which tool gets which samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from geometry.toolbody import HolderSegment
+from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, walls
+from zones.model import Channel, Connection, Decomposition, Wall
+from zones.zoning import (
+    Form,
+    able,
+    build_zones,
+    face_regions,
+    forms_of,
+    is_open,
+    machinable_faces,
+    preference,
+)
+
+NOTHING = Decomposition((), (), ())
+
+
+def zones_of(mesh, tools, *, faces=None, scallop=0.02, lift=0.002, density=20.0, regions=None):
+    samples = samples_of(mesh, density, faces)
+    samples = samples.subset(samples.normals[:, 2] > -0.02)
+    fields = {t.id: field_of(mesh, t) for t in tools}
+    named = regions or dict.fromkeys(range(1, int(mesh.face_ids.max()) + 1), "free")
+    return samples, fields, build_zones(samples, named, fields, scallop, lift)
+
+
+def face_at(mesh, point, normal) -> int:
+    """Number of the face of the triangle with this normal that lies nearest to a point."""
+    mine = np.flatnonzero(mesh.normals @ np.array(normal, float) > 0.999)
+    centre = mesh.triangles[mine].mean(axis=1)
+    return int(mesh.face_ids[mine[np.argmin(np.linalg.norm(centre - np.array(point), axis=1))]])
+
+
+def test_forms_by_the_normal():
+    n = np.array([[0, 0, 1.0], [0.6, 0, 0.8], [0.8, 0, 0.6], [1, 0, 0], [0, 0.0, -1]])
+    assert forms_of(n).tolist() == [Form.LEVEL, Form.SHALLOW, Form.STEEP, Form.STEEP, Form.STEEP]
+
+
+def test_the_seat_and_what_faces_down_are_not_machinable():
+    mesh = walls()
+    samples = samples_of(mesh, 2.0)
+    faces = machinable_faces(samples, NOTHING, None, set())
+    assert 1 not in faces and faces == set(range(2, int(mesh.face_ids.max()) + 1))
+    assert machinable_faces(samples, Decomposition((), (), (), {}, (2,)), None, {3}) == faces - {2, 3}
+    assert machinable_faces(samples, NOTHING, {4, 5}, {5}) == {4}
+
+
+def test_walls_that_face_each_other_share_a_channel():
+    mesh = walls()
+    left = {s: face_at(mesh, (5 if s < 0 else 7, 7, 6), (s, 0, 0)) for s in (-1, 1)}
+    right = {s: face_at(mesh, (15 if s < 0 else 17, 7, 6), (s, 0, 0)) for s in (-1, 1)}
+    tops = face_at(mesh, (6, 7, 10), (0, 0, 1))
+    floor = face_at(mesh, (11, 7, 3), (0, 0, 1))
+    d = Decomposition((Wall("W1", (*left.values(), tops), tuple(left.values()), 2, 3, 10),
+                       Wall("W2", tuple(right.values()), tuple(right.values()), 2, 3, 10)), (),
+                      (Channel("H1", ("W1", "W2"), 8.0, (7, 7, 6)),), {floor: "floor"})
+    region = face_regions(as_part(mesh), d, samples_of(mesh, 5.0), TriangleTree(mesh))
+    assert (region[left[1]], region[right[-1]]) == ("H1", "H1")
+    assert (region[left[-1]], region[right[1]]) == ("W1", "W2")
+    assert (region[tops], region[floor], region[1]) == ("top", "floor", "free")
+
+
+def test_faces_of_a_connection_are_its_region():
+    mesh = walls()
+    d = Decomposition((), (Connection("C1", (3, 4), ("W1", "W2"), 0, 1),), ())
+    region = face_regions(as_part(mesh), d, samples_of(mesh, 2.0), TriangleTree(mesh))
+    assert region[3] == region[4] == "C1" and region[2] == "free"
+
+
+def test_a_sharp_end_is_for_planes_and_upright_walls():
+    n = np.array([[0, 0, 1.0], [1, 0, 0], [0.9999, 0, 0.0141], [0.6, 0, 0.8]])
+    assert able(tool(4, 0), n, 0.02).tolist() == [True, True, True, False]
+    assert able(tool(4, 0), n, 0.002).tolist() == [True, True, False, False]
+    assert able(ball(4), n, 0.002).all()
+
+
+def test_flat_ends_come_first_on_planes_only():
+    flat, thick = tool(4, 0), ball(6)
+    assert preference(flat, Form.LEVEL) < preference(thick, Form.LEVEL)
+    assert preference(thick, Form.STEEP) < preference(flat, Form.STEEP)
+
+
+def test_zones_partition_what_is_in_reach():
+    samples, fields, zones = zones_of(walls(), [ball(4, "T1"), tool(3, 0, "T2")])
+    taken = np.concatenate([z.samples for z in zones])
+    assert len(np.unique(taken)) == len(taken)
+    assert [z.id for z in zones] == [f"Z{k}" for k in range(1, len(zones) + 1)]
+    for z in zones:
+        assert (forms_of(samples.normals[z.samples]) == z.form).all()
+        field = fields[z.tool.id]
+        at = z.tips + [0, 0, 2e-5]
+        assert not (field.blocked_by_cutter(at) | field.blocked_by_body(at)).any()
+        assert samples.points[z.samples, 2].min() == z.bottom and samples.points[z.samples, 2].max() == z.top
+    level = [z for z in zones if z.form is Form.LEVEL]
+    assert {z.tool.id for z in level} == {"T2"}
+    assert samples.area[taken].sum() == pytest.approx(samples.area.sum(), rel=0.01)
+
+
+def test_the_stoutest_tool_stops_where_its_shank_meets_the_wall():
+    mesh = terraces([0, 10, 24], [0, 10], [[14, 2]])
+    short, long = ball(6, "T1", neck=8.0, shank=10.0), ball(3, "T2", neck=20.0)
+    samples, _, zones = zones_of(mesh, [short, long], faces={face_at(mesh, (10, 5, 8), (1, 0, 0))})
+    assert [z.tool.id for z in zones] == ["T1", "T2"]
+    upper, lower = zones
+    assert upper.bottom >= upper.plane > -np.inf
+    # at contact the tip stands 3 below the sample; the shank 8 above it has to clear the top at 14
+    assert upper.plane == pytest.approx(14 - 8 + 3, abs=0.1)
+    assert lower.top < upper.plane and lower.bottom == pytest.approx(2 + 1.5, abs=0.15)
+    assert lower.rejected[0]["tool"] == "T1"
+
+
+def test_the_cutting_plane_costs_no_reach_where_no_other_tool_follows():
+    # the holder meets the tall block over the upper floor; the lower floor far away is free to the same tool
+    mesh = terraces([0, 6, 14, 40], [0, 20], [[30, 10, 4]])
+    body = tool(4, 0, neck=60.0, stickout=12.0, holder=(HolderSegment(16, 16, 40),))
+    floors = {face_at(mesh, (10, 10, 10), (0, 0, 1)), face_at(mesh, (30, 10, 4), (0, 0, 1))}
+    samples, fields, zones = zones_of(mesh, [body], faces=floors)
+    low = samples.points[:, 2] < 5
+    by_tool = np.zeros(len(samples), bool)
+    for z in zones:
+        by_tool[z.samples] = True
+    assert low.any() and by_tool[low & (samples.points[:, 0] > 26)].all()
+    assert not by_tool[~low & (samples.points[:, 0] < 10)].any()
+    assert all(z.plane == -np.inf or z.bottom >= z.plane for z in zones)
+
+
+def test_a_thinner_tool_still_comes_before_what_lies_below_the_plane():
+    mesh = terraces([0, 6, 14, 40], [0, 20], [[30, 10, 4]])
+    stout = tool(4, 0, "T1", stickout=12.0, holder=(HolderSegment(16, 16, 40),))
+    long = tool(3, 0, "T2", stickout=60.0)
+    floors = {face_at(mesh, (10, 10, 10), (0, 0, 1)), face_at(mesh, (30, 10, 4), (0, 0, 1))}
+    _, _, zones = zones_of(mesh, [stout, long], faces=floors)
+    assert {z.tool.id for z in zones if z.bottom < 5} == {"T2"}
+
+
+def test_a_small_region_gets_one_tool():
+    # a square pocket of 5 mm: the 4 mm ball gets nearly all the 3 mm one gets of its walls
+    mesh = terraces([0, 4, 10, 14], [0, 4, 10, 14], [[4, 4, 4], [4, 2.8, 4], [4, 4, 4]])
+    walls_of_pocket = {face_at(mesh, p, n) for p, n in [((4, 7, 3.4), (1, 0, 0)), ((10, 7, 3.4), (-1, 0, 0)),
+                                                        ((7, 4, 3.4), (0, 1, 0)), ((7, 10, 3.4), (0, -1, 0))]}
+    _, _, zones = zones_of(mesh, [tool(2, 0, "T2"), tool(1.9, 0, "T1")], faces=walls_of_pocket)
+    assert [z.tool.id for z in zones] == ["T2"]
+
+
+def test_too_little_area_is_no_zone():
+    mesh = terraces([0, 4, 4.5, 10], [0, 1, 2, 10], [[4, 4, 4], [4, 5, 4], [4, 4, 4]])
+    top = {face_at(mesh, (4.2, 1.5, 5), (0, 0, 1))}
+    _, _, zones = zones_of(mesh, [ball(3)], faces=top)
+    assert zones == []
+
+
+def test_tools_that_reach_nothing_make_no_zone():
+    mesh = terraces([0, 5, 5.8, 11], [0, 10], [[8, 2, 8]])
+    _, _, zones = zones_of(mesh, [ball(3)], faces={face_at(mesh, (5.4, 5, 2), (0, 0, 1))})
+    assert zones == []
+
+
+def test_open_and_closed_zones():
+    mesh = dome()
+    _, fields, zones = zones_of(mesh, [ball(4)], faces={2})
+    assert is_open(zones[0], fields["T1"])
+    pocket = terraces([0, 4, 16, 20], [0, 4, 16, 20], [[8, 8, 8], [8, 2, 8], [8, 8, 8]])
+    _, fields, zones = zones_of(pocket, [ball(4)], faces={face_at(pocket, (10, 10, 2), (0, 0, 1))})
+    assert not is_open(zones[0], fields["T1"])
