@@ -136,10 +136,22 @@ def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[st
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
         return [{"kind": "nothing_cut", "message": "no tool of the setup can cut anything of what was asked for",
                  "would_need": would}]
+    out = _beyond_travel(ready, made)
     if coverage < least:
-        return [{"kind": "coverage", "depth": r(coverage, 6), "limit": least,
-                 "message": f"coverage {coverage:.4f} is below coverage_min {least:g}"}]
-    return []
+        out.append({"kind": "coverage", "depth": r(coverage, 6), "limit": least,
+                    "message": f"coverage {coverage:.4f} is below coverage_min {least:g}"})
+    return out
+
+
+def _beyond_travel(ready: Prepared, made: Plan) -> list[dict[str, Any]]:
+    """Axes whose moves span more than the machine's travel; where the travel lies is for the operator to set."""
+    travel = ready.setup.machine.travel_mm
+    if travel is None:
+        return []
+    points = np.vstack([t.points for s in made.steps for t in s.trajectories])
+    return [{"kind": "limit", "depth": r(span - limit), "limit": limit,
+             "message": f"the program moves over {span:.3f} mm in {axis}, the machine travels {limit:g} mm"}
+            for axis, span, limit in zip("XYZ", np.ptp(points, axis=0).tolist(), travel, strict=True) if span > limit]
 
 
 def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict[str, Workingstep],

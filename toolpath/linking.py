@@ -50,12 +50,14 @@ class Linker:
     field   : TipField of the tool
     stock   : StockMap, lowered as passes are added
     motions : Motions
+    rim     : lattice steps beyond the cutter's radius at which a way down a ramp looks for stock
     skipped : lines that found no safe way in
     """
 
     field: TipField
     stock: StockMap
     motions: Motions
+    rim: float = -0.3
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
@@ -140,7 +142,8 @@ class Linker:
         return None
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
-        over = max(float(self.stock.overlap(points, self.field.tool, -0.3).max()), self.motions.step_down) + 0.1
+        seen = float(self.stock.overlap(points, self.field.tool, self.rim).max())
+        over = max(seen, self.motions.step_down) + 0.1
         ramp = self._ramp(points, closed, over)
         return None if ramp is None else (ramp[:1], ramp, False)
 

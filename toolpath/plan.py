@@ -19,7 +19,7 @@ from toolpath.levels import Line, dilated
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
-from toolpath.stock import StockMap
+from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach import TipField
 from zones.zoning import Form, ZoneArea
@@ -27,6 +27,8 @@ from zones.zoning import Form, ZoneArea
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+# A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
+LATTICE_CARE = 1.5
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off
 
 Progress = Callable[[float], None]
@@ -155,8 +157,9 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     """One workingstep that takes the stock above all zones of a tool off in depth layers."""
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
-    allowance = max(0.1 * cut.step_down, 1.2 * lat.step)
-    linker = Linker(field, stock, _motions(cut, settings))
+    allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
+    rim = min(SURE_RIM, 0.9 * allowance / stock.lattice.step)
+    linker = Linker(field, stock, _motions(cut, settings), rim)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance
@@ -167,7 +170,7 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
         below = dilated(lat.mask(tips[tips[:, 2] <= z + 1e-6, :2]), max(0.5 * tool.radius / lat.step, 1.5))
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
-                linker.add(line, 0.25 * lat.step)
+                linker.add(line, 0.1 * lat.step)
         finished = lat.mask(walls[np.abs(walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
         for line in nearest_order(layers.rim(field, stock, z, below, finished, allowance, chord), linker.at, False):
             linker.add(line)
