@@ -182,13 +182,14 @@ def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: flo
         return []
     points = line.points
     if line.closed:
-        unwanted = np.flatnonzero(~wanted[:-1])
-        if not len(unwanted):
-            return [line]
-        # begin in the longest unwanted stretch, so that no piece is cut at the arbitrary start of the loop
         n = len(points) - 1
-        gaps = np.diff(np.concatenate([unwanted, [unwanted[0] + n]]))
-        shift = int(unwanted[int(np.argmin(gaps))])
+        if wanted[:-1].all():
+            return [line]
+        # begin in the middle of the longest unwanted stretch, so that no piece is cut at the arbitrary start
+        order = (np.arange(n) + int(np.argmax(wanted[:-1]))) % n
+        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[[*order, order[0]]], axis=0), axis=1))])
+        a, b = max(true_runs(~wanted[order]), key=lambda run: float(at[run[1]] - at[run[0]]))
+        shift = int(order[(a + b) // 2])
         order = np.concatenate([np.arange(shift, n), np.arange(0, shift + 1)])
         points, wanted = points[order], wanted[order]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

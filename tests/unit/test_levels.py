@@ -1,0 +1,157 @@
+"""Lines at one height: pieces, thinning, and lines that keep to the free region."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
+from tests.plan_checks import dense
+from toolpath.levels import (
+    Line,
+    contours,
+    dilated,
+    free_pieces,
+    moves_free,
+    pieces_where,
+    rings,
+    thinned,
+    true_runs,
+)
+
+
+def circle(n=200, r=10.0, closed=True):
+    a = np.linspace(0, 2 * np.pi, n + 1)
+    return Line(np.column_stack([r * np.cos(a), r * np.sin(a), np.zeros(n + 1)]), closed)
+
+
+def along(points):
+    return np.asarray(points, float)
+
+
+def everywhere(field):
+    return np.ones((field.lattice.ny, field.lattice.nx), bool)
+
+
+def test_length_and_reversal():
+    line = circle()
+    assert line.length == pytest.approx(2 * np.pi * 10, rel=1e-3)
+    back = line.reversed()
+    assert back.closed and (back.points[::-1] == line.points).all()
+
+
+def test_runs_of_true():
+    assert true_runs(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == [(0, 2), (3, 4), (6, 7)]
+    assert true_runs(np.zeros(3, bool)) == []
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 0.05, 0.001])
+def test_thinning_keeps_ends_and_stays_within_its_tolerance(tolerance):
+    rng = np.random.default_rng(4)
+    points = np.cumsum(rng.normal(size=(300, 3)) * [0.2, 0.2, 0.02], axis=0)
+    kept = thinned(points, tolerance)
+    assert (kept[0] == points[0]).all() and (kept[-1] == points[-1]).all()
+    fine = dense(kept, 0.25 * tolerance + 1e-3)
+    gap = np.sqrt(((points[:, None] - fine[None]) ** 2).sum(-1)).min(axis=1)
+    assert gap.max() <= tolerance + 0.5 * (0.25 * tolerance + 1e-3)
+    assert len(thinned(circle().points, 0.01)) < 80
+
+
+def test_a_straight_line_keeps_two_points():
+    assert len(thinned(np.linspace([0, 0, 0], [9, 3, 1], 50), 1e-9)) == 2
+
+
+def test_dilation_grows_a_square():
+    m = np.zeros((9, 9), bool)
+    m[4, 4] = True
+    assert dilated(m, 0.0).sum() == 1 and dilated(m, 1.0).sum() == 9 and dilated(m, 1.2).sum() == 25
+
+
+def test_pieces_are_cut_out_extended_and_joined():
+    points = np.column_stack([np.arange(21.0), np.zeros(21), np.zeros(21)])
+    line = Line(points, False)
+    wanted = np.zeros(21, bool)
+    wanted[[3, 4, 5, 12, 13]] = True
+    got = pieces_where(line, wanted, 0.5, 2.0)
+    assert [(p.points[0, 0], p.points[-1, 0]) for p in got] == [(2.5, 5.5), (11.5, 13.5)]
+    assert [(p.points[0, 0], p.points[-1, 0]) for p in pieces_where(line, wanted, 0.5, 7.0)] == [(2.5, 13.5)]
+    assert pieces_where(line, np.zeros(21, bool), 1, 1) == []
+    wanted[:] = True
+    assert pieces_where(line, wanted, 5.0, 1.0)[0].points[[0, -1], 0].tolist() == [0.0, 20.0]
+
+
+@pytest.mark.parametrize("start", [0, 37, 100, 160])
+def test_a_piece_of_a_loop_does_not_depend_on_where_the_loop_begins(start):
+    loop = circle()
+    ring = np.roll(loop.points[:-1], -start, axis=0)
+    line = Line(np.vstack([ring, ring[:1]]), True)
+    wanted = line.points[:, 0] > 5.0
+    wanted |= (line.points[:, 0] < -9.99)  # a second, tiny piece on the far side
+    got = pieces_where(line, wanted, 0.7, 1.0)
+    assert len(got) == 2 and not any(p.closed for p in got)
+    assert max(p.length for p in got) == pytest.approx(2 * np.pi / 3 * 10 + 1.4, abs=0.4)
+
+
+@pytest.mark.parametrize("start", range(0, 200, 40))
+def test_near_pieces_of_a_loop_are_joined_wherever_it_begins(start):
+    loop = circle()
+    ring = np.roll(loop.points[:-1], -start, axis=0)
+    line = Line(np.vstack([ring, ring[:1]]), True)
+    angle = np.degrees(np.arctan2(line.points[:, 1], line.points[:, 0]))
+    wanted = (np.abs(angle) < 60) & (np.abs(angle) > 5)
+    assert len(pieces_where(line, wanted, 0.1, 3.0)) == 1
+
+
+def test_a_loop_that_is_wanted_all_round_stays_closed():
+    line = circle()
+    assert pieces_where(line, np.ones(201, bool), 0.1, 0.1)[0].closed
+    wanted = np.ones(201, bool)
+    wanted[100] = False
+    assert pieces_where(line, wanted, 0.1, 1.0)[0].closed
+
+
+def test_contours_walk_with_the_material_on_the_right():
+    field = field_of(box_mesh([0, 0, 0], [8, 5, 4]), ball(3.0))
+    (line,) = contours(field, 1.0, everywhere(field), 0.002)
+    assert line.closed and (line.points[:, 2] == 1.0).all()
+    p = line.points[:, :2]
+    assert 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1])) < 0  # clockwise round an island
+    pocket = field_of(terraces([0, 2, 12, 14], [0, 2, 12, 14], [[6, 6, 6], [6, 2, 6], [6, 6, 6]]), ball(3.0))
+    inner = [c for c in contours(pocket, 3.0, everywhere(pocket), 0.002)
+             if (np.abs(c.points[:, :2] - 7).max(axis=1) < 5).all()]
+    assert len(inner) == 1
+    p = inner[0].points[:, :2]
+    assert 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1])) > 0  # the other way inside a pocket
+
+
+def test_a_contour_that_leaves_the_area_is_open():
+    field = field_of(box_mesh([0, 0, 0], [8, 5, 4]), ball(3.0))
+    active = everywhere(field)
+    active[:, active.shape[1] // 2:] = False
+    (line,) = contours(field, 1.0, active, 0.002)
+    assert not line.closed
+    assert contours(field, 1.0, np.zeros_like(active), 0.002) == []
+    assert contours(field, 9.0, everywhere(field), 0.002) == []
+
+
+@pytest.mark.parametrize("distance", [0.4, 1.1])
+def test_rings_keep_their_distance(distance):
+    field = field_of(box_mesh([0, 0, 0], [8, 5, 4]), tool(3.0, 0.0))
+    lines = rings(field, 1.0, everywhere(field), distance)
+    p = np.vstack([dense(r.points, 0.05) for r in lines])
+    outside = np.hypot(*(np.maximum(np.maximum([0, 0] - p[:, :2], p[:, :2] - [8, 5]), 0)).T)
+    near = outside < 4.0
+    assert np.abs(outside[near] - 1.5 - distance).max() <= 1.5 * field.lattice.step
+    assert rings(field, 1.0, np.zeros((field.lattice.ny, field.lattice.nx), bool), 1.0) == []
+
+
+def test_moves_through_a_wall_are_seen_and_cut_out():
+    field = field_of(walls(), ball(2.0))
+    line = along([[1, 7, 4], [3, 7, 4], [9, 7, 4], [12, 7, 4]])
+    assert moves_free(field, line).tolist() == [True, False, True]
+    got = free_pieces(field, line, False)
+    assert [p.points[:, 0].tolist() for p in got] == [[1, 3], [9, 12]]
+    whole = free_pieces(field, along([[1, 7, 4], [3, 7, 4]]), False)
+    assert len(whole) == 1 and len(whole[0].points) == 2
+    # standing inside the wall is no better than moving through it
+    assert free_pieces(field, along([[6, 7, 4], [6.1, 7, 4]]), False) == []
