@@ -23,6 +23,9 @@ FILES = {"program.linuxcnc.ngc": "program", "job.stpnc": "stepnc", "job.arm.stpn
          "preview.png": "preview"}
 LOWERED = 0.05
 
+# The first test waits for the whole chain, kernels compiled on the way.
+pytestmark = pytest.mark.timeout(900)
+
 
 @pytest.fixture(scope="module")
 def report(demo_job):

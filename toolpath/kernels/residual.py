@@ -55,8 +55,8 @@ def _segment_gap(p, a, b, radius, corner, level):
 def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    level (n,): 1 on a level plane, 2 on a wall, else 0. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each cell;
-    gx, gy, cell: corner and size of the cells, mm.
+    level (n,): 1 on a level plane, 2 on a wall, else 0. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each
+    cell; gx, gy, cell: corner and size of the cells, mm.
     """
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
