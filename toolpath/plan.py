@@ -170,15 +170,20 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
         below = dilated(lat.mask(tips[tips[:, 2] <= z + 1e-6, :2]), max(0.5 * tool.radius / lat.step, 1.5))
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
-                linker.add(line, 0.1 * lat.step)
+                linker.add(_turned(line, settings), 0.1 * lat.step)
         finished = lat.mask(walls[np.abs(walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
         for line in nearest_order(layers.rim(field, stock, z, below, finished, allowance, chord), linker.at, False):
-            linker.add(line)
+            linker.add(_turned(line, settings))
     if not linker.passes:
         return None
     ids = " ".join(z.id for z in zones)
     return _step(step_id, f"{step_id} layers {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
                  0.8 * tool.radius, linker, settings)
+
+
+def _turned(line: Line, settings: PlanSettings) -> Line:
+    """A line in climb order, the other way where the setup wants conventional milling."""
+    return line if settings.climb or settings.either_way else line.reversed()
 
 
 def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock: StockMap,
@@ -196,8 +201,8 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
             if name != "zigzag":
                 lines = nearest_order(lines, linker.at, settings.either_way)
             for line in lines:
-                if name == "zlevel" and not settings.climb and not settings.either_way:
-                    line = line.reversed()
+                if name != "zigzag":
+                    line = _turned(line, settings)
                 before = len(linker.trajectories)
                 for layer in zigzag.skimmed(line, stock, field.tool, SKIN * field.tool.diameter):
                     linker.add(layer)
