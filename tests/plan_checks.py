@@ -41,7 +41,10 @@ def deepest_gouge(case: Case, within: float, allowance: float = 0.0, spacing: fl
 
 def body_intrusion(tree: TriangleTree, body: ToolBody, points: F64, shank: float, holder: float) -> float:
     """How far shank or holder, made wider by these clearances, go below the top of the obstacles, mm."""
-    p = dense(points, 0.1)
+    p = dense(points, 0.3)
+    p = p[p[:, 2] < tree.mesh.bounds[1, 2]]
+    if not len(p):
+        return -np.inf
     discs = [(body.shank_diameter / 2 + shank, body.neck_length)] if body.shank_diameter > body.diameter else []
     z = body.stickout
     for seg in body.holder:
@@ -136,11 +139,8 @@ def worst_plunge(case: Case) -> tuple[float, str]:
     return worst, where
 
 
-def brute_residual(points: F64, normals: F64, paths: list[tuple[ToolBody, F64]], spacing: float = 0.03) -> F64:
-    """Distance (n,) mm from samples along their normals to the nearest cutter among tips every ``spacing`` mm.
-
-    A ball only: the distance from the sample to the sphere of the tip, or to the cylinder above its middle.
-    """
+def brute_residual(points: F64, paths: list[tuple[ToolBody, F64]], spacing: float = 0.04) -> F64:
+    """Distance (n,) mm from samples to the nearest ball cutter among tips every ``spacing`` mm, flank included."""
     from scipy.spatial import cKDTree
 
     best = np.full(len(points), np.inf)
@@ -148,6 +148,12 @@ def brute_residual(points: F64, normals: F64, paths: list[tuple[ToolBody, F64]],
         r = body.radius
         assert body.corner_radius == r
         tips = np.vstack([dense(p, spacing) for b, p in paths if b.id == body.id])
-        middle = cKDTree(tips + [0.0, 0.0, r])
-        best = np.minimum(best, middle.query(points)[0] - r)
+        near = cKDTree(tips[:, :2]).query_ball_point(points[:, :2], r + 0.3)
+        for k, members in enumerate(near):
+            c = tips[members]
+            u = np.hypot(c[:, 0] - points[k, 0], c[:, 1] - points[k, 1])
+            w = np.maximum(c[:, 2] + r - points[k, 2], 0.0)
+            flank = c[:, 2] + body.flute_length >= points[k, 2]
+            if flank.any():
+                best[k] = min(best[k], float(np.sqrt(u**2 + w**2)[flank].min()) - r)
     return best
