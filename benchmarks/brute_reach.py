@@ -46,7 +46,7 @@ SEEN = -0.02  # n_z above: the access direction sees it
 LEVEL = 1.0 - 1e-6  # n_z above: level
 UPRIGHT_STEP = 0.1  # mm, step down at which a sharp-cornered end must keep the scallop on a wall
 HOLDER_SLICES = 12
-MOST_NODES = 3_000_000
+MOST_WORK = 1.0e10
 SAMPLES = 400_000
 MOST_DENSITY = 100.0  # samples a mm²
 SEED = 7
@@ -355,15 +355,16 @@ def _fixtures(height: F64, grid: Grid, setup: dict[str, Any]) -> None:
         height[inside] = np.maximum(height[inside], hi[2])
 
 
-def default_step(mesh: Any) -> float:
-    """0.05 mm, or what keeps the grid at ``MOST_NODES``."""
-    size = mesh.bounds[1, :2] - mesh.bounds[0, :2] + 10.0
-    return max(0.05, math.sqrt(float(size[0] * size[1]) / MOST_NODES))
+def default_step(mesh: Any, tools: list[BruteTool]) -> float:
+    """0.05 mm, or what keeps the dilation by the widest round tool at ``MOST_WORK`` sums."""
+    widest = max((t.radius for t in tools if t.corner > 0), default=1.0)
+    size = mesh.bounds[1, :2] - mesh.bounds[0, :2] + 4.0 * widest
+    return max(0.05, (float(size[0] * size[1]) * math.pi * widest**2 / MOST_WORK) ** 0.25)
 
 
 def estimate(mesh: Any, setup: dict[str, Any], step: float | None = None) -> dict[str, Any]:
     """Both coverages at ``step`` and at twice that, and the line through both extended to a step of nothing."""
-    step = step or default_step(mesh)
+    step = step or default_step(mesh, tools_of(setup))
     coarse, fine = brute_reach(mesh, setup, 2 * step), brute_reach(mesh, setup, step)
     out: dict[str, Any] = {"step_mm": round(step, 4), "machinable_area_mm2": round(fine.area, 3)}
     for name in ("touched", "clean"):
