@@ -27,6 +27,7 @@ from zones.zoning import Form, ZoneArea
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+FLUTE_SHARE = 0.8  # of the flute length: no rim beside a wall may stand higher before a deeper pass comes by
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
 LATTICE_CARE = 1.5
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off
@@ -166,13 +167,17 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     top = stock.highest
     if top <= bottom:
         return None
+    swept = top
     for z in layers.layer_heights(top, bottom, 0.85 * cut.step_down):
         below = dilated(lat.mask(tips[tips[:, 2] <= z + 1e-6, :2]), max(0.5 * tool.radius / lat.step, 1.5))
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(_turned(line, settings), 0.1 * lat.step)
         finished = lat.mask(walls[np.abs(walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
-        for line in nearest_order(layers.rim(field, stock, z, below, finished, allowance, chord), linker.at, False):
+        unseen = z <= swept - FLUTE_SHARE * tool.flute_length
+        swept = z if unseen else swept
+        rims = layers.rim(field, stock, z, below, finished, allowance, chord, unseen)
+        for line in nearest_order(rims, linker.at, False):
             linker.add(_turned(line, settings))
     if not linker.passes:
         return None

@@ -52,20 +52,20 @@ def _segment_gap(p, a, b, radius, corner, level):
 
 
 @njit(cache=True, nogil=True)
-def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, residual):
+def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, margin, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
     level (n,): 1 on a level plane, 2 on a wall, else 0. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each
-    cell; gx, gy, cell: corner and size of the cells, mm.
+    cell; gx, gy, cell: corner and size of the cells, mm; margin: mm beyond the cutter within which it is measured.
     """
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
-        r = radius + 0.02
+        r = radius + margin
         j0 = max(int((min(a[0], b[0]) - r - gx) / cell), 0)
         j1 = min(int((max(a[0], b[0]) + r - gx) / cell), ncx - 1)
         i0 = max(int((min(a[1], b[1]) - r - gy) / cell), 0)
         i1 = min(int((max(a[1], b[1]) + r - gy) / cell), ncy - 1)
-        z_lo, z_hi = min(a[2], b[2]) - 0.02, max(a[2], b[2]) + flute
+        z_lo, z_hi = min(a[2], b[2]) - margin, max(a[2], b[2]) + flute
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
                 c = i * ncx + j

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath.levels import Line, contours, dilated, pieces_where, rings
-from toolpath.stock import StockMap
+from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import TipField
 
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
@@ -62,7 +62,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
-        allowance: float, tolerance: float) -> list[Line]:
+        allowance: float, tolerance: float, unseen: bool) -> list[Line]:
     """Lines that take the allowance off walls which no finishing pass of this tool will follow at this height.
 
     Without them a wall that is undercut, or is no business of this tool, keeps a thin rim that stands higher than
@@ -70,11 +70,13 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
 
     finished  : (ny, nx) bool, where the finish of a wall at this height puts the tool
     tolerance : mm, of the lines against the true boundary; the other parameters are those of ``layer``
+    unseen    : follow every wall, also where the stock map, coarser than a thin rim, shows none
     """
     lat, tool = field.lattice, field.tool
     done = dilated(finished, 3.0 * allowance / lat.step + 2.0)
     out: list[Line] = []
     for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~done, tolerance):
-        wanted = (stock.overlap(line.points, tool, 0.0) > STOCK_WORTH) & ~done[lat.cells(line.points[:, :2])]
+        seen = stock.overlap(line.points, tool, SURE_RIM if unseen else 0.0) > STOCK_WORTH
+        wanted = seen & ~done[lat.cells(line.points[:, :2])]
         out.extend(pieces_where(line, wanted, 0.5 * tool.radius, 2.0 * tool.radius))
     return out
