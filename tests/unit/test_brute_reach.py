@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from pocket_case import block
 
 from benchmarks import brute_reach
+from tests.pocket_case import block
 
 STEP = 0.1
 LENGTH, WIDTH, DEEP, R = 20.0, 12.0, 5.0, 2.0
