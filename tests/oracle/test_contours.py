@@ -1,0 +1,41 @@
+"""Waterlines against the exact offset of a plan with upright walls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.hand_parts import ball, field_of, terraces, tool
+from tests.plan_checks import dense
+from toolpath.levels import contours
+
+shapely = pytest.importorskip("shapely")
+
+HEIGHTS = np.array([[0, 6, 6, 0], [6, 6, 0, 6], [0, 0, 6, 0]], float)
+XS, YS = np.array([0, 3, 8, 11, 14.0]), np.array([0, 4, 7.5, 12.0])
+
+
+def plan():
+    """The walls as a polygon in plan: an L, a bay, and blocks that meet at their corners only."""
+    cells = [shapely.box(XS[j], YS[i], XS[j + 1], YS[i + 1])
+             for i in range(3) for j in range(4) if HEIGHTS[i, j] > 0]
+    return shapely.union_all(cells)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.002])
+@pytest.mark.parametrize("body", [ball(2.0), ball(4.0), tool(4.0, 0.5)], ids=lambda b: f"{b.kind}")
+def test_waterlines_are_the_offset_of_the_walls(body, tolerance):
+    field = field_of(terraces(XS, YS, np.maximum(HEIGHTS, 0.0), -2.0), body)
+    lines = contours(field, 1.0, np.ones((field.lattice.ny, field.lattice.nx), bool), tolerance)
+    assert lines and all(line.closed for line in lines)
+    exact = plan().buffer(body.radius, quad_segs=400).boundary
+    walked = dense(np.vstack([line.points for line in lines[:1]]), 0.02)
+    for line in lines[1:]:
+        walked = np.vstack([walked, dense(line.points, 0.02)])
+    away = shapely.distance(shapely.points(walked[:, :2]), exact)
+    assert away.max() <= 1.1 * tolerance
+    # and the whole offset is there, but for cusps narrower than the lattice sees
+    made = shapely.MultiLineString([line.points[:, :2] for line in lines])
+    back = shapely.points([exact.interpolate(s).coords[0] for s in np.arange(0, exact.length, 0.05)])
+    missing = shapely.distance(back, made)
+    assert np.quantile(missing, 0.97) <= 1.1 * tolerance and missing.max() <= 2.0 * field.lattice.step

@@ -1,0 +1,84 @@
+"""The planner's measure of what passes leave, against tips every hundredth of a millimetre."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.hand_parts import ball, tool
+from tests.plan_checks import dense
+from toolpath.residual import UNTOUCHED, ResidualMap
+
+SPACING = 0.004
+
+
+def slow(points, path, body):
+    """Least distance from each point to the cutting part among dense tips (the flank counts as high as the flute)."""
+    best = np.full(len(points), np.inf)
+    r, flat = body.corner_radius, body.radius - body.corner_radius
+    for c in dense(path, SPACING):
+        u = np.maximum(np.hypot(points[:, 0] - c[0], points[:, 1] - c[1]) - flat, 0.0)
+        w = np.maximum(c[2] + r - points[:, 2], 0.0)
+        best = np.minimum(best, np.sqrt(u**2 + w**2) - r)
+    return best
+
+
+@pytest.mark.parametrize("body", [ball(3.0), tool(4.0, 1.0)], ids=lambda b: b.kind)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_measure_is_that_of_dense_tips(body, seed):
+    rng = np.random.default_rng(seed)
+    path = np.cumsum(rng.normal(size=(7, 3)) * [1.5, 1.5, 0.4], axis=0)
+    near = dense(path, 0.05)
+    n = 3000
+    c = near[rng.integers(0, len(near), n)]
+    a, phi, off = rng.random(n) * 2 * np.pi, rng.random(n) * 0.5 * np.pi, rng.normal(size=n) * 0.01
+    u = body.radius - body.corner_radius + (body.corner_radius + off) * np.sin(phi)
+    points = c + np.column_stack([u * np.cos(a), u * np.sin(a),
+                                  body.corner_radius - (body.corner_radius + off) * np.cos(phi)])
+    normals = -np.column_stack([np.sin(phi) * np.cos(a), np.sin(phi) * np.sin(a), -np.cos(phi)])
+    made = ResidualMap(points, normals)
+    made.cut(path, body)
+    true = slow(points, path, body)
+    # the measure stops once a sample is inside the sweep; it is never below the truth by more than the sampling
+    out = true > 1e-4
+    assert out.sum() > 50
+    seen = made.residual < UNTOUCHED
+    assert (made.residual[seen & out] >= true[seen & out] - 2e-4).all()
+    close = out & (true < 0.015)
+    assert close.sum() > 20
+    if body.kind == "bull":
+        return  # on an inclined move the measure of a bull nose is an upper bound only
+    np.testing.assert_allclose(made.residual[close & seen], true[close & seen], atol=2e-4)
+    assert (made.residual[~out] <= 2e-4).all()
+
+
+def test_several_passes_only_lower():
+    rng = np.random.default_rng(9)
+    points = rng.random((500, 3)) * [10, 10, 0.0]
+    made = ResidualMap(points, np.tile([0.0, 0, 1], (500, 1)))
+    before = made.residual.copy()
+    for y in (2.0, 5.0, 8.0):
+        made.cut(np.array([[0, y, 0.0], [10, y, 0.0]]), ball(4.0))
+        assert (made.residual <= before).all()
+        before = made.residual.copy()
+    off = np.min(np.abs(points[:, 1, None] - [2.0, 5.0, 8.0]), axis=1)
+    np.testing.assert_allclose(made.residual[off < 1.9], (2 - np.sqrt(4 - off**2))[off < 1.9], atol=1e-9)
+
+
+@pytest.mark.parametrize("height", [0.01, 0.05, 0.3])
+def test_a_plane_below_the_bottom_is_measured_as_far_as_the_scallop_goes(height):
+    points = np.array([[5.0, 5.0, 0.0]])
+    made = ResidualMap(points, np.array([[0.0, 0, 1]]), margin=0.5)
+    made.cut(np.array([[0, 5, height], [10, 5, height]]), tool(4.0, 0.0))
+    assert made.residual[0] == pytest.approx(height)
+
+
+def test_a_sharp_end_above_the_foot_of_a_wall_leaves_it():
+    points, normals = np.array([[5.0, 5.0, 0.0]]), np.array([[0.0, 1.0, 0]])
+    made = ResidualMap(points, normals)
+    made.cut(np.array([[0, 7.0, 0.01], [10, 7.0, 0.01]]), tool(4.0, 0.0))
+    assert made.residual[0] == 1e3
+    made.cut(np.array([[0, 7.0, -0.5], [10, 7.0, -0.5]]), tool(4.0, 0.0))
+    assert made.residual[0] <= 1e-9
+    empty = ResidualMap(np.zeros((0, 3)), np.zeros((0, 3)))
+    empty.cut(np.zeros((2, 3)), ball(2.0))

@@ -1,0 +1,172 @@
+"""Ways in, across and out, on a plate under a block of stock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
+from toolpath.levels import Line
+from toolpath.linking import Linker, Motions, nearest_order
+from toolpath.motion import Motion
+from toolpath.stock import StockMap
+
+TOP = 4.0
+
+
+def linker(body=None, top=TOP, post=False, step_down=1.0):
+    """A plate 30 x 30 with its top at 0, stock up to ``top``, a post in the middle if asked for."""
+    mesh = box_mesh([0, 0, -2], [30, 30, 0])
+    if post:
+        mesh = joined(mesh, box_mesh([13, 13, 0], [17, 17, 3]))
+    field = field_of(mesh, body or ball(4.0))
+    stock = StockMap.box(np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
+    return Linker(field, stock, Motions(800, 200, 3000, 8.0, 6.0, RAMP, step_down, 0.001))
+
+
+def straight(x0, x1, y, z):
+    return Line(np.array([[x0, y, z], [x1, y, z]], float), False)
+
+
+def loop(r, z, centre=(15.0, 15.0), n=90):
+    a = np.linspace(0, 2 * np.pi, n + 1)
+    return Line(np.column_stack([centre[0] + r * np.cos(a), centre[1] + r * np.sin(a), np.full(n + 1, z)]), True)
+
+
+def steepest_cut(link):
+    """Steepest descent of the cutting moves, rad."""
+    worst = 0.0
+    for t in link.trajectories:
+        if t.motion is Motion.CUT:
+            d = np.diff(t.points, axis=0)
+            worst = max(worst, float(np.arctan2(-d[:, 2], np.hypot(d[:, 0], d[:, 1])).max()))
+    return worst
+
+
+def motions(link):
+    return [t.motion for t in link.trajectories]
+
+
+def test_in_air_the_tool_comes_straight_down():
+    link = linker(top=-1.0)
+    assert link.add(straight(5, 20, 10, 1.0))
+    assert motions(link) == [Motion.RAPID, Motion.RAPID, Motion.APPROACH, Motion.APPROACH, Motion.CUT]
+    assert link.trajectories[-1].points.tolist() == [[5, 10, 1], [20, 10, 1]]
+    feeds = [t.feed for t in link.trajectories if t.motion is Motion.APPROACH]
+    assert feeds == [3000, 200]
+
+
+def test_from_outside_the_stock_it_comes_in_level():
+    link = linker()
+    assert link.add(straight(1.0, 20, 10, 3.2))
+    cut = link.trajectories[-1]
+    assert cut.motion is Motion.CUT and len(cut.points) == 2
+    first = next(t for t in link.trajectories if t.motion is Motion.APPROACH)
+    assert (first.points[:, 0] < -2.0).all()  # beside the block
+
+
+@pytest.mark.parametrize("length", [3.0, 12.0, 24.0])
+def test_an_open_line_in_stock_is_ramped_to_and_fro(length):
+    link = linker(step_down=0.5)
+    line = straight(15 - length / 2, 15 + length / 2, 15, 1.5)
+    assert link.add(line)
+    cut = link.trajectories[-1].points
+    assert steepest_cut(link) <= RAMP
+    assert cut[0, 2] >= TOP  # begins above the stock
+    assert (cut[-2:] == line.points).all()  # and ends with the whole pass at depth
+    assert (cut[:, 1] == 15).all() and cut[:, 0].min() >= line.points[0, 0] - 1e-9
+
+
+@pytest.mark.parametrize("radius", [1.0, 4.0, 9.0])
+def test_a_loop_in_stock_is_ramped_round_and_closed_at_depth(radius):
+    link = linker(step_down=0.5)
+    line = loop(radius, 2.0)
+    assert link.add(line)
+    cut = link.trajectories[-1].points
+    assert steepest_cut(link) <= RAMP and cut[0, 2] >= TOP
+    deep = cut[np.abs(cut[:, 2] - 2.0) < 1e-9]
+    run = float(np.linalg.norm(np.diff(deep, axis=0), axis=1).sum())
+    assert run >= 0.995 * line.length  # a whole turn at depth, after the ramp
+    assert (np.hypot(cut[:, 0] - 15, cut[:, 1] - 15) <= radius + 1e-9).all()
+
+
+def test_a_spot_too_short_for_a_ramp_is_left_out_and_kept():
+    link = linker()
+    line = straight(15, 15.01, 15, 1.0)
+    assert not link.add(line)
+    assert link.skipped == [line] and link.trajectories == [] and link.passes == 0
+
+
+def test_a_point_is_no_pass():
+    link = linker()
+    assert link.add(Line(np.array([[1.0, 1, 1], [1, 1, 1]]), False)) and link.passes == 0
+
+
+def test_the_next_pass_beside_is_reached_without_a_lift():
+    link = linker(step_down=1.5)
+    link.add(straight(-1, 25, 10, 3.0))
+    link.add(Line(straight(-1, 25, 12, 3.0).points[::-1], False))
+    assert motions(link)[-2:] == [Motion.CONNECT, Motion.CUT]
+    assert motions(link).count(Motion.RAPID) == 2
+
+
+def test_a_deeper_level_is_reached_down_a_ramp_along_the_pass():
+    link = linker(tool(4.0, 0.0), step_down=1.0)
+    link.add(loop(8, 3.2))
+    before = len(link.trajectories)
+    link.add(loop(8, 2.4))
+    new = link.trajectories[before:]
+    assert all(t.motion is not Motion.RAPID for t in new)
+    assert steepest_cut(link) <= RAMP
+    assert new[-1].points[0, 2] == pytest.approx(3.2) and new[-1].points[-1, 2] == pytest.approx(2.4)
+
+
+def test_no_link_goes_through_a_wall():
+    link = linker(tool(2.0, 0.0), top=-1.0, post=True)
+    link.add(straight(5, 11.5, 15, 1.0))
+    link.add(straight(18.5, 25, 15, 1.0))
+    assert motions(link).count(Motion.CONNECT) == 0
+    for t in link.trajectories:
+        inside = (np.abs(t.points[:, :2] - 15) < 2.9).all(axis=1)
+        assert (t.points[inside, 2] >= 3.0).all()
+
+
+def test_a_link_takes_no_more_than_a_layer():
+    link = linker(tool(2.0, 0.0), step_down=0.5)
+    link.add(straight(-2, 6, 10, 1.0))
+    link.add(straight(9.5, 20, 10, 1.0))
+    assert Motion.CONNECT not in motions(link)
+
+
+def test_finish_ends_at_the_clearance_plane_with_feed_below_the_rapid_floor():
+    link = linker()
+    link.add(straight(5, 20, 10, 3.2))
+    done = link.finish()
+    assert done[-2].motion is Motion.LIFT and done[-2].points[-1, 2] == 6.0
+    assert done[-1].motion is Motion.RAPID and done[-1].points[-1, 2] == 8.0
+    assert len(link.finish()) == len(done)
+    for a, b in zip(done[:-1], done[1:], strict=True):
+        assert (a.points[-1] == b.points[0]).all()
+
+
+def test_order_goes_to_the_nearest_start():
+    lines = [straight(0, 1, y, 0) for y in (5.0, 1.0, 3.0)]
+    got = nearest_order(lines, np.array([0.0, 0, 9]), False)
+    assert [p.points[0, 1] for p in got] == [1, 3, 5]
+    assert all((p.points[0, 0], p.points[-1, 0]) == (0, 1) for p in got)  # climb is kept
+    free = nearest_order(lines, np.array([0.0, 0, 9]), True)
+    assert [p.points[0, 0] for p in free] == [0, 1, 0]  # to and fro
+    assert nearest_order([], None, True) == []
+
+
+def test_a_loop_begins_at_its_nearest_point_and_keeps_its_sense():
+    line = loop(5.0, 0.0)
+    (got,) = nearest_order([line], np.array([15.0, 30.0, 0]), True)
+    assert got.closed and got.points[0, :2] == pytest.approx([15, 20], abs=0.4)
+    assert (got.points[0] == got.points[-1]).all() and got.length == pytest.approx(line.length)
+
+    def area(p):
+        return 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]))
+    assert math.copysign(1, area(got.points)) == math.copysign(1, area(line.points))
