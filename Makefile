@@ -20,12 +20,12 @@ $(BIN)/python:
 	$(if $(UV),uv venv -q --python $(PYTHON) $(VENV),$(PYTHON) -m venv $(VENV))
 
 $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
-	$(INSTALL) -r requirements.lock
+	$(INSTALL) --no-deps -r requirements.lock
 	$(INSTALL) --no-deps -e .
 	@touch $@
 
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
-	$(INSTALL) -r requirements-bench.lock
+	$(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
 
 check: $(STAMP)
