@@ -157,6 +157,8 @@ def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup)
         raise SetupError(f"faces {', '.join(f'F{f}' for f in unknown)} do not exist; the part has F1 to "
                          f"F{len(part.faces)}", code="no_such_face", subjects=tuple(f"F{f}" for f in unknown),
                          limit=len(part.faces), remedy="name faces of zones.json")
-    coarse = sample_surface(part.mesh, 4.0, seed=1234)
-    faces = machinable_faces(coarse, decomposition, wanted, excluded)
+    mesh = part.mesh
+    facets = SurfaceSamples(mesh.triangles.mean(axis=1), mesh.normals, mesh.areas, mesh.face_ids,
+                            np.arange(len(mesh.faces), dtype=np.int32))
+    faces = machinable_faces(facets, decomposition, wanted, excluded)
     return np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))

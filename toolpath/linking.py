@@ -27,6 +27,8 @@ from zones.reach import LEVEL_TOLERANCE, TipField
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
+LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
+COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
 @dataclass
@@ -50,14 +52,12 @@ class Linker:
     field   : TipField of the tool
     stock   : StockMap, lowered as passes are added
     motions : Motions
-    rim     : lattice steps beyond the cutter's radius at which a way down a ramp looks for stock
     skipped : lines that found no safe way in
     """
 
     field: TipField
     stock: StockMap
     motions: Motions
-    rim: float = -0.3
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
@@ -142,10 +142,21 @@ class Linker:
         return None
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
-        seen = float(self.stock.overlap(points, self.field.tool, self.rim).max())
-        over = max(seen, self.motions.step_down) + 0.1
-        ramp = self._ramp(points, closed, over)
-        return None if ramp is None else (ramp[:1], ramp, False)
+        seen = float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max())
+        ramp = self._ramp(points, closed, max(seen, self.motions.step_down) + 0.1)
+        return None if ramp is None else (self._beside(ramp[0]), ramp, False)
+
+    def _beside(self, top: F64) -> F64:
+        """Where to come down to the top of a ramp: off the wall, where the rim left there is sure not to be met."""
+        tool = self.field.tool
+        if bool(self.stock.in_air(top[None, :], tool)[0]):
+            return top[None, :]
+        for far in (0.06, 0.12, 0.25, 0.5, 1.0):
+            ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
+            for k in np.flatnonzero(self.stock.in_air(ring, tool)):
+                if self._limit(ring[k]) <= top[2] + LEVEL_TOLERANCE and self._free_move(ring[k, :2], top[:2], top[2]):
+                    return np.vstack([ring[k], top])
+        return top[None, :]
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
         """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning."""

@@ -19,7 +19,7 @@ from toolpath.levels import Line, dilated
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock import StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach import TipField
 from zones.zoning import Form, ZoneArea
@@ -159,8 +159,7 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    rim = min(SURE_RIM, 0.9 * allowance / stock.lattice.step)
-    linker = Linker(field, stock, _motions(cut, settings), rim)
+    linker = Linker(field, stock, _motions(cut, settings))
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance
@@ -195,7 +194,8 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
             settings: PlanSettings, step_id: str) -> tuple[Workingstep | None, ZonePlan]:
     """The finishing workingstep of one zone."""
     points, normals = checks.points, checks.normals
-    residual = ResidualMap(points + settings.stock_allowance * normals, normals)
+    residual = ResidualMap(points + settings.stock_allowance * normals, normals,
+                           margin=1.5 * settings.scallop_height)
     linker = Linker(field, stock, _motions(cut, settings))
     name, spacing, rounds = _strategy(zone, checks, field, cut, settings)
     budget = PASS_SHARE * settings.scallop_height

@@ -30,6 +30,7 @@ from zones.reach import TipField, touchable
 STEEP = 0.70710678  # n_z below: steeper than 45 degrees, cut by waterlines
 LEVEL = 1.0 - 1e-6  # n_z above: a level plane, a flat end leaves no cusp
 SEEN = -0.02  # n_z above: the access direction sees it
+SEEN_SHARE = 0.005  # of the area of a face
 LEAST_ZONE_MM2 = 1.0
 LEAST_ZONE_SHARE = 0.002
 SMALL_REGION_MM2 = 30.0  # a region this small gets one tool, not a tool change for every corner
@@ -75,9 +76,12 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
                      excluded: set[int]) -> set[int]:
     """Numbers of the faces of the machinable area Ma.
 
-    By default every face with a sample the access direction sees, without the seat; else the faces asked for.
+    By default every face of which the access direction sees at least ``SEEN_SHARE``, without the seat; else the
+    faces asked for. The share keeps the answer from hanging on one facet of rounding at the rim of an underside.
     """
-    seen = {int(f) for f in np.unique(samples.face[samples.normals[:, 2] > SEEN])}
+    total = np.bincount(samples.face, weights=samples.area)
+    part = np.bincount(samples.face, weights=samples.area * (samples.normals[:, 2] > SEEN), minlength=len(total))
+    seen = {int(f) for f in np.flatnonzero((part > 0) & (part >= SEEN_SHARE * total))}
     chosen = seen - set(decomposition.seat) if wanted is None else set(wanted)
     return chosen - excluded
 

@@ -39,3 +39,19 @@ def test_waterlines_are_the_offset_of_the_walls(body, tolerance):
     back = shapely.points([exact.interpolate(s).coords[0] for s in np.arange(0, exact.length, 0.05)])
     missing = shapely.distance(back, made)
     assert np.quantile(missing, 0.97) <= 1.1 * tolerance and missing.max() <= 2.0 * field.lattice.step
+
+
+@pytest.mark.parametrize("body", [ball(4.0), tool(4.0, 0.0), tool(4.0, 0.5)], ids=lambda b: f"{b.kind}")
+def test_every_point_of_a_waterline_is_free_touches_and_has_the_wall_on_its_right(body):
+    field = field_of(terraces(XS, YS, np.maximum(HEIGHTS, 0.0), -2.0), body)
+    exact = plan().buffer(body.radius, quad_segs=2000)
+    for line in contours(field, 1.0, np.ones((field.lattice.ny, field.lattice.nx), bool), 0.002):
+        at = line.points + np.array([0.0, 0.0, 1e-5])
+        assert not field.blocked_by_cutter(at).any()
+        assert shapely.distance(shapely.points(line.points[:, :2]), exact.boundary).max() < 5e-4
+        step = np.diff(line.points[:, :2], axis=0)
+        length = np.linalg.norm(step, axis=1)
+        right = np.column_stack([step[:, 1], -step[:, 0]]) / np.maximum(length, 1e-12)[:, None]
+        probe = line.points[:-1, :2] + 0.5 * step + 0.02 * right
+        inside = shapely.contains(exact, shapely.points(probe))
+        assert inside[length > 0.02].mean() > 0.99

@@ -11,14 +11,17 @@ from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
 from toolpath.levels import Line, contours, dilated, free_pieces, pieces_where, thinned
 from zones.reach import LEVEL_TOLERANCE, TipField
 
+SAME_PLANE = 5e-4  # mm
+
 
 def plane_heights(tips: F64) -> list[float]:
-    """The heights at which level area is touched, descending; heights within 1 µm are one.
+    """The heights at which level area is touched, descending; tips less than ``SAME_PLANE`` mm apart are one.
 
     tips : (n, 3) float64, mm
     """
-    z = np.unique(np.round(tips[:, 2], 3))[::-1]
-    return [float(np.median(tips[np.abs(tips[:, 2] - v) < 6e-4, 2])) for v in z]
+    z = np.sort(tips[:, 2])[::-1]
+    cuts = np.flatnonzero(np.diff(z) < -SAME_PLANE) + 1
+    return [float(np.median(group)) for group in np.split(z, cuts) if len(group)]
 
 
 def planes(field: TipField, tips: F64, tolerance: float) -> list[list[Line]]:
@@ -37,7 +40,7 @@ def planes(field: TipField, tips: F64, tolerance: float) -> list[list[Line]]:
     flat = tool.radius - tool.corner_radius
     out = []
     for z in plane_heights(tips):
-        mine = tips[np.abs(tips[:, 2] - z) < 6e-4]
+        mine = tips[np.abs(tips[:, 2] - z) < 2.0 * SAME_PLANE]
         mask = dilated(lat.mask(mine[:, :2]), max(1.5, 0.2 * tool.radius / lat.step))
         free = field.height <= z + LEVEL_TOLERANCE
         lines = _rings(field, z, mask & free, 0.2 * flat, 1.6 * flat)
