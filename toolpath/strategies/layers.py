@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from toolpath.levels import Line, contours, dilated, pieces_where, rings
 from toolpath.stock import SURE_RIM, StockMap
-from zones.reach import TipField
+from zones.reach import LEVEL_TOLERANCE, TipField
 
+MOST_RINGS = 400
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 
 
@@ -40,22 +42,25 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     list of Line
         The rings farthest from the walls first, so that the cutter comes from air where there is any.
     """
+    active = dilated(area, field.tool.radius / field.lattice.step)
+    yield from _sweep(field, stock, z, active, allowance, side_step)
+    # Where rings turn sharply, islands stay between them; rings half a step off take these.
+    yield from _sweep(field, stock, z, active, allowance + 0.5 * side_step, side_step)
+
+
+def _sweep(field: TipField, stock: StockMap, z: float, active: NDArray[np.bool_], first: float,
+           side_step: float) -> Iterator[list[Line]]:
     tool = field.tool
-    active = dilated(area, tool.radius / field.lattice.step)
     found: list[list[Line]] = []
-    k = 0
-    while True:
-        lines = rings(field, z, active, allowance + k * side_step)
+    for k in range(MOST_RINGS):
+        lines = rings(field, z, active, first + k * side_step)
         kept: list[Line] = []
         for line in lines:
             wanted = stock.overlap(line.points, tool) > STOCK_WORTH
             kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
-        if not lines or (k > 0 and not kept and found and not found[-1]):
+        if not lines or (k > 0 and not kept and not found[-1]):
             break
         found.append(kept)
-        k += 1
-        if k > 400:
-            break
     for kept in reversed(found):
         if kept:
             yield kept
@@ -70,13 +75,24 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
 
     finished  : (ny, nx) bool, where the finish of a wall at this height puts the tool
     tolerance : mm, of the lines against the true boundary; the other parameters are those of ``layer``
-    unseen    : follow every wall, also where the stock map, coarser than a thin rim, shows none
+    unseen    : follow every wall, finished here or not, also where the stock map, coarser than a thin rim, shows
+                none; done once a flute length on the way down
     """
     lat, tool = field.lattice, field.tool
-    done = dilated(finished, 3.0 * allowance / lat.step + 2.0)
+    skip = dilated(finished, 3.0 * allowance / lat.step + 2.0) & ~_slots(field, z, allowance)
+    if unseen:
+        skip = np.zeros_like(skip)
     out: list[Line] = []
-    for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~done, tolerance):
+    for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~skip, tolerance):
         seen = stock.overlap(line.points, tool, SURE_RIM if unseen else 0.0) > STOCK_WORTH
-        wanted = seen & ~done[lat.cells(line.points[:, :2])]
+        wanted = seen & ~skip[lat.cells(line.points[:, :2])]
         out.extend(pieces_where(line, wanted, 0.5 * tool.radius, 2.0 * tool.radius))
     return out
+
+
+def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
+    """(ny, nx) bool: free places in strips too narrow for a ring; their walls are all there is to follow."""
+    free = field.height <= z + LEVEL_TOLERANCE
+    cells = allowance / field.lattice.step
+    wide = ndimage.distance_transform_edt(free) >= cells if not free.all() else free
+    return np.asarray(free & ~dilated(np.asarray(wide), cells + 1.0))
