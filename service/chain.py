@@ -38,7 +38,8 @@ Progress = Callable[[str, float], None]
 RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
 STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
-STOCK_STEP = 0.12  # mm, the planner's stock lattice
+STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
+STOCK_CELLS = 4e6
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
 PROGRAM_NAME = "program.linuxcnc.ngc"
 
@@ -148,10 +149,11 @@ def stock_corners(ready: Prepared) -> np.ndarray:
 def planning_stock(ready: Prepared) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
     stock = ready.setup.stock
+    lo, hi = stock_corners(ready)
+    step = max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     if stock.kind == "box":
-        lo, hi = stock_corners(ready)
-        return StockMap.box(lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, STOCK_STEP)
-    return StockMap.around(ready.tree, ready.part.bounds, stock.margin_mm + stock.uncertainty_mm, STOCK_STEP)
+        return StockMap.box(lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
+    return StockMap.around(ready.tree, ready.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
 
 
 def plan_settings(ready: Prepared, stock: StockMap) -> PlanSettings:

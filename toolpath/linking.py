@@ -21,13 +21,14 @@ import numpy as np
 from geometry.mesh import F64
 from toolpath.levels import Line, thinned
 from toolpath.motion import Motion, Trajectory
-from toolpath.stock import StockMap
+from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
+TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -142,12 +143,23 @@ class Linker:
         return None
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
-        seen = float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max())
-        ramp = self._ramp(points, closed, max(seen, self.motions.step_down) + 0.1)
-        return None if ramp is None else (self._beside(ramp[0]), ramp, False)
+        tool = self.field.tool
+        touched = self.stock.overlap(points, tool, TOUCH_RIM)
+        if closed:
+            first = int(np.argmin(touched[:-1]))
+            points = np.vstack([points[first:-1], points[:first + 1]])
+            touched = np.roll(touched[:-1], -first)
+        seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
+        highest = float(self.stock.overlap(points[:1], tool, SURE_RIM)[0])
+        for over in (max(seen, self.motions.step_down) + 0.1, highest + 0.1):
+            ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
+            entry = self._beside(ramp[0]) if ramp is not None else None
+            if ramp is not None and entry is not None:
+                return entry, ramp, False
+        return None
 
-    def _beside(self, top: F64) -> F64:
-        """Where to come down to the top of a ramp: off the wall, where the rim left there is sure not to be met."""
+    def _beside(self, top: F64) -> F64 | None:
+        """Where to come down to the top of a ramp: there, or off the wall where no rim left there can be met."""
         tool = self.field.tool
         if bool(self.stock.in_air(top[None, :], tool)[0]):
             return top[None, :]
@@ -156,7 +168,7 @@ class Linker:
             for k in np.flatnonzero(self.stock.in_air(ring, tool)):
                 if self._limit(ring[k]) <= top[2] + LEVEL_TOLERANCE and self._free_move(ring[k, :2], top[:2], top[2]):
                     return np.vstack([ring[k], top])
-        return top[None, :]
+        return None
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
         """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning."""
