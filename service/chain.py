@@ -152,7 +152,7 @@ def planning_stock(ready: Prepared) -> StockMap:
     lo, hi = stock_corners(ready)
     step = max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     if stock.kind == "box":
-        return StockMap.box(lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
+        return StockMap.box(ready.tree, lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
     return StockMap.around(ready.tree, ready.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
 
 

@@ -36,10 +36,10 @@ def plan(part: Part, setup: SetupPath,
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
         make_folder(out)
-        from service import chain
+        from service.chain import plan as plan_job
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        report = chain.plan(part, given, out, progress)
+        report = plan_job(part, given, out, progress)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
     _exit(part, setup, run, as_json)
@@ -50,9 +50,9 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
-        from service import chain
+        from service.chain import zones_only
 
-        return chain.zones_only(part, given, progress), 0
+        return zones_only(part, given, progress), 0
 
     _exit(part, setup, run, as_json)
 
@@ -64,10 +64,10 @@ def verify(part: Part, setup: SetupPath,
     """Prove any program, also a foreign one; prints the findings."""
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
-        from service import chain
+        from service.chain import verify_program
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        result = chain.verify_program(part, given, read_program(program), progress)
+        result = verify_program(part, given, read_program(program), progress)
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     _exit(part, setup, run, as_json)

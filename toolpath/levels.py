@@ -57,6 +57,13 @@ def thinned(points: F64, tolerance: float) -> F64:
     return np.ascontiguousarray(points[keep])
 
 
+def dense(points: F64, spacing: float) -> F64:
+    """A polyline (n, 3) with points put in between, at most ``spacing`` mm apart along it."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
+    return np.column_stack([np.interp(more, s, points[:, c]) for c in range(3)])
+
+
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
     """A (ny, nx) mask grown by ``cells`` lattice steps in each direction, a square round every node."""
     size = 2 * int(np.ceil(cells)) + 1

@@ -19,12 +19,17 @@ from dataclasses import field as fresh
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.levels import Line, thinned
+from toolpath.kernels.ramp import ease
+from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
+EASE_SHARE = 0.98  # of the same, for one move that catches up
+ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
+FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
+LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
@@ -65,13 +70,35 @@ class Linker:
     skipped: list[Line] = fresh(default_factory=list)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
-        """Append one line as a cutting pass; False where no safe way in was found."""
+        """Append one line as a cutting pass; False where no safe way in was found.
+
+        Where stock stands higher over the line than the flutes reach, the line is first walked above it.
+        """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
             return True
-        way = self._straight_on(points, line.closed) or self._from_air(points) or self._ramped(points, line.closed)
-        if way is None:
+        if not (self._topped(line) and self._pass(points, line.closed)):
             self.skipped.append(line)
+            return False
+        return True
+
+    def _topped(self, line: Line) -> bool:
+        """Take off what stands higher over a line than the flutes reach, from the top down."""
+        tool = self.field.tool
+        points = dense(line.points, LOOK_EVERY * tool.radius)
+        over = self.stock.standing(points, tool)
+        height = FLUTE_SHARE * tool.flute_length
+        for k in range(int(max(float(over.max()), 0.0) / height), 0, -1):
+            lifted = Line(points + np.array([0.0, 0.0, k * height]), line.closed)
+            for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
+                walk = thinned(piece.points, self.motions.tolerance)
+                if len(walk) > 1 and not self._pass(walk, piece.closed):
+                    return False
+        return True
+
+    def _pass(self, points: F64, closed: bool) -> bool:
+        way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
+        if way is None:
             return False
         entry, cut, joined = way
         if joined:
@@ -150,7 +177,8 @@ class Linker:
             points = np.vstack([points[first:-1], points[:first + 1]])
             touched = np.roll(touched[:-1], -first)
         seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
-        highest = float(self.stock.overlap(points[:1], tool, SURE_RIM)[0])
+        highest = max(float(self.stock.overlap(points[:1], tool, SURE_RIM)[0]),
+                      float(self.stock.under_end(points[:1], tool)[0]))
         for over in (max(seen, self.motions.step_down) + 0.1, highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
             entry = self._beside(ramp[0]) if ramp is not None else None
@@ -186,8 +214,7 @@ class Linker:
             t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
             down = _with_knot(walked, t, need)
             lift = np.maximum(over * (1.0 - down[1] / need), 0.0)
-            path = down[0].copy()
-            path[:, 2] += lift
+            path = self._eased(down[0], lift)
             last = int(np.searchsorted(down[1], need + total - 1e-9))
             return np.ascontiguousarray(path[: last + 1])
         leg = min(total, max(need / 2.0, 1e-9))
@@ -197,13 +224,17 @@ class Linker:
         leg = min(leg, total)
         head, hs = _with_knot(points, s, leg)
         head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
-        pieces = []
+        ways, lifts = [points[:1]], [np.array([over])]
         for k in range(legs):
             xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
-            piece = xy.copy()
-            piece[:, 2] += over * (1.0 - (k * leg + along) / (legs * leg))
-            pieces.append(piece if k == 0 else piece[1:])
-        return np.ascontiguousarray(np.vstack([*pieces, points[1:]]))
+            ways.append(xy[1:])
+            lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
+        return self._eased(np.vstack([*ways, points[1:]]), np.concatenate([*lifts, np.zeros(len(points) - 1)]))
+
+    def _eased(self, points: F64, lift: F64) -> F64:
+        """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep."""
+        ease(points, lift, math.tan(self.motions.ramp_angle) * EASE_SHARE, ROUNDING)
+        return np.ascontiguousarray(points + np.column_stack([np.zeros((len(points), 2)), lift]))
 
     # -- moves ------------------------------------------------------------------------------------------------
 

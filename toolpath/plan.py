@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.levels import Line, dilated
-from toolpath.linking import Linker, Motions, nearest_order
+from toolpath.linking import FLUTE_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
-from toolpath.stock import StockMap
+from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach import TipField
 from zones.zoning import Form, ZoneArea
@@ -27,10 +27,8 @@ from zones.zoning import Form, ZoneArea
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
-FLUTE_SHARE = 0.8  # of the flute length: no rim beside a wall may stand higher before a deeper pass comes by
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
 LATTICE_CARE = 1.5
-SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off
 
 Progress = Callable[[float], None]
 

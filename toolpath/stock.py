@@ -8,48 +8,59 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.stock import overlaps, stamp
+from toolpath.kernels.stock import HALF_DIAGONAL, overlaps, stamp, standing
 from zones.reach import Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
 AIR_TOLERANCE = 0.01  # mm
+SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
 
 
 class StockMap:
     """Top of the stock over a lattice.
 
     lattice : Lattice
-    top     : (ny, nx) float64, mm; -inf where there is none
+    top     : (ny, nx) float64, mm, height at the nodes; -inf where there is none
+    cover   : (ny, nx) float64, mm, no lower than anything in the cell round a node: what is thinner than a cell
+              is in it too. Left out, it is the highest of a node and its neighbours
+    part    : (ny, nx) float64, mm, no lower than the part in the cell; -inf everywhere where left out
     """
 
-    def __init__(self, lattice: Lattice, top: F64) -> None:
+    def __init__(self, lattice: Lattice, top: F64, cover: F64 | None = None, part: F64 | None = None) -> None:
         self.lattice, self.top = lattice, np.ascontiguousarray(top)
+        self.cover = ndimage.maximum_filter(self.top, 3) if cover is None else np.ascontiguousarray(cover)
+        self.part = np.full_like(self.top, -np.inf) if part is None else np.ascontiguousarray(part)
 
     @classmethod
     def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float) -> StockMap:
         """Stock that stands ``offset`` mm off the part everywhere: the envelope of balls on its surface."""
         lat = Lattice.over(bounds, offset + 3 * step, step)
-        r = max(offset, 1e-3)
-        return cls(lat, drop_grid(tree, lat.x0, lat.y0, step, lat.nx, lat.ny, r, r) + r)
+        r, half = max(offset, 1e-3), HALF_DIAGONAL * step
+        # A ball dropped from above stands at the highest point of such balls; with a flat end as wide as the disc
+        # round a cell it stands at the highest of the disc.
+        top, cover = (drop_grid(tree, lat.x0, lat.y0, step, lat.nx, lat.ny, r + d, r) + r for d in (0.0, half))
+        return cls(lat, top, cover, _in_cells(tree, lat))
 
     @classmethod
-    def box(cls, lower: F64, upper: F64, step: float) -> StockMap:
-        """A block between two corners (3,), mm."""
+    def box(cls, tree: TriangleTree, lower: F64, upper: F64, step: float) -> StockMap:
+        """A block between two corners (3,), mm, round the part."""
         lat = Lattice.over(np.array([lower, upper]), 3 * step, step)
         x = lat.x0 + step * np.arange(lat.nx)
         y = lat.y0 + step * np.arange(lat.ny)
         inside = ((y >= lower[1]) & (y <= upper[1]))[:, None] & ((x >= lower[0]) & (x <= upper[0]))[None, :]
-        return cls(lat, np.where(inside, upper[2], -np.inf))
+        return cls(lat, np.where(inside, upper[2], -np.inf), None, _in_cells(tree, lat))
 
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
         lat = self.lattice
-        stamp(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius, tool.corner_radius)
+        stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
+              tool.corner_radius)
 
     def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
         """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.
@@ -60,14 +71,44 @@ class StockMap:
         out = np.empty(len(tips))
         lat = self.lattice
         overlaps(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
-                 rim * lat.step, out)
+                 rim * lat.step, 0.0, out)
+        return out
+
+    def under_end(self, tips: F64, tool: ToolBody) -> F64:
+        """(n,) float64, mm: the most that may stand under the end of the cutter at tips (n, 3), slivers included.
+
+        The end is what cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its
+        radius. See ``cover``.
+        """
+        reach = tool.radius - 0.5 * tool.corner_radius
+        out, lat = np.empty(len(tips)), self.lattice
+        half = HALF_DIAGONAL * lat.step
+        overlaps(self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
+                 reach + half - tool.radius, half, out)
+        return out
+
+    def standing(self, tips: F64, tool: ToolBody) -> F64:
+        """(n,) float64, mm: how far stock that is not beside a wall may stand above tips (n, 3) within the cutter."""
+        out, lat = np.empty(len(tips)), self.lattice
+        standing(self.cover, self.part, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
+                 HALF_DIAGONAL * lat.step, out)
         return out
 
     def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:
-        """(n,) bool: the cutting part is sure to touch neither stock nor part at tips (n, 3), mm."""
-        return np.asarray(self.overlap(tips, tool, SURE_RIM) <= AIR_TOLERANCE)
+        """(n,) bool: at tips (n, 3), mm, the tool may come down from above.
+
+        The cutting part touches nothing that the nodes show, and with its end takes no more than a skin of what
+        may stand between them.
+        """
+        air = self.overlap(tips, tool, SURE_RIM) <= AIR_TOLERANCE
+        return np.asarray(air & (self.under_end(tips, tool) <= SKIN * tool.diameter))
 
     @property
     def highest(self) -> float:
         """Highest point of the stock, mm; -inf where there is none."""
         return float(self.top.max()) if self.top.size else float("-inf")
+
+
+def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:
+    """(ny, nx) float64, mm: highest of the part in the disc round each cell."""
+    return drop_grid(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.levels import Line
 from toolpath.linking import Linker, Motions, nearest_order
@@ -22,7 +23,7 @@ def linker(body=None, top=TOP, post=False, step_down=1.0):
     if post:
         mesh = joined(mesh, box_mesh([13, 13, 0], [17, 17, 3]))
     field = field_of(mesh, body or ball(4.0))
-    stock = StockMap.box(np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
     return Linker(field, stock, Motions(800, 200, 3000, 8.0, 6.0, RAMP, step_down, 0.001))
 
 

@@ -1,7 +1,7 @@
 """The planner's stock: the top of the material over a plan lattice, lowered by every pass.
 
-Notation: S (ny, nx) top z at nodes; a cutter with its tip at c reaches down to c_z + h(rho) at distance rho,
-h(rho) = 0 for rho <= R - r, else r - sqrt(r^2 - (rho - R + r)^2).
+Notation: S (ny, nx) top z at nodes, or the most in the cell round each; a cutter with its tip at c reaches down
+to c_z + h(rho) at distance rho, h(rho) = 0 for rho <= R - r, else r - sqrt(r^2 - (rho - R + r)^2).
 This is for deciding (is there something to cut, may the tool come down here); the proof has a model of its own.
 """
 
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -20,9 +22,14 @@ def _bottom(rho, radius, corner):
 
 
 @njit(cache=True, nogil=True)
-def stamp(top, x0, y0, step, points, radius, corner):
-    """Lower ``top`` along a polyline of tips (n, 3)."""
+def stamp(top, cover, x0, y0, step, points, radius, corner):
+    """Lower ``top`` and ``cover`` along a polyline of tips (n, 3).
+
+    A cell of ``cover`` is lowered only by positions that clear the whole disc of its half diagonal, to what the
+    farthest point of the disc is lowered to; positions lie on the polyline, so neither map ever falls too low.
+    """
     ny, nx = top.shape
+    half = HALF_DIAGONAL * step
     n_r = int(np.ceil(radius / step))
     for k in range(max(len(points) - 1, 1)):
         a = points[k]
@@ -35,21 +42,23 @@ def stamp(top, x0, y0, step, points, radius, corner):
             jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
             for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
                 for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
-                    if top[i, j] <= z:
+                    if cover[i, j] <= z:
                         continue
                     rho = np.sqrt((x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2)
-                    if rho <= radius:
-                        h = z + _bottom(rho, radius, corner)
-                        if h < top[i, j]:
-                            top[i, j] = h
+                    if rho > radius:
+                        continue
+                    top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
+                    if rho + half <= radius:
+                        cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
 
 
 @njit(cache=True, nogil=True)
-def overlap(top, x0, y0, step, tip, radius, corner, margin):
+def overlap(top, x0, y0, step, tip, radius, corner, margin, half):
     """How far the stock stands above the cutter's bottom at a tip (3,), mm: greatest over the disc; <= 0 is air.
 
     margin : mm added to the radius of the disc that is looked at. Below zero it leaves out the rim, where a node
-             cannot tell a wall the cutter touches from stock; above zero it is sure to see every stock, and walls.
+             cannot tell a wall the cutter touches from stock
+    half   : mm round a node that its height stands for: 0 for a point, half a diagonal for a cell
     """
     ny, nx = top.shape
     inner = max(radius + margin, 0.35 * radius)
@@ -60,14 +69,37 @@ def overlap(top, x0, y0, step, tip, radius, corner, margin):
         for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
             rho = np.sqrt((x0 + j * step - tip[0]) ** 2 + (y0 + i * step - tip[1]) ** 2)
             if rho <= inner:
-                over = top[i, j] - tip[2] - _bottom(min(rho, radius), radius, corner)
+                over = top[i, j] - tip[2] - _bottom(min(rho - half, radius), radius, corner)
                 if over > worst:
                     worst = over
     return worst
 
 
 @njit(cache=True, nogil=True)
-def overlaps(top, x0, y0, step, tips, radius, corner, margin, out):
+def overlaps(top, x0, y0, step, tips, radius, corner, margin, half, out):
     """``overlap`` for tips (n, 3)."""
     for k in range(len(tips)):
-        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner, margin)
+        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner, margin, half)
+
+
+@njit(cache=True, nogil=True)
+def standing(cover, part, x0, y0, step, tips, radius, half, out):
+    """How far stock stands above tips (n, 3), mm, in the cells that a cutter of this radius may touch.
+
+    part : (ny, nx) float64, highest of the part in a cell; cells with part above the tip are left out: whatever else
+           is in them stands beside a wall
+    """
+    ny, nx = cover.shape
+    reach = radius + half
+    n_r = int(np.ceil(reach / step))
+    for k in range(len(tips)):
+        x, y, z = tips[k]
+        jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+        worst = -np.inf
+        for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
+            for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+                over = cover[i, j] - z
+                if over > worst and part[i, j] <= z:
+                    if (x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2 <= reach * reach:
+                        worst = over
+        out[k] = worst

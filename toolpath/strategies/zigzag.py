@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.kernels.follow import follow
-from toolpath.levels import Line, dilated, pieces_where, thinned, true_runs
+from toolpath.levels import Line, dense, dilated, pieces_where, thinned, true_runs
 from toolpath.stock import StockMap
 from zones.reach import TipField
 
@@ -110,7 +110,7 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float) -> list[Li
     rise = np.ptp(line.points[:, 2])
     if rise < 1e-6:
         return [line]
-    points = _dense(line.points, 0.3 * tool.radius)
+    points = dense(line.points, 0.3 * tool.radius)
     over = stock.overlap(points, tool, -0.3)
     over[~np.isfinite(over)] = 0.0
     steep = _descends(points)
@@ -121,12 +121,6 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float) -> list[Li
         lifted = Line(points + np.array([0.0, 0.0, k * skin]), False)
         out.extend(pieces_where(lifted, (over > k * skin) & steep, tool.radius, 4.0 * tool.radius))
     return [*out, line]
-
-
-def _dense(points: F64, spacing: float) -> F64:
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
-    return np.column_stack([np.interp(more, s, points[:, c]) for c in range(3)])
 
 
 def _descends(points: F64) -> NDArray[np.bool_]:

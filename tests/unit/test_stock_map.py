@@ -1,0 +1,109 @@
+"""The planner's stock against many points of the true stock: what a cell says is never too low."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from tests.hand_parts import ball, box_mesh, joined, tool
+from toolpath.kernels.ramp import ease
+from toolpath.stock import SKIN, StockMap
+
+STEP = 0.2
+PART = joined(box_mesh([0, 0, -2], [12, 12, 0]), box_mesh([3.05, 3.0, 0], [4.0, 9.0, 5.0]))
+BODIES = [tool(3.0, 0.0), ball(3.0), tool(3.0, 0.6)]
+PATH = np.array([[6.0, 1.0, 1.5], [6.3, 8.0, 1.2], [9.0, 9.5, 0.4], [5.51, 5.0, 0.4], [5.51, 8.0, 0.1]])
+
+
+def bottom(rho, body):
+    u = np.maximum(rho - (body.radius - body.corner_radius), 0.0)
+    return body.corner_radius - np.sqrt(np.maximum(body.corner_radius**2 - u * u, 0.0))
+
+
+def swept(points, top, path, body, spacing=0.01):
+    """Heights ``top`` over points (n, 2) after the cutter went along the path: every position, one after another."""
+    top = top.copy()
+    for a, b in zip(path[:-1], path[1:], strict=True):
+        for t in np.linspace(0.0, 1.0, int(np.linalg.norm(b - a) / spacing) + 2):
+            c = a + t * (b - a)
+            rho = np.hypot(*(points - c[:2]).T)
+            under = rho <= body.radius
+            top[under] = np.minimum(top[under], c[2] + bottom(rho[under], body))
+    return top
+
+
+def offset_blank(points, offset):
+    """Highest of balls of a radius on the part's surface over points (n, 2): two boxes, solved box by box."""
+    out = np.full(len(points), -np.inf)
+    for lo, hi, z in (((0, 0), (12, 12), 0.0), ((3.05, 3.0), (4.0, 9.0), 5.0)):
+        off = np.hypot(*np.maximum(np.maximum(np.array(lo) - points, points - np.array(hi)), 0.0).T)
+        inside = off <= offset
+        out[inside] = np.maximum(out[inside], z + np.sqrt(offset**2 - off[inside] ** 2))
+    return out
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: b.kind)
+def test_no_point_of_the_stock_stands_above_its_cell(body):
+    stock = StockMap.around(TriangleTree(PART), PART.bounds, 1.0, STEP)
+    stock.cut(PATH, body)
+    points = np.random.default_rng(1).uniform(-1.5, 13.5, (40_000, 2))
+    true = swept(points, offset_blank(points, 1.0), PATH, body)
+    at = stock.lattice.cells(points)
+    assert (stock.cover[at] >= true - 1e-9).all()
+    assert (stock.cover >= stock.top - 1e-9).all()
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: b.kind)
+def test_a_cell_the_cutter_has_covered_is_down_to_what_it_left(body):
+    stock = StockMap.around(TriangleTree(PART), PART.bounds, 1.0, STEP)
+    stock.cut(np.array([[6.0, 2.0, 0.4], [10.0, 2.0, 0.4]]), body)
+    below = stock.cover[stock.lattice.cells(np.column_stack([np.linspace(6.0, 10.0, 30), np.full(30, 2.0)]))]
+    assert (below <= 0.4 + bottom(np.array(1.5 * STEP), body) + 1e-9).all()
+    assert (below >= 0.4).all()
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: b.kind)
+def test_a_place_called_air_takes_no_more_than_a_skin_with_the_end(body):
+    stock = StockMap.around(TriangleTree(PART), PART.bounds, 1.0, STEP)
+    stock.cut(PATH, body)
+    rng = np.random.default_rng(2)
+    tips = np.column_stack([rng.uniform(0, 12, (4000, 2)), rng.uniform(0.0, 3.0, 4000)])
+    tips = np.vstack([tips, PATH + [0.0, 0.0, 0.02], PATH[1:3] + [0.3, 0.1, 0.4]])
+    air = tips[stock.in_air(tips, body)]
+    assert len(air) > 20
+    points = rng.uniform(-1.5, 13.5, (40_000, 2))
+    true = swept(points, offset_blank(points, 1.0), PATH, body)
+    reach = body.radius - 0.5 * body.corner_radius
+    for tip in air:
+        rho = np.hypot(*(points - tip[:2]).T)
+        under = rho <= reach
+        assert (true[under] - tip[2] - bottom(rho[under], body)).max(initial=0.0) <= SKIN * body.diameter + 1e-9
+
+
+def test_stock_beside_a_wall_is_not_what_stands_over_a_pass():
+    tree = TriangleTree(PART)
+    body = tool(2.0, 0.0)
+    beside = np.array([[5.0, 6.0, 0.5]])  # touches the wall at x = 4
+    stock = StockMap.around(tree, PART.bounds, 1.0, 0.05)
+    assert 5.0 < stock.standing(beside, body)[0] <= 5.5  # the millimetre round the wall is open stock
+    stock.cut(np.array([[5.0, 3.0, 0.5], [5.0, 9.0, 0.5]]), body)
+    assert stock.standing(beside, body)[0] <= 0.5 + 1e-9  # what is left is the blank on the plate, past the rim
+
+
+def test_an_eased_ramp_is_never_steeper_than_its_slope_less_the_rounding():
+    rng = np.random.default_rng(3)
+    runs = np.where(rng.random(400) < 0.4, 10.0 ** rng.uniform(-4, -2, 400), rng.uniform(0.05, 0.6, 400))
+    points = np.column_stack([np.concatenate([[0.0], np.cumsum(runs)]), np.zeros(401), np.zeros(401)])
+    slope, rounding = math.tan(math.radians(3.0)) * 0.98, 1.1e-4
+    wanted = 2.0 - points[:, 0] * math.tan(math.radians(3.0)) * 0.9
+    lift = np.maximum(wanted, 0.0)
+    ease(points, lift, slope, rounding)
+    assert (lift >= np.maximum(wanted, 0.0)).all()
+    assert lift[-1] == 0.0
+    assert np.abs(lift - np.maximum(wanted, 0.0)).max() < 0.01
+    written = np.round(lift, 4)
+    at = np.round(points[:, 0], 4)
+    assert (np.diff(written) >= -math.tan(math.radians(3.0)) * np.diff(at) - 1e-9).all()
