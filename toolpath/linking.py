@@ -1,13 +1,14 @@
 """Passes joined to one safe motion: how the tool comes in, gets across and gets out.
 
-Rules, in this order of trying
+Stock that stands higher over a pass than the flutes reach is first walked off above it. Then, in this order of trying
 1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
-   more stock than a layer; down to a deeper level along the pass itself, never steeper than the ramp angle.
+   more stock than a layer; down to a deeper level in air, or along the pass itself, never steeper than the ramp angle.
 2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
-3. Down a ramp along the pass, to and fro, from above the stock.
-Anything else goes up to the clearance plane. Rapids move Z alone there and back to the top of the stock, or XY
-alone at the clearance plane; below the top of the stock every move is a feed move, because no rapid keeps its
-clearance beside a wall.
+3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
+   top is in air, or a free place close beside it is.
+A pass with none of these is left out. Ways 2 and 3 begin at the clearance plane. Rapids move Z alone between that
+plane and a height clear of the stock, or XY alone at the plane; below that height every move is a feed move,
+because no rapid keeps its clearance beside a wall.
 """
 
 from __future__ import annotations
