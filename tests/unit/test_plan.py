@@ -150,7 +150,7 @@ def test_roughing_switched_off_leaves_the_finish_alone():
 
 
 def test_finishing_switched_off_leaves_the_layers_alone():
-    full = case("corner")
+    full = replanned(case("corner"))
     c = replanned(full, finishing=False)
     assert c.plan.zones == () and {s.strategy for s in c.plan.steps} == {"layers"}
     first = [t.points for t in full.plan.steps[0].trajectories]
