@@ -117,37 +117,50 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
     return out
 
 
-def rings(field: TipField, z: float, active: NDArray[np.bool_], distance: float) -> list[Line]:
-    """Lines of tip positions ``distance`` mm inside the boundary of the free region at height z.
+def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, spacing: float) -> list[list[Line]]:
+    """Lines of tip positions at equal distances inside the boundary of the free region at height z.
 
-    active   : (ny, nx) bool, cells of the lattice that are looked at, as in ``contours``
-    distance : mm, right to one lattice step
+    active  : (ny, nx) bool, cells of the lattice that lines are wanted in
+    first   : mm, distance of the lines nearest to the boundary, right to one lattice step
+    spacing : mm between one list and the next
 
-    A move that the exact cutter does not allow is left out, which opens the line there.
+    Returns
+    -------
+    list of lists of Line
+        A list a distance, in the order stock is taken: the farthest from what blocks first. At a height where
+        nothing blocks, distances count from the border of ``active``, and the lines along it come first.
+        A move that the exact cutter does not allow is left out, which opens the line there.
     """
     if not active.any():
         return []
     lat = field.lattice
-    rows, cols = _window(active, int(distance / lat.step) + 2)
-    blocked = field.height[rows, cols] > z + LEVEL_TOLERANCE
-    far = ndimage.distance_transform_edt(~blocked) * lat.step if blocked.any() else np.full(blocked.shape, 1e6)
-    ids, starts, closed = trace(np.ascontiguousarray(far < distance), np.ascontiguousarray(active[rows, cols]),
-                                SEGMENTS)
-    if not len(ids):
-        return []
-    xy = np.empty((len(ids), 2))
-    linear_crossings(ids, np.ascontiguousarray(far), distance, lat.x0 + cols.start * lat.step,
-                     lat.y0 + rows.start * lat.step, lat.step, xy)
-    out: list[Line] = []
-    for k in range(len(starts) - 1):
-        chain = xy[starts[k]:starts[k + 1]]
-        if len(chain) < 2:
-            continue
-        pts = np.column_stack([chain, np.full(len(chain), z)])
-        if closed[k]:
-            pts = np.vstack([pts, pts[:1]])
-        out.extend(free_pieces(field, pts, bool(closed[k])))
-    return out
+    blocked = field.height > z + LEVEL_TOLERANCE
+    walled = bool(blocked.any())
+    rows, cols = _window(active, 1)
+    if walled:
+        far = ndimage.distance_transform_edt(~blocked)[rows, cols] * lat.step
+    else:
+        far = ndimage.distance_transform_edt(np.pad(active[rows, cols], 1))[1:-1, 1:-1] * lat.step
+    inside = np.ascontiguousarray(active[rows, cols])
+    widest = float(far[inside].max())
+    far = np.ascontiguousarray(far)
+    corner = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
+    out = []
+    for distance in np.arange(min(first, 0.9 * widest), widest, spacing).tolist():
+        ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
+        xy = np.empty((len(ids), 2))
+        linear_crossings(ids, far, distance, *corner, lat.step, xy)
+        lines: list[Line] = []
+        for k in range(len(starts) - 1):
+            chain = xy[starts[k]:starts[k + 1]]
+            if len(chain) < 2:
+                continue
+            pts = np.column_stack([chain, np.full(len(chain), z)])
+            if closed[k]:
+                pts = np.vstack([pts, pts[:1]])
+            lines.extend(free_pieces(field, pts, bool(closed[k])))
+        out.append(lines)
+    return out[::-1] if walled else out
 
 
 def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:

@@ -87,6 +87,11 @@ class StockMap:
                  reach + half - tool.radius, half, out)
         return out
 
+    def above(self, z: float) -> F64:
+        """(n, 2) float64, mm: nodes where more than the part stands above height z."""
+        iy, ix = np.nonzero(self.top > np.maximum(self.part, z))
+        return np.column_stack([self.lattice.x0 + self.lattice.step * ix, self.lattice.y0 + self.lattice.step * iy])
+
     def standing(self, tips: F64, tool: ToolBody) -> F64:
         """(n,) float64, mm: how far stock that is not beside a wall may stand above tips (n, 3) within the cutter."""
         out, lat = np.empty(len(tips)), self.lattice

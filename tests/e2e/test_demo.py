@@ -133,7 +133,7 @@ def test_linuxcnc_accepts_the_program(demo_job):
 def lowered(program, report):
     """The program with one G1 of a floor pass set lower, and its line number.
 
-    A line of the finishing pass on the base that names X or Y alone stands at the height of the base.
+    A line of the finishing pass on the base that names X or Y alone stands on the base, or no higher than a touch.
     """
     zone = next(z for z in report["zones"] if z["region"] == "floor" and z["strategy"] == "floor")
     height = zone["depth_mm"][1]
@@ -145,11 +145,11 @@ def lowered(program, report):
         word = re.search(r"Z(-?[\d.]+)", lines[k])
         z = float(word[1]) if word else z
         plain = re.fullmatch(r"(X-?[\d.]+)?\s*(Y-?[\d.]+)?", lines[k]) and lines[k]
-        if plain and not word and z == height and not re.search(r"[ZFG(]", lines[k + 1]):
+        if plain and not word and z is not None and abs(z - height) < 0.005 and not re.search(r"[ZFG(]", lines[k + 1]):
             level.append(k)
     at = level[len(level) // 2]
     lines[at] += f" Z{height - LOWERED:g}"
-    lines[at + 1] += f" Z{height:g}"
+    lines[at + 1] += f" Z{height + 0.005:g}"
     return "\n".join(lines), at + 1
 
 

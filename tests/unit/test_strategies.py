@@ -225,8 +225,6 @@ SURFACES = {
 }
 
 
-@pytest.mark.xfail(strict=True, reason="only the middle of a piece is compared with its chord, so a kink beside it "
-                                       "may be missed: 0.010 mm left standing at a tolerance of 0.004")
 def test_a_pass_is_within_its_tolerance_at_a_kink():
     body, tol = tool(3.0, 0.6), 0.004
     field = field_of(SURFACES["ripples"](), body)
@@ -256,8 +254,7 @@ def test_passes_cover_the_area_on_the_tip_limit(name, body, x_first):
         off = (p[:-1, 2] - limit[:-1]) / np.hypot(1.0, slope)  # across the path
         gentle = np.abs(slope) < 3.0
         assert off[gentle].min(initial=0.0) >= -tol
-        # a kink that drags the tip over a hollow may be missed, see above; what stays there is found by measuring
-        assert off[gentle].max(initial=0.0) <= 2.5 * tol
+        assert off[gentle].max(initial=0.0) <= 1.5 * tol
     # a pass on either side of every tip, no farther than the step, and at the same height of the surface
     walked = np.vstack([dense(line.points, 0.05) for line in lines])
     tree = cKDTree(walked[:, :2])

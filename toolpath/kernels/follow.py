@@ -47,8 +47,15 @@ def follow(tree, noncut, row, ax, ay, bx, by, radius, corner, allowance, step, t
             if run > smallest:
                 tm = 0.5 * (ta + tb)
                 zm = tip_limit(tree, noncut, row, ax + (bx - ax) * tm, ay + (by - ay) * tm, radius, corner, allowance)
-                if abs(zm - 0.5 * (za + zb)) > tol or abs(zb - za) > steepest * run:
-                    split = True
+                split = abs(zm - 0.5 * (za + zb)) > tol or abs(zb - za) > steepest * run
+                # two kinks can cancel in the middle, not there and at both quarters
+                for q in (0.25, 0.75):
+                    if not split:
+                        t = ta + q * (tb - ta)
+                        z = tip_limit(tree, noncut, row, ax + (bx - ax) * t, ay + (by - ay) * t, radius, corner,
+                                      allowance)
+                        split = abs(z - (za + q * (zb - za))) > tol
+                if split:
                     stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2], stack[top + 1, 3] = tm, zm, tb, zb
                     stack[top + 2, 0], stack[top + 2, 1], stack[top + 2, 2], stack[top + 2, 3] = ta, za, tm, zm
                     top += 2

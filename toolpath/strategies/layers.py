@@ -12,7 +12,6 @@ from toolpath.levels import Line, contours, dilated, pieces_where, rings
 from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import LEVEL_TOLERANCE, TipField
 
-MOST_RINGS = 400
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 
 
@@ -42,28 +41,18 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     list of Line
         The rings farthest from the walls first, so that the cutter comes from air where there is any.
     """
-    active = dilated(area, field.tool.radius / field.lattice.step)
-    yield from _sweep(field, stock, z, active, allowance, side_step)
+    lat, tool = field.lattice, field.tool
+    standing = dilated(lat.mask(stock.above(z + STOCK_WORTH)), 2.0 * tool.radius / lat.step)
+    active = dilated(area, tool.radius / lat.step) & standing
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
-    yield from _sweep(field, stock, z, active, allowance + 0.5 * side_step, side_step)
-
-
-def _sweep(field: TipField, stock: StockMap, z: float, active: NDArray[np.bool_], first: float,
-           side_step: float) -> Iterator[list[Line]]:
-    tool = field.tool
-    found: list[list[Line]] = []
-    for k in range(MOST_RINGS):
-        lines = rings(field, z, active, first + k * side_step)
-        kept: list[Line] = []
-        for line in lines:
-            wanted = stock.overlap(line.points, tool) > STOCK_WORTH
-            kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
-        if not lines or (k > 0 and not kept and not found[-1]):
-            break
-        found.append(kept)
-    for kept in reversed(found):
-        if kept:
-            yield kept
+    for start in (allowance, allowance + 0.5 * side_step):
+        for lines in rings(field, z, active, start, side_step):
+            kept: list[Line] = []
+            for line in lines:
+                wanted = stock.overlap(line.points, tool) > STOCK_WORTH
+                kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
+            if kept:
+                yield kept
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
