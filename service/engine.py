@@ -38,7 +38,7 @@ class Engine:
         self.owner = f"service-{uuid.uuid4().hex}"
         self.work = WorkConfig(
             settings.url, str(settings.data_dir.resolve()),
-            Limits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.child_threads,
+            Limits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
                    settings.poll_s),
             settings.lease_s, chain)
         self._wake, self._stop = threading.Event(), threading.Event()

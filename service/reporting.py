@@ -105,7 +105,8 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
                     ready.lift, given_up[rest])
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
-    reach = float(area[proved | (zone > 0)].sum())
+    # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
+    reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == "pass")
     coverage = done / total if total > 0 else 0.0
     remainder = _remainder(items)
     findings = [f.as_dict() for f in proof.findings]

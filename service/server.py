@@ -15,6 +15,7 @@ from typing import Any
 import structlog
 import uvicorn
 from pydantic import ValidationError
+from pydantic_settings import SettingsError
 
 from geometry.errors import CamError, SetupError
 from service.app import create_app
@@ -36,6 +37,9 @@ def settings_with(given: dict[str, Any]) -> Settings:
     """
     try:
         return Settings(**{k: v for k, v in given.items() if v is not None})
+    except SettingsError as error:
+        raise SetupError(f"the environment: {error}; it is to be JSON", code="bad_setting",
+                         remedy="docs/settings.md lists every setting") from None
     except ValidationError as error:
         problems = problems_of(error, "settings")
         raise SetupError(f"setting {problems[0]['at']}: {problems[0]['problem']}", code="bad_setting",

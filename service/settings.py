@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, SecretStr
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from geometry.errors import SetupError
@@ -34,8 +34,8 @@ class Settings(BaseSettings):
         description="Address of a Dask scheduler (tcp://host:8786); unset: embedded.")] = None
     workers: Annotated[int, Field(ge=1, le=1024, description="Jobs at a time of the embedded engine.")] = max(
         1, _cores() // 2)
-    child_threads: Annotated[int, Field(ge=1, le=1024, description="Kernel threads of one job.")] = max(
-        1, _cores() // max(1, _cores() // 2))
+    child_threads: Annotated[int, Field(ge=0, le=1024, description="Kernel threads of one job; 0: the cores over "
+                                                                   "the workers.")] = 0
     job_time_limit_s: Annotated[float, Field(gt=0, description="Wall time of one attempt, s.")] = 1800.0
     job_memory_limit_mb: Annotated[int, Field(ge=64, description="Resident memory of a job, its children counted, "
                                                                  "MB.")] = 8000
@@ -53,10 +53,37 @@ class Settings(BaseSettings):
                          ] = "info"
     log_format: Annotated[Literal["console", "json"], Field(description="Form of the log on stderr.")] = "console"
 
+    @field_validator("post_rate")
+    @classmethod
+    def _a_rate(cls, value: str) -> str:
+        from limits import parse
+
+        if parse(value).amount < 1:
+            raise ValueError("lets nothing through")
+        return value
+
+    @field_validator("database_url")
+    @classmethod
+    def _a_url(cls, value: str | None) -> str | None:
+        from sqlalchemy import make_url
+        from sqlalchemy.exc import ArgumentError
+
+        try:
+            if value is not None:
+                make_url(value).get_dialect()
+        except ArgumentError:  # its message may hold the password
+            raise ValueError("is no SQLAlchemy URL of a database that can be reached from here") from None
+        return value
+
     @property
     def url(self) -> str:
         """Database URL in use."""
         return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'zonemill.db'}"
+
+    @property
+    def threads(self) -> int:
+        """Kernel threads of one job in use."""
+        return self.child_threads or max(1, _cores() // self.workers)
 
     @property
     def max_body_bytes(self) -> int:

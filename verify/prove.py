@@ -69,7 +69,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     moves, source = _moves(read, tools)
     tell(0.1)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
-    run = run_stock(blank(part.mesh, setup, threads=threads), moves, tools, setup, threads=threads,
+    field = blank(part.mesh, setup, threads=threads)
+    run = run_stock(field, moves, tools, setup, threads=threads,
                     progress=lambda f: tell(0.6 + 0.25 * f))
     body_points = np.concatenate([cuts.guard, cuts.edge])
     touched, lost = run_bodies(body_points, moves, tools, setup, threads=threads,
@@ -79,7 +80,7 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                 *cuts.gouges, *_program_findings(read), *_limit_findings(moves, source, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = (f"{run.lost + lost} contacts more than the tables hold",) if run.lost + lost else ()
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, notes)
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, notes)
 
 
 def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -226,7 +227,7 @@ def _zones(scored: ScoredSamples, residual: F64, proved: NDArray[np.bool_], setu
 
 
 def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[Program], moves: Moves,
-           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
+           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str], spacing: float,
            notes: tuple[str, ...]) -> Proof:
     length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
     feed = np.concatenate([np.where(p.kind == FEED, p.feed, setup.rapid_feed) for p in read]) if read else length
@@ -245,7 +246,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
     return Proof(top, counts, cuts.residual, line, program, proved,
                  _zones(scored, cuts.residual, proved, setup, zone_ids), cuts.gouge_max, seconds,
                  float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
-                 RAY_ERROR + CHORD, cuts.reach, setup.line_spacing, notes)
+                 RAY_ERROR + CHORD, cuts.reach, spacing, notes)
 
 
 __all__ = ["Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

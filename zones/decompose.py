@@ -31,7 +31,7 @@ def decompose(part: Part) -> Decomposition:
     -------
     Decomposition
         Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are those of the mesh, refined until
-        the search neighbourhood is below 1 % of the sample pitch; they exceed the gap of the exact surfaces by at
+        the search neighbourhood is below 5 % of the sample pitch; they exceed the gap of the exact surfaces by at
         most twice ``part.deviation``.
     """
     graph = FaceGraph(part)

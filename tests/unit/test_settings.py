@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from geometry.errors import SetupError
+from service.server import settings_with
 from service.settings import Settings, is_loopback
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settings.md"
@@ -40,3 +41,21 @@ def test_beyond_loopback_a_token_is_needed(host, refused, monkeypatch):
         Settings(host=host, tokens={"a": "b"}).check_exposure()
     else:
         Settings(host=host).check_exposure()
+
+
+@pytest.mark.parametrize(("name", "value"), [("ZONEMILL_TOKENS", "alice"), ("ZONEMILL_POST_RATE", "often"),
+                                             ("ZONEMILL_POST_RATE", "0/minute"), ("ZONEMILL_PORT", "http"),
+                                             ("ZONEMILL_DATABASE_URL", "nowhere"),
+                                             ("ZONEMILL_DATABASE_URL", "nosuch://u:hidden@host/db")])
+def test_a_setting_that_makes_no_sense_is_named(name, value, monkeypatch):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(SetupError) as caught:
+        settings_with({})
+    assert caught.value.code == "bad_setting" and caught.value.remedy
+    assert name.removeprefix("ZONEMILL_").lower() in str(caught.value) and "hidden" not in str(caught.value)
+
+
+def test_the_threads_of_a_job_follow_the_workers():
+    cores = Settings(workers=1).threads
+    assert Settings(workers=1000).threads == 1 and cores >= 1
+    assert Settings(workers=1000, child_threads=3).threads == 3
