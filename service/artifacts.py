@@ -15,7 +15,26 @@ from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
+from geometry.errors import InputError
+
+RESULT_FILES = ("program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "report.json", "zones.json", "preview.png")
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
+
+
+def clear_results(folder: Path) -> None:
+    """Delete the files of an earlier job from a folder: a program left beside a new report would pass for proved.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be deleted.
+    """
+    for name in RESULT_FILES:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder / name} of an earlier job cannot be deleted: {error.strerror}",
+                             code="out_not_writable", remedy="give another --out") from None
 
 
 @lru_cache(maxsize=1)

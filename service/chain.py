@@ -69,7 +69,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
     progress("write", 0.66)
     work = workplan(ready, made, settings)
     program = write_linuxcnc(work) if made.steps else ""
-    zone, given_up = scored.without(made)
+    zone, given_up = scored.without(made, ready.zones)
     proof = prove([(PROGRAM_NAME, program)] if made.steps else [], ready.part, tool_bodies(setup), proof_setup(ready),
                   ScoredSamples(dense, zone), [z.id for z in ready.zones],
                   lambda f: progress("prove", 0.68 + 0.27 * f))

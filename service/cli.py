@@ -35,13 +35,14 @@ def plan(part: Part, setup: SetupPath,
     """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
-        make_folder(out)
         from service.chain import plan as plan_job
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
         report = plan_job(part, given, out, progress)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
+    with _errors(as_json):
+        make_folder(out)
     _exit(part, setup, run, as_json)
 
 
@@ -111,7 +112,7 @@ def openapi() -> None:
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder for the files.
+    """Make the folder for the files, without those of an earlier job.
 
     Raises
     ------
@@ -119,6 +120,7 @@ def make_folder(out: Path) -> None:
         It cannot be made or written to.
     """
     from geometry.errors import InputError
+    from service.artifacts import clear_results
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -128,6 +130,7 @@ def make_folder(out: Path) -> None:
     except OSError as error:
         raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
                          remedy="give another --out") from None
+    clear_results(out)
 
 
 def read_program(path: Path) -> str:

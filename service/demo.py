@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InternalError
+from service.artifacts import clear_results
 from service.console import Progress, print_json, say
 from service.errors import EXIT_BUG, EXIT_INPUT, EXIT_PROVED, EXIT_UNPROVED
 from service.logs import configure
@@ -27,6 +28,7 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.chain") -> int:
     """
     from examples.demo import write_demo
 
+    clear_results(out)
     with tempfile.TemporaryDirectory(prefix="zonemill-demo-") as folder:
         step, setup = (Path(p) for p in write_demo(Path(folder, "sample")))
         settings = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": Path(folder, "data"), "tokens": {}})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -109,8 +110,8 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == "pass")
     coverage = done / total if total > 0 else 0.0
     remainder = _remainder(items)
-    findings = [f.as_dict() for f in proof.findings]
-    findings += _unmet(ready, made, coverage, remainder)
+    unmet = _unmet(ready, made, coverage, remainder)
+    findings = [*(f.as_dict() for f in proof.findings), *unmet]
     plans = {p.zone.id: p for p in made.zones}
     steps = {s.id: s for s in made.steps}
     report = {
@@ -119,7 +120,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder, "findings": findings,
-        "finding_counts": dict(proof.counts), "coverage": r(coverage, 6),
+        "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machinable_area_mm2": r(total, 3), "machining_time_s": r(proof.machining_time, 1),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
@@ -135,13 +136,26 @@ def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[st
     least = ready.setup.quality.coverage_min
     if not made.steps:
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
-        return [{"kind": "nothing_cut", "message": "no tool of the setup can cut anything of what was asked for",
-                 "would_need": would}]
-    out = _beyond_travel(ready, made)
-    if coverage < least:
-        out.append({"kind": "coverage", "depth": r(coverage, 6), "limit": least,
-                    "message": f"coverage {coverage:.4f} is below coverage_min {least:g}"})
-    return out
+        return [_of_job("nothing_cut", "no tool of the setup can cut anything of what was asked for", would_need=would)]
+    return [*_beyond_travel(ready, made), *_too_little(coverage, least)]
+
+
+def _too_little(coverage: float, least: float) -> list[dict[str, Any]]:
+    if coverage >= least:
+        return []
+    return [_of_job("coverage", f"coverage {coverage:.4f} is below coverage_min {least:g}",
+                    round(coverage, 6), least)]
+
+
+def _counted(proof: Proof, unmet: list[dict[str, Any]]) -> dict[str, int]:
+    """How many findings there are of each kind, those beyond the list included."""
+    return dict(sorted((Counter(proof.counts) + Counter(f["kind"] for f in unmet)).items()))
+
+
+def _of_job(kind: str, message: str, depth: float = 0.0, limit: float = 0.0, **more: Any) -> dict[str, Any]:
+    """A finding about the job as a whole: it has no place and no line."""
+    return {"kind": kind, "message": message, "depth": depth, "limit": limit, "program": "", "line": 0, "zone": None,
+            "face": None, "point": None, "count": 1, "area": 0.0, **more}
 
 
 def _beyond_travel(ready: Prepared, made: Plan) -> list[dict[str, Any]]:
@@ -150,8 +164,8 @@ def _beyond_travel(ready: Prepared, made: Plan) -> list[dict[str, Any]]:
     if travel is None:
         return []
     points = np.vstack([t.points for s in made.steps for t in s.trajectories])
-    return [{"kind": "limit", "depth": r(span - limit), "limit": limit,
-             "message": f"the program moves over {span:.3f} mm in {axis}, the machine travels {limit:g} mm"}
+    return [_of_job("limit", f"the program moves over {span:.3f} mm in {axis}, the machine travels {limit:g} mm",
+                    round(span - limit, 4), limit)
             for axis, span, limit in zip("XYZ", np.ptp(points, axis=0).tolist(), travel, strict=True) if span > limit]
 
 
@@ -212,10 +226,15 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
     """The answer to ``zonemill verify``."""
     total = float(dense.area.sum())
     done = float(dense.area[np.asarray(proof.proved, dtype=np.bool_)].sum())
-    return {"state": "proved" if proof.clean else "unproved",
-            "findings": [f.as_dict() for f in proof.findings], "finding_counts": dict(proof.counts),
+    coverage = done / total if total else 0.0
+    unmet = _too_little(coverage, ready.setup.quality.coverage_min)
+    if proof.cutting_length <= 0.0:
+        unmet.append(_of_job("nothing_cut", "the program takes no stock off"))
+    findings = [*(f.as_dict() for f in proof.findings), *unmet]
+    return {"state": "unproved" if findings else "proved", "findings": findings,
+            "finding_counts": _counted(proof, unmet),
             "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
-            "coverage": r(done / total if total else 0.0, 6), "gouge_max_mm": r(proof.gouge_max, 5),
+            "coverage": r(coverage, 6), "gouge_max_mm": r(proof.gouge_max, 5),
             "machining_time_s": r(proof.machining_time, 1), "cutting_length_mm": r(proof.cutting_length, 1),
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
                       "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes)},

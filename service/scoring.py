@@ -8,6 +8,7 @@ the tool before any pass is laid. The planner then measures its passes at the sa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from geometry.sampling import SurfaceSamples, sample_surface
 from service.prepare import Prepared, machinable_triangles
 from toolpath.plan import Checks, Plan
 from zones.reach import touchable
-from zones.zoning import forms_of
+from zones.zoning import ZoneArea, forms_of
 
 PROOF_DENSITY = 100.0  # samples a mm²
 PROOF_SEED = 20_011
@@ -50,16 +51,20 @@ class Score:
                               np.vstack([self.tips[mine], z.tips[border]])))
         return out
 
-    def without(self, plan: Plan) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def without(self, plan: Plan, zones: Sequence[ZoneArea]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         """Zone of every sample less those the plan gave up, and which these are.
 
-        A sample is given up where a tool could touch it but the plan's own measure says that no pass does. It
-        then stands in the remainder, reason 'pass'.
+        A sample is given up where a tool could touch it but the plan's own measure says that no pass does, or
+        where its zone was not finished at all. It then stands in the remainder, reason 'pass'.
+
+        zones : as in ``Prepared``
         """
         zone, lost = self.zone.copy(), np.zeros(len(self.zone), np.bool_)
-        for k, p in enumerate(plan.zones, start=1):
+        plans = {p.zone.id: p for p in plan.zones}
+        for k, z in enumerate(zones, start=1):
             mine = np.flatnonzero(self.zone == k)
-            lost[mine if p.step is None else mine[p.left[p.left < len(mine)]]] = True
+            p = plans.get(z.id)
+            lost[mine if p is None or p.step is None else mine[p.left[p.left < len(mine)]]] = True
         zone[lost] = 0
         return zone, lost
 

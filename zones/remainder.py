@@ -25,8 +25,8 @@ from zones.model import Decomposition
 from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
 from zones.zoning import SEEN
 
-SHARES = (0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of the thinnest cutter at hand, tried from stout to thin
-LEAST_DIAMETER = 0.1  # mm, the thinnest ball anybody is asked to buy
+# mm, tried from stout to thin below the thinnest cutter at hand; nobody is asked to buy a thinner one than the last
+DIAMETERS = (40.0, 25.0, 16.0, 10.0, 6.0, 4.0, 2.5, 1.5, 1.0, 0.6, 0.4, 0.25, 0.15, 0.1)
 ASKED_AT_MOST = 6000  # samples that are asked one by one; the rest follow the nearest in kind by random choice
 
 
@@ -165,8 +165,7 @@ def _too_thick(thinnest: ToolBody, few: SurfaceSamples, tree: TriangleTree, part
                reason: NDArray[np.object_], need: Needs) -> None:
     top = float(part.bounds[1, 2])
     trials: list[tuple[str, float, float]] = []
-    for share in (1.0, *SHARES):
-        d = max(thinnest.diameter * share, LEAST_DIAMETER)
+    for d in (thinnest.diameter, *(d for d in DIAMETERS if d < thinnest.diameter)):
         trials.extend([("ball", d, d / 2), ("flat", d, 0.0)])
     ahead: F64 | None = None
     for kind, d, corner in trials:

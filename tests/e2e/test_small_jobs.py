@@ -1,0 +1,85 @@
+"""What a job says as a whole, on a block with one step: nothing cut, roughing alone, an earlier job's files."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from service.artifacts import RESULT_FILES
+from service.cli import app
+from tests.step_files import write_step
+
+cq = pytest.importorskip("cadquery")
+
+FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
+SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0}}
+
+
+@pytest.fixture(scope="module")
+def part(tmp_path_factory) -> Path:
+    shape = cq.Workplane().box(16, 12, 4, centered=False).cut(cq.Workplane().box(8, 12, 2, centered=False)
+                                                              .translate((0, 0, 2)))
+    return write_step(shape, tmp_path_factory.mktemp("step") / "step.step")
+
+
+def run(command, part, folder, setup, *more):
+    path = folder / "setup.json"
+    path.write_text(json.dumps(setup))
+    return CliRunner().invoke(app, [command, str(part), "--setup", str(path), *more])
+
+
+@pytest.mark.parametrize("text", ["%\nM30\n%\n", "G21 G90 G94 G17 G54\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X40 Y40\nG0 Z12\n"
+                                  "G1 X50 F300\nG0 Z30\nM5\nM30\n"], ids=["nothing", "air"])
+def test_a_program_that_cuts_nothing_is_not_proved(part, tmp_path, text):
+    program = tmp_path / "p.ngc"
+    program.write_text(text)
+    got = run("verify", part, tmp_path, SETUP, "--program", str(program))
+    answer = json.loads(got.stdout)
+    assert got.exit_code == 3 and answer["state"] == "unproved" and answer["finding_counts"]["nothing_cut"] == 1
+    assert answer["coverage"] == 0.0
+
+
+def test_verify_keeps_the_least_coverage_asked_for(part, tmp_path):
+    program = tmp_path / "p.ngc"
+    program.write_text("G21 G90 G94 G17 G54\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X-4 Y-4\nG0 Z6\nG1 Z4.2 F100\n"
+                       "G1 X20 F300\nG1 Y3\nG1 X-4\nG0 Z30\nM5\nM30\n")
+    free = json.loads(run("verify", part, tmp_path, SETUP, "--program", str(program)).stdout)
+    assert "coverage" not in free["finding_counts"]
+    asked = {**SETUP, "quality": {"scallop_height_mm": 0.05, "coverage_min": 0.9}}
+    got = run("verify", part, tmp_path, asked, "--program", str(program))
+    (found,) = [f for f in json.loads(got.stdout)["findings"] if f["kind"] == "coverage"]
+    assert got.exit_code == 3 and found["limit"] == 0.9 and found["depth"] == free["coverage"] < 0.9
+
+
+def test_roughing_alone_is_proved_and_the_rest_is_named(part, tmp_path):
+    got = run("plan", part, tmp_path, {**SETUP, "operations": {"finishing": False}}, "--out", str(tmp_path / "out"))
+    report = json.loads(got.stdout)
+    assert got.exit_code == 0 and report["state"] == "proved" and not report["complete"]
+    assert {s["operation"] for s in report["steps"]} == {"roughing"}
+    left = sum(x["area_mm2"] for x in report["remainder"] if x["reason"] == "pass")
+    missing = (1.0 - report["reach_coverage"]) / report["reach_coverage"] * report["coverage"]
+    assert left == pytest.approx(missing * report["machinable_area_mm2"], rel=0.02) and left > 100
+
+
+@pytest.mark.parametrize("fault", ["unproved", "bad part", "bad setup"])
+def test_no_program_of_an_earlier_job_stays_beside_a_later_answer(part, tmp_path, fault):
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in (*RESULT_FILES, "mine.txt"):
+        (out / name).write_text("of another job")
+    setup = dict(SETUP)
+    if fault == "unproved":  # a ball leaves the inner corner
+        setup["tools"] = [{**FLAT, "kind": "ball"}]
+        setup["quality"] = {"scallop_height_mm": 0.05, "coverage_min": 1.0}
+    if fault == "bad part":
+        part = tmp_path / "bad.step"
+        part.write_text("no STEP")
+    if fault == "bad setup":
+        setup["unit"] = "inch"
+    got = run("plan", part, tmp_path, setup, "--out", str(out))
+    assert got.exit_code == (3 if fault == "unproved" else 2), got.output
+    kept = {p.name: p.read_text(errors="replace") for p in out.iterdir()}
+    assert kept.pop("mine.txt") == "of another job"
+    assert "of another job" not in kept.values()
+    assert not {"program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc"} & set(kept)
