@@ -14,7 +14,7 @@ import sys
 from typing import Any
 
 from geometry.child import run_limited
-from geometry.errors import SetupError
+from geometry.errors import PartError, ResourceError, SetupError
 from geometry.frames import Placement
 from geometry.part import Part
 
@@ -34,17 +34,33 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
 
     Returns Part in the setup frame; ``part.deviation`` is the distance measured against the exact surface.
     Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
-    ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``, ``several_solids``,
-    ``no_such_solid``, ``part_too_small``, ``part_too_large``), SetupError (``bad_placement``,
-    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``), ResourceError (``reader_crashed``,
-    ``reader_timeout``, ``reader_memory``).
+    ``bad_number``, ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``,
+    ``several_solids``, ``no_such_solid``, ``part_too_small``, ``part_too_large``), SetupError (``bad_placement``,
+    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``). A part that drives the reader over its
+    limits or into a fault is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``): it would do so
+    again. A reader killed from outside is ResourceError (``reader_crashed``).
     """
     check_tolerances(chord, angle)
     request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "chord": chord, "angle": angle,
                                "placement": placement.as_dict() if placement else None}
     command = [sys.executable, "-m", "geometry.step_child"]
-    data = run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
+    try:
+        data = run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
+    except ResourceError as error:
+        raise _by_the_part(error) from None
     return Part.from_bytes(data)
+
+
+def _by_the_part(error: ResourceError) -> ResourceError | PartError:
+    """Whose fault it is that the reader ended: the part's, unless someone else killed the process."""
+    if error.measured == "SIGKILL":
+        return error
+    remedy = error.remedy
+    if error.code in ("reader_timeout", "reader_memory"):
+        remedy = ("send the part alone, without small details such as threads and lettering; a larger "
+                  "quality.scallop_height_mm and gouge_tolerance_mm mesh it more coarsely")
+    return PartError(error.message, code=error.code, subjects=error.subjects, measured=error.measured,
+                     limit=error.limit, remedy=remedy)
 
 
 def check_tolerances(chord: float, angle: float) -> None:

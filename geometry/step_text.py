@@ -26,6 +26,11 @@ _REFERENCE = re.compile(rb"#(\d+)")
 _FACE = re.compile(rb"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
 _UNCERTAINTY = re.compile(rb"UNCERTAINTY_MEASURE_WITH_UNIT\s*\(\s*LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)")
 _PRODUCT = re.compile(rb"=\s*PRODUCT\s*\(\s*'([^']*)'\s*,\s*'([^']*)'")
+# NAN and INF as C printf writes them, 1.#QNAN as older Windows did; a STEP enumeration stands between dots.
+_NOT_FINITE = re.compile(rb"[(,]\s*([-+]?(?:nan|inf|infinity|1\.#(?:inf|ind|[qs]nan))(?:\([^()]*\))?)\s*(?=[,)])",
+                         re.IGNORECASE)
+# No coordinate has a three-digit exponent; kernels write such numbers for "unbounded", but not into points.
+_HUGE_POINT = re.compile(rb"CARTESIAN_POINT\s*\([^;]*?([-+]?[0-9.]+E\+?[1-9][0-9]{2,})", re.IGNORECASE)
 _START = b"ISO-10303-21;"
 _END = b"END-ISO-10303-21"
 
@@ -56,11 +61,12 @@ def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
 
     Returns StepText.
     Raises StepError with code ``no_file``, ``empty_file``, ``file_too_large``, ``not_step``, ``truncated_step``
-    or ``dangling_reference``.
+    ``bad_number`` or ``dangling_reference``.
     """
     data = _read(Path(path), max_bytes)
     _check_frame(data)
     bare = _COMMENT.sub(b"", _STRING.sub(b"''", data))
+    _check_numbers(bare)
     if len(data) <= REFERENCE_CHECK_BYTES:
         _check_references(bare)
     uncertainty = [float(x) for x in _UNCERTAINTY.findall(bare) if _is_positive(x)]
@@ -109,6 +115,19 @@ def _check_frame(data: bytes) -> None:
         raise StepError(f"the STEP file is cut off after {len(data)} bytes: its closing {missing} is missing",
                         code="truncated_step", measured=len(data), limit="END-ISO-10303-21;",
                         remedy="transfer or export the file again")
+
+
+def _check_numbers(bare: bytes) -> None:
+    """Refuse numbers that are none: a CAD kernel may take such a point for a place and never come back."""
+    wrong = _NOT_FINITE.search(bare) or _HUGE_POINT.search(bare)
+    if wrong is None:
+        return
+    owners = _DEFINED.findall(bare, 0, wrong.start(1))
+    name = f"#{owners[-1].decode()}" if owners else "the header"
+    value = wrong.group(1).decode("latin-1")
+    raise StepError(f"{name} of the STEP file holds {value}, which is no place in space", code="bad_number",
+                    subjects=(name,), measured=value, limit="a finite number below 1E100",
+                    remedy=f"repair the shape that {name} belongs to in the CAD program and export the part again")
 
 
 def _check_references(bare: bytes) -> None:

@@ -24,6 +24,12 @@ Count = Annotated[int, Field(strict=True)]
 """A JSON integer; strings and booleans are refused."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 """Three numbers x, y, z."""
+LARGEST = 1e6
+"""Largest component of a position (mm: a kilometre) or direction; beyond it double precision has no micrometre."""
+BoundedNumber = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
+"""A number of no more than ``LARGEST`` in size."""
+Triple = Annotated[list[BoundedNumber], Field(min_length=3, max_length=3)]
+"""A position or direction: three numbers x, y, z within ``LARGEST``."""
 FaceId = Annotated[str, Field(pattern=r"^F[1-9][0-9]{0,6}$", examples=["F12"])]
 """A B-rep face by its place in the STEP file."""
 

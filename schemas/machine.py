@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.base import Number, Vector, WireModel
+from schemas.base import Number, Triple, Vector, WireModel
 
 BUILT_DIALECTS = ("linuxcnc",)
 
@@ -25,17 +25,19 @@ class Machine(WireModel):
                                            "machine.")] = True
     dialects: Annotated[list[str], Field(min_length=1, max_length=8,
                                          description="Controls to write for; built so far: linuxcnc.")] = ["linuxcnc"]
-    travel_mm: Annotated[Vector | None, Field(description="Travel in X, Y and Z, mm; null: not limited.")] = None
+    travel_mm: Annotated[Triple | None, Field(description="Travel in X, Y and Z, mm; null: not limited.")] = None
     rotary_deg: Annotated[list[list[Number]] | None, Field(description="Limits of the rotary axes, deg; null on a "
                                                                        "3-axis machine.")] = None
     pivots_mm: Annotated[list[Vector] | None, Field(description="Pivot points of the rotary axes, mm; null on a "
                                                                 "3-axis machine.")] = None
-    max_rpm: Annotated[Number | None, Field(gt=0, description="Highest spindle speed, 1/min; null: 18000.")] = None
-    max_feed_mm_min: Annotated[Number | None, Field(gt=0, description="Highest feed, mm/min; null: 5000.")] = None
-    rapid_mm_min: Annotated[Number | None, Field(gt=0, description="Rapid rate for times, mm/min; null: "
-                                                                   "10000.")] = None
-    acceleration_mm_s2: Annotated[Number | None, Field(gt=0, description="Acceleration, mm/s2, for times; null: "
-                                                                         "1000.")] = None
+    max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: "
+                                                                       "18000.")] = None
+    max_feed_mm_min: Annotated[Number | None, Field(ge=0.1, le=1e6, description="Highest feed, mm/min; null: "
+                                                                                 "5000.")] = None
+    rapid_mm_min: Annotated[Number | None, Field(ge=1, le=1e6, description="Rapid rate for times, mm/min; null: "
+                                                                            "10000.")] = None
+    acceleration_mm_s2: Annotated[Number | None, Field(ge=1, le=1e7, description="Acceleration, mm/s2, for times; "
+                                                                                  "null: 1000.")] = None
     rapid_motion: Annotated[Literal["linear", "dogleg"], Field(
         description="How the control runs a rapid in several axes.")] = "linear"
 

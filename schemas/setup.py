@@ -13,13 +13,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.base import Count, FaceId, Number, Shelf, Vector, WireModel
+from schemas.base import Count, FaceId, Number, Shelf, Triple, WireModel
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material, MaterialField
 from schemas.tools import HolderSegment, Tool, numbered
 
 AXIS_TOLERANCE = 1e-6
-Box = Annotated[list[Vector], Field(min_length=2, max_length=2, description="Lower and upper corner, mm.")]
+SHORTEST_AXIS = 1e-6
+Box = Annotated[list[Triple], Field(min_length=2, max_length=2, description="Lower and upper corner, mm.")]
 
 
 class PartChoice(WireModel):
@@ -32,15 +33,19 @@ class PartChoice(WireModel):
 class Placement(WireModel):
     """The setup frame in STEP coordinates; its origin is program zero."""
 
-    origin_mm: Annotated[Vector, Field(description="Origin of the setup frame, mm.")] = [0.0, 0.0, 0.0]
-    z_axis: Annotated[Vector, Field(description="Z of the setup frame; any length above 0.")] = [0.0, 0.0, 1.0]
-    x_axis: Annotated[Vector, Field(description="X of the setup frame, at right angles to Z.")] = [1.0, 0.0, 0.0]
+    origin_mm: Annotated[Triple, Field(description="Origin of the setup frame, mm; within 1e6 of 0.")] = [0.0, 0.0, 0.0]
+    z_axis: Annotated[Triple, Field(description="Z of the setup frame; any length from 1e-6, components within "
+                                                "1e6.")] = [0.0, 0.0, 1.0]
+    x_axis: Annotated[Triple, Field(description="X of the setup frame, at right angles to Z; length as of "
+                                                "z_axis.")] = [1.0, 0.0, 0.0]
 
     @model_validator(mode="after")
     def _check(self) -> Placement:
         lengths = math.hypot(*self.z_axis), math.hypot(*self.x_axis)
-        if min(lengths) < AXIS_TOLERANCE:
-            raise ValueError("placement.z_axis and x_axis must not be of zero length")
+        for name, length in zip(("z_axis", "x_axis"), lengths, strict=True):
+            if length < SHORTEST_AXIS:
+                raise ValueError(f"placement.{name} has length {length:g}, almost zero length; give a direction such "
+                                 "as [0, 0, 1]")
         cosine = sum(a * b for a, b in zip(self.z_axis, self.x_axis, strict=True)) / (lengths[0] * lengths[1])
         if abs(cosine) > AXIS_TOLERANCE:
             raise ValueError(f"placement.z_axis and x_axis must be at right angles; their angle is "
@@ -52,14 +57,14 @@ class Access(WireModel):
     """A direction the part is machined from: tool tip to spindle, in the setup frame."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
-    direction: Annotated[Vector, Field(description="Tool axis; only [0, 0, 1] is built so far.")] = [0.0, 0.0, 1.0]
+    direction: Annotated[Triple, Field(description="Tool axis; only [0, 0, 1] is built so far.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 
     @model_validator(mode="after")
     def _check(self) -> Access:
         x, y, z = self.direction
-        if math.hypot(x, y) > AXIS_TOLERANCE * max(z, 0.0) or z <= 0:
+        if z < SHORTEST_AXIS or math.hypot(x, y) > AXIS_TOLERANCE * z:
             raise ValueError(f"access {self.id}: direction {self.direction} is not built yet, only [0, 0, 1]; turn "
                              "the part with placement.z_axis instead")
         return self
@@ -112,12 +117,12 @@ class Clearance(WireModel):
 class Quality(WireModel):
     """What the finished surface must keep."""
 
-    scallop_height_mm: Annotated[Number, Field(gt=0, description="Highest cusp between passes, along the normal, "
-                                                                 "mm.")] = 0.01
-    chordal_tolerance_mm: Annotated[Number, Field(gt=0, le=1, description="Greatest distance of path to surface along "
-                                                                          "a pass, mm.")] = 0.002
-    gouge_tolerance_mm: Annotated[Number, Field(gt=0, le=1, description="Deepest cut into the part that is no "
-                                                                        "finding, mm.")] = 0.01
+    scallop_height_mm: Annotated[Number, Field(ge=1e-4, description="Highest cusp between passes, along the "
+                                                                          "normal, mm; from 0.0001.")] = 0.01
+    chordal_tolerance_mm: Annotated[Number, Field(ge=1e-4, le=1, description="Greatest distance of path to "
+                                                  "surface along a pass, mm; from 0.0001.")] = 0.002
+    gouge_tolerance_mm: Annotated[Number, Field(ge=1e-3, le=1, description="Deepest cut into the part that is no "
+                                                "finding, mm; from 0.001, for the mesh must be finer still.")] = 0.01
     stock_allowance_mm: Annotated[Number, Field(ge=0, le=50, description="Material left on the part, mm.")] = 0.0
     coverage_min: Annotated[Number, Field(ge=0, le=1, description="Least share of the machinable area for state "
                                                                   "proved.")] = 0.0

@@ -68,9 +68,9 @@ class Tool(WireModel):
     gauge_length_mm: Annotated[Length | None, Field(
         description="Tip to spindle face, mm, for the length offset and kinematics only; default: stickout_mm + the "
                     "holder's lengths.")] = None
-    max_rpm: Annotated[Number | None, Field(gt=0, description="Highest spindle speed, 1/min; null: no limit of the "
-                                                              "tool's own.")] = None
-    life_min: Annotated[Number | None, Field(gt=0, description="Life in cut, min; null: not given.")] = None
+    max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: no limit of "
+                                                                       "the tool's own.")] = None
+    life_min: Annotated[Number | None, Field(gt=0, le=1e6, description="Life in cut, min; null: not given.")] = None
     holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
                                                                             "no holder is checked.")] = []
 

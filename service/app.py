@@ -14,6 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from geometry.errors import CamError
 from service import problems
 from service.engine import Engine
+from service.head import HeadMiddleware
 from service.limits import BodyLimitMiddleware
 from service.metrics import Metrics, MetricsMiddleware
 from service.openapi import document
@@ -60,6 +61,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
         app.include_router(module.router)
     app.add_middleware(BodyLimitMiddleware, limit=settings.max_body_bytes)
     app.add_middleware(MetricsMiddleware, metrics=app.state.metrics)
+    app.add_middleware(HeadMiddleware)
     app.add_middleware(CorrelationIdMiddleware, header_name="X-Request-ID")
 
     def openapi() -> dict[str, Any]:

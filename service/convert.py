@@ -16,6 +16,7 @@ from geometry.toolbody import HolderSegment, ToolBody
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
 
+OBJECT_WANTED = ("model_type", "model_attributes_type", "dict_type")
 Library = Mapping[str, Mapping[str, Any]]
 
 
@@ -28,19 +29,58 @@ def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None =
     Raises
     ------
     SetupError
-        Code 'setup_not_json' or 'bad_setup'; ``measured`` lists every problem as {"at", "problem"}, ``subjects``
-        the places.
+        Code 'setup_not_json', 'repeated_key', 'bad_setup' (``measured`` lists every problem as {"at", "problem"},
+        ``subjects`` the places), or as ``check_blank``.
     """
     if isinstance(data, bytes | str):
         try:
-            data = json.loads(data)
+            data = json.loads(data, object_pairs_hook=_without_repeats)
         except (ValueError, RecursionError) as error:
             raise SetupError(f"the setup is not JSON: {error}", code="setup_not_json",
                              remedy="send one JSON object as described by the Setup schema") from None
     try:
-        return Setup.model_validate(data, context={"library": library or {}})
+        setup = Setup.model_validate(data, context={"library": library or {}})
     except ValidationError as error:
         raise setup_error(error) from None
+    check_blank(setup)
+    return setup
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose names are all different; the usual reading, the last one counts, hides a mistake."""
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise SetupError(f"the name {json.dumps(name)} stands twice in one object of the setup",
+                             code="repeated_key", subjects=(name,), measured=sum(n == name for n, _ in pairs), limit=1,
+                             remedy="leave one of them out")
+        found[name] = value
+    return found
+
+
+def check_blank(setup: Setup) -> None:
+    """Refuse a blank grown from the part that leaves nothing to cut, or less than is to stay on the part.
+
+    Raises
+    ------
+    SetupError
+        Code 'no_stock' or 'allowance_beyond_stock'.
+    """
+    stock, allowance = setup.stock, setup.quality.stock_allowance_mm
+    if stock.kind != "part_offset":
+        return
+    grown = stock.margin_mm + stock.uncertainty_mm
+    if grown <= 0:
+        raise SetupError("nothing stands on the part that could be cut: stock.margin_mm and stock.uncertainty_mm are "
+                         "both 0", code="no_stock", subjects=("stock.margin_mm", "stock.uncertainty_mm"),
+                         measured=grown, limit=0.0, remedy="give a stock.margin_mm above 0, or the real blank as a box")
+    if allowance >= grown:
+        raise SetupError(f"quality.stock_allowance_mm {allowance:g} is not below the {grown:g} mm (margin_mm "
+                         f"{stock.margin_mm:g} + uncertainty_mm {stock.uncertainty_mm:g}) of stock on the part",
+                         code="allowance_beyond_stock",
+                         subjects=("quality.stock_allowance_mm", "stock.margin_mm", "stock.uncertainty_mm"),
+                         measured=allowance, limit=grown, remedy="leave less on the part, or give the blank a larger "
+                                                                 "margin_mm")
 
 
 def read_setup(path: Path, library: Library | None = None) -> Setup:
@@ -55,7 +95,7 @@ def read_setup(path: Path, library: Library | None = None) -> Setup:
         text = path.read_bytes()
     except OSError as error:
         raise SetupError(f"the setup file {path.name} cannot be read: {error.strerror}",
-                         code="setup_unreadable") from None
+                         code="setup_unreadable", remedy="check the path and the permissions") from None
     return parse_setup(text, library)
 
 
@@ -64,14 +104,23 @@ def problems_of(error: ValidationError, root: str = "setup") -> list[dict[str, s
     found = []
     for item in error.errors(include_url=False, include_context=False, include_input=False):
         at = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in item["loc"]).lstrip(".")
-        if item["type"] == "extra_forbidden":
-            text = "unknown field"
-        elif at == "tools" and item["type"] in ("missing", "too_short"):
+        if at == "tools" and item["type"] in ("missing", "too_short"):
             text = "no tools are given; a setup needs at least one"
+        elif not at and item["type"] in OBJECT_WANTED:
+            text = f"the {root} is to be a JSON object"
         else:
-            text = item["msg"].removeprefix("Value error, ")
+            text = sentence(item["type"], item["msg"])
         found.append({"at": at or root, "problem": text})
     return found
+
+
+def sentence(kind: str, message: str) -> str:
+    """What a validation found, in the words of JSON; ``kind`` and ``message`` are those of the validation."""
+    if kind == "extra_forbidden":
+        return "unknown field"
+    if kind in OBJECT_WANTED:
+        return "this is to be a JSON object"
+    return message.removeprefix("Value error, ")
 
 
 def setup_error(error: ValidationError) -> SetupError:

@@ -14,6 +14,7 @@ from starlette.routing import compile_path
 
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
+from service.convert import sentence
 from service.errors import (
     ERROR_TABLE,
     MethodError,
@@ -25,6 +26,7 @@ from service.errors import (
     UnauthorizedError,
     problem_document,
 )
+from service.head import is_stream
 
 log = structlog.get_logger(__name__)
 
@@ -64,12 +66,16 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
     limit = request.app.state.settings.max_body_bytes
     text = str(error.detail)
     named: dict[int, CamError] = {
-        401: UnauthorizedError(text),
-        404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path"),
-        405: MethodError(f"{request.method} is not offered at {request.url.path}"),
+        401: UnauthorizedError(text, remedy="send Authorization: Bearer TOKEN"),
+        404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path",
+                           remedy="GET /openapi.json lists the paths"),
+        405: MethodError(f"{request.method} is not offered at {request.url.path}",
+                         remedy="the Allow header names the methods that are"),
         413: too_large(limit),
     }
-    fallback = RequestError(text) if error.status_code == 422 else ServiceError(text)
+    # 400 is the framework's word for a body that it cannot decode; any other bad body is 422
+    fallback = (RequestError(text, remedy="see the schema in /openapi.json") if error.status_code in (400, 422)
+                else ServiceError(text, remedy="see /openapi.json for what this path takes"))
     headers = dict(error.headers or {})
     if error.status_code == 405:
         headers["Allow"] = ", ".join(_offered(request))
@@ -79,13 +85,15 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
 def _offered(request: Request) -> list[str]:
     """Methods that some route offers at this path; the router itself names only those of the first that matches."""
     paths = request.app.openapi()["paths"]
-    return sorted({method.upper() for template, item in paths.items() for method in item
-                   if compile_path(template)[0].match(request.url.path)})
+    found = {method.upper() for template, item in paths.items() for method in item
+             if compile_path(template)[0].match(request.url.path)}
+    return sorted(found | ({"HEAD"} if "GET" in found and not is_stream(request.url.path) else set()))
 
 
 async def _validation(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": e["msg"]} for e in error.errors()]
+    problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": sentence(e["type"], e["msg"])}
+                for e in error.errors()]
     first = problems[0]
     return problem_response(request, RequestError(f"{first['at']}: {first['problem']}", measured=problems,
                                                   subjects=tuple(p["at"] for p in problems),
@@ -95,7 +103,7 @@ async def _validation(request: Request, error: Exception) -> JSONResponse:
 async def _unexpected(request: Request, error: Exception) -> JSONResponse:
     log.exception("bug in a route", path=request.url.path, exc_info=error)
     return problem_response(request, InternalError("a bug in the service; the log has the details under this request "
-                                                   "id", code="bug"))
+                                                   "id", code="bug", remedy="please report it with the request id"))
 
 
 def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:

@@ -57,7 +57,7 @@ class JobStore:
         Raises
         ------
         KeyConflictError
-            The principal used the key before for other content.
+            The principal used the key before for other content or another kind of job.
         """
         values = {
             "id": new_id(), "kind": new.kind, "principal": new.principal, "idempotency_key": new.idempotency_key,
@@ -73,7 +73,12 @@ class JobStore:
             found = self._by_key(new.principal, new.idempotency_key)
             if found is None:
                 raise
-        if (found["kind"], found["content_sha256"]) != (new.kind, new.content_sha256):
+        if found["kind"] != new.kind:
+            raise KeyConflictError(
+                f"the Idempotency-Key belongs to job {found['id']}, which is of kind {found['kind']}, not {new.kind}",
+                subjects=(found["id"],), measured=new.kind, limit=found["kind"],
+                remedy="take a new key for each kind of job")
+        if found["content_sha256"] != new.content_sha256:
             raise KeyConflictError(
                 f"the Idempotency-Key belongs to job {found['id']}, which has other content",
                 subjects=(found["id"],), measured=new.content_sha256, limit=found["content_sha256"],
@@ -99,7 +104,8 @@ class JobStore:
         with self.engine.connect() as c:
             row = c.execute(query).mappings().one_or_none()
         if row is None:
-            raise NotFoundError(f"there is no job {job_id}", code="no_such_job", subjects=(job_id,))
+            raise NotFoundError(f"there is no job {job_id}", code="no_such_job", subjects=(job_id,),
+                                remedy="GET /v1/jobs lists your jobs")
         return row
 
     def page(self, principal: str, *, limit: int, before: str | None = None, state: str | None = None,

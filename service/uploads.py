@@ -40,7 +40,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     Raises
     ------
     RequestError
-        A part is missing, or one stands there that is not known.
+        A part is missing or stands there twice, or one is not known.
     """
     wanted = {"part", "setup"} | ({"program"} if with_program else set())
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
@@ -51,14 +51,18 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     except HTTPException as error:
         if error.status_code == 413:
             raise
-        raise RequestError(f"the multipart body cannot be read: {error.detail}", code="bad_multipart") from None
-    names = list(form.keys())
+        raise RequestError(f"the multipart body cannot be read: {error.detail}", code="bad_multipart",
+                           remedy="let the client write the multipart body: curl -F part=@PART.step -F "
+                                  "'setup=@SETUP.json;type=application/json'") from None
+    names = [name for name, _ in form.multi_items()]
     for name in sorted(set(names) - wanted):
-        raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part")
+        raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
+                           remedy=f"send {' and '.join(sorted(wanted))}, each once")
     for name in sorted(wanted):
-        if names.count(name) != 1:
-            raise RequestError(f"the form needs exactly one part '{name}'", subjects=(name,), code="missing_part",
-                               remedy=f"send {' and '.join(sorted(wanted))}")
+        if (count := names.count(name)) != 1:
+            raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
+                               subjects=(name,), code="repeated_part" if count else "missing_part", measured=count,
+                               limit=1, remedy=f"send {' and '.join(sorted(wanted))}, each once")
     part, program = form["part"], form.get("program")
     if not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile)):
         raise RequestError("part and program must be sent as files, with a file name", code="not_a_file",
@@ -71,7 +75,8 @@ async def _bytes_of(field: Any) -> bytes:
         return str(field).encode()
     data = await field.read(MAX_SETUP_BYTES + 1)
     if len(data) > MAX_SETUP_BYTES:
-        raise SetupError("the setup is larger than 4 MB", code="setup_too_large", limit=MAX_SETUP_BYTES)
+        raise SetupError("the setup is larger than 4 MB", code="setup_too_large", limit=MAX_SETUP_BYTES,
+                         remedy="leave out what the job does not need; 200 tools take less than 1 MB")
     return data
 
 
@@ -87,7 +92,7 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     """
     if key is not None and not 1 <= len(key) <= KEY_LIMIT:
         raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
-                           measured=len(key), limit=KEY_LIMIT)
+                           measured=len(key), limit=KEY_LIMIT, remedy="a UUID will do")
     setup = parse_setup(form.setup, engine.library.all())
     part_sha = store_part(engine.artifacts, form.part.file)
     program_sha = _store_program(engine.artifacts, form.program.file) if form.program else None
@@ -116,7 +121,8 @@ def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
 def _store_program(artifacts: Artifacts, file: BinaryIO) -> str:
     sha, size = artifacts.put_blob(_chunks(file))
     if size == 0:
-        raise ProgramError("the program is empty", code="empty_program")
+        raise ProgramError("the program is empty", code="empty_program", measured=0, limit=1,
+                           remedy="send the NC program as part 'program'")
     return sha
 
 

@@ -21,12 +21,14 @@ from service.resources import (
     job_resource,
     list_files,
     media_type,
+    path_of,
     result_folder,
 )
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
+UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "If-None-Match names what the client has."}}
 RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError)
 
 
@@ -57,14 +59,14 @@ def cancel_job(request: Request, principal: Principal, job_id: str) -> Job:
     return job_resource(jobs.get(job_id, principal))
 
 
-@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT,
+@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT | UNCHANGED,
             response_model=Zones)
 def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
     """Walls, connections, channels, zones and remainder."""
     return _document(request, principal, job_id, "zones.json")
 
 
-@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT,
+@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT | UNCHANGED,
             response_model=Report | Verification)
 def get_report(request: Request, principal: Principal, job_id: str) -> Response:
     """The plan and its proof; of a verification, its findings."""
@@ -84,14 +86,22 @@ FILE_OK: dict[int | str, dict[str, Any]] = {200: {
 
 
 @router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
-            responses=FILE_OK | responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError,
+            responses=FILE_OK | UNCHANGED | responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError,
                                           WithheldError))
-def get_file(request: Request, principal: Principal, job_id: str, name: str) -> FileResponse:
+def get_file(request: Request, principal: Principal, job_id: str, name: str) -> Response:
     """A file. Programs and STEP-NC of a job that is not proved are withheld (409)."""
     row = request.app.state.engine.jobs.get(job_id, principal)
     path = find_file(result_folder(request.app.state.engine.artifacts, row), row, name)
-    return FileResponse(path, media_type=media_type(name), filename=name,
-                        headers={"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"})
+    headers = {"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"}
+    if _is_known(request, headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return FileResponse(path, media_type=media_type(name), filename=name, headers=headers)
+
+
+def _is_known(request: Request, etag: str) -> bool:
+    """Whether If-None-Match holds this entity tag; the comparison is the weak one (RFC 9110, 13.1.2)."""
+    given = [t.strip().removeprefix("W/") for t in request.headers.get("if-none-match", "").split(",")]
+    return etag in given or given == ["*"]
 
 
 def _document(request: Request, principal: str, job_id: str, name: str) -> Response:
@@ -100,5 +110,9 @@ def _document(request: Request, principal: str, job_id: str, name: str) -> Respo
     row = engine.jobs.get(job_id, principal)
     path = result_folder(engine.artifacts, row) / name
     if not path.is_file():
-        raise NotFoundError(f"a job of kind {row['kind']} has no {name}", code="no_such_document", subjects=(name,))
-    return Response(path.read_bytes(), media_type="application/json")
+        raise NotFoundError(f"a job of kind {row['kind']} has no {name}", code="no_such_document", subjects=(name,),
+                            remedy=f"GET {path_of(row)} names the documents of this job under links")
+    headers = {"ETag": f'"{file_sha256(path)}"'}
+    if _is_known(request, headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return Response(path.read_bytes(), media_type="application/json", headers=headers)

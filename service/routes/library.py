@@ -22,6 +22,8 @@ from service.problems import responses
 router = APIRouter(prefix="/v1", tags=["libraries"])
 
 Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry; a setup says lib:NAME.")]
+MaterialName = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$",
+                                   description="Name as GET /v1/materials lists it; built-in ones may have blanks.")]
 READ = responses(UnauthorizedError)
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The entry is new."}}
@@ -94,9 +96,12 @@ def list_materials(request: Request, _: Principal) -> MaterialList:
 
 
 @router.get("/materials/{name}", operation_id="getMaterial", responses=ONE)
-def get_material(request: Request, _: Principal, name: Name) -> MaterialEntry:
-    """One material of the library."""
-    entry = request.app.state.engine.library.get("materials", name)
+def get_material(request: Request, _: Principal, name: MaterialName) -> MaterialEntry:
+    """One material: the library's entry of that name, else the built-in one."""
+    library = request.app.state.engine.library
+    if name in MATERIALS and name not in library.all()["materials"]:
+        return MaterialEntry(name=name, entry=MATERIALS[name], built_in=True)
+    entry = library.get("materials", name)
     return MaterialEntry(name=name, entry=Material.model_validate(entry))
 
 

@@ -58,6 +58,10 @@ def test_library_entries_are_checked(client):
     assert answer.status_code == 422 and answer.headers["content-type"] == "application/problem+json"
     assert client.put("/v1/tools/..x", json=TOOL).status_code == 422
     names = [m["name"] for m in client.get("/v1/materials").json()["items"]]
+    for name in names:
+        found = client.get(f"/v1/materials/{name}")
+        assert found.status_code == 200 and found.json()["built_in"] and found.json()["entry"]["name"] == name
+    assert client.get("/v1/materials/cheese").status_code == 404
     assert "Ti-6Al-4V" in names and client.get("/v1/machines").json() == {"items": []}
 
 

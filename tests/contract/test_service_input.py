@@ -16,7 +16,7 @@ def _is_problem(answer, status, code):
     body = answer.json()
     assert (body["status"], body["code"]) == (status, code), body
     assert body["type"].startswith("urn:zonemill:problem:") and body["type"].endswith(f":{code}")
-    assert body["title"] and body["detail"] and body["request_id"] == answer.headers["x-request-id"]
+    assert body["title"] and body["detail"] and body["remedy"] and body["request_id"] == answer.headers["x-request-id"]
     return body
 
 
@@ -82,6 +82,26 @@ def test_malformed_forms(client, post):
     assert answer.status_code == 202  # a plain form field will do as well
 
 
+def test_a_part_sent_twice_is_refused_by_name(client):
+    good = json.dumps({"tools": [TOOL]})
+    for name in ("part", "setup"):
+        parts = [("part", ("a.step", STEP)), ("setup", ("s.json", good))]
+        parts.append((name, dict(parts)[name]))
+        body = _is_problem(client.post("/v1/jobs", files=parts), 422, "repeated_part")
+        assert body["subjects"] == [name] and (body["measured"], body["limit"]) == (2, 1)
+
+
+def test_names_that_stand_twice_in_the_setup_are_refused(client, post):
+    text = '{"tools": [], "tools": ' + json.dumps([TOOL]) + "}"
+    assert _is_problem(post(client, setup=text), 422, "repeated_key")["subjects"] == ["tools"]
+
+
+@pytest.mark.parametrize("body", [b"{", b"", b"\xff\xfe", b"[" * 100_000, b"[]"])
+def test_a_library_body_that_is_no_entry_is_422(client, body):
+    answer = client.put("/v1/tools/x", content=body, headers={"content-type": "application/json"})
+    assert "dictionary" not in _is_problem(answer, 422, "malformed_request")["detail"]
+
+
 def test_the_key_has_a_length(client, post):
     _is_problem(post(client, key="k" * 256), 422, "malformed_request")
     _is_problem(post(client, key=""), 422, "malformed_request")
@@ -93,7 +113,7 @@ def test_what_is_not_there_is_404_and_what_is_not_offered_405(client, post):
     _is_problem(client.get("/v1/jobs/jx"), 404, "no_such_job")
     answer = client.patch("/v1/jobs")
     _is_problem(answer, 405, "method_not_allowed")
-    assert "GET" in answer.headers["allow"]
+    assert "GET" in answer.headers["allow"] and "HEAD" in answer.headers["allow"]
     _is_problem(client.get("/v1/jobs?limit=0"), 422, "malformed_request")
 
 

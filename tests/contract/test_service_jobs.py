@@ -36,6 +36,30 @@ def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish
         assert hashlib.sha256(got.content).hexdigest() == item["sha256"]
 
 
+def test_head_is_get_without_the_body(client, post, finish):
+    job = finish(client, post(client, "").json())
+    links = job["links"]
+    paths = ["/healthz", "/readyz", "/v1/jobs", links["self"], links["report"], links["files"],
+             f"{links['files']}/program.linuxcnc.ngc", "/v1/materials"]
+    for path in paths:
+        head, get = client.head(path), client.get(path)
+        assert head.status_code == get.status_code == 200 and head.content == b""
+        for name in ("content-length", "content-type", "etag"):
+            assert head.headers.get(name) == get.headers.get(name)
+    assert client.head(f"{links['files']}/none").status_code == 404
+    assert client.head("/v1/zones").status_code == client.head(links["events"]).status_code == 405
+
+
+def test_what_the_client_has_is_not_sent_again(client, post, finish):
+    links = finish(client, post(client, "").json())["links"]
+    for path in (f"{links['files']}/program.linuxcnc.ngc", links["report"], links["zones"]):
+        tag = client.get(path).headers["etag"]
+        for given in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+            again = client.get(path, headers={"If-None-Match": given})
+            assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
+        assert client.get(path, headers={"If-None-Match": '"other"'}).status_code == 200
+
+
 def test_programs_of_an_unproved_job_are_withheld_with_the_finding(client, post, finish):
     job = finish(client, post(client, "gouge").json())
     assert job["state"] == "unproved"
@@ -69,7 +93,10 @@ def test_same_key_and_content_is_the_same_job_and_other_content_is_refused(clien
     other = post(client, key="k1", setup=setup_json("", quality={"scallop_height_mm": 0.03}))
     assert other.status_code == 422 and other.json()["code"] == "idempotency_key_reused"
     kind = post(client, key="k1", setup=setup, path="/v1/zones")
-    assert kind.status_code == 422
+    assert kind.status_code == 422 and kind.json()["code"] == "idempotency_key_reused"
+    assert (kind.json()["measured"], kind.json()["limit"]) == ("zones", "plan") and "kind" in kind.json()["detail"]
+    dry = [post(client, key="k2", setup=setup, path="/v1/zones") for _ in range(2)]
+    assert dry[0].status_code == dry[1].status_code == 202 and dry[0].json()["id"] == dry[1].json()["id"]
     assert post(client, setup=setup).json()["id"] != first.json()["id"]
 
 

@@ -91,6 +91,25 @@ def test_quoted_numbers_are_no_references(tmp_path, box_text):
     assert check_text(path).faces == 6
 
 
+@pytest.mark.parametrize("number", ["NAN", "nan", "-nan(ind)", "INF", "-Infinity", "1.#QNAN", "1.E300", "-2.5e+100"])
+def test_a_coordinate_that_is_none(tmp_path, box_text, number):
+    at = box_text.index("CARTESIAN_POINT('',(") + len("CARTESIAN_POINT('',(")
+    entity = "#" + box_text[:at].rpartition("#")[2].split("=")[0].strip()
+    path = tmp_path / "nan.step"
+    path.write_text(box_text[:at] + number + box_text[box_text.index(",", at):])
+    began = time.monotonic()
+    found = refused(StepError, "bad_number", lambda: check_text(path))
+    assert time.monotonic() - began < 1.0
+    assert found.subjects == (entity,) and found.measured == number and entity in found.remedy
+
+
+def test_words_that_look_like_no_number_are_no_harm(tmp_path, box_text):
+    path = tmp_path / "words.step"
+    path.write_text(box_text.replace("'Open CASCADE STEP", "'(NAN,INF) Open CASCADE STEP", 1)
+                    .replace("DATA;", "DATA;\n#99998=X(.INF.,1.E-300,NANO());\n/* (NAN) */", 1))
+    assert check_text(path).faces == 6
+
+
 def test_file_too_large(tmp_path, box_text):
     path = tmp_path / "big.step"
     path.write_text(box_text)
@@ -167,14 +186,28 @@ def test_impossible_mesh_tolerances(tmp_path, bad):
 def test_heavy_part_runs_out_of_time():
     path = real_part("imp_kj66_compressor_wheel.step")
     began = time.monotonic()
-    found = refused(ResourceError, "reader_timeout", lambda: read_part(path, time_limit=2.0))
+    found = refused(PartError, "reader_timeout", lambda: read_part(path, time_limit=2.0))
     assert time.monotonic() - began < 4.0 and found.limit == 2.0
+    assert "scallop_height_mm" in found.remedy
 
 
 def test_memory_limit_stops_the_reader(tmp_path, box_text):
     path = tmp_path / "box.step"
     path.write_text(box_text)
-    refused(ResourceError, "reader_memory", lambda: read_part(path, memory_limit=50e6))
+    refused(PartError, "reader_memory", lambda: read_part(path, memory_limit=50e6))
+
+
+def test_a_reader_that_crashes_blames_the_part_and_one_killed_from_outside_does_not(tmp_path, monkeypatch):
+    def dying(name):
+        def run(*_, **__):
+            return run_limited([sys.executable, "-c", f"import os, signal; os.kill(os.getpid(), signal.{name})"], b"",
+                               time_limit=20.0, memory_limit=1e9)
+        return run
+
+    monkeypatch.setattr("geometry.step.run_limited", dying("SIGSEGV"))
+    refused(PartError, "reader_crashed", lambda: read_part(tmp_path / "any.step"))
+    monkeypatch.setattr("geometry.step.run_limited", dying("SIGKILL"))
+    refused(ResourceError, "reader_crashed", lambda: read_part(tmp_path / "any.step"))
 
 
 def child(code, **limits):

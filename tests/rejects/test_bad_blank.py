@@ -1,0 +1,103 @@
+"""Blanks and fixtures that contradict the part are refused before anything is planned."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geometry.errors import CamError, SetupError
+from service.blank import check_against_part
+from service.convert import parse_setup
+from service.errors import problem_document
+from tests.unit.test_boxes import block
+
+TOOLS = [{"id": "T1", "kind": "ball", "diameter_mm": 3}]
+PART = SimpleNamespace(mesh=block([-10, -5, 0], [10, 5, 8]), bounds=np.array([[-10.0, -5, 0], [10, 5, 8]]),
+                       volume=20.0 * 10 * 8)
+
+
+def refused(code, **fields):
+    with pytest.raises(SetupError) as caught:
+        check_against_part(parse_setup({"tools": TOOLS, **fields}), PART)
+    found = caught.value
+    assert found.code == code, found.message
+    assert found.remedy and found.subjects
+    document = problem_document(found)
+    assert document["status"] == 422 and document["type"] == f"urn:zonemill:problem:bad-setup:{code}"
+    return found
+
+
+def accepted(**fields):
+    check_against_part(parse_setup({"tools": TOOLS, **fields}), PART)
+
+
+@pytest.mark.parametrize(("corner", "axis", "side"), [
+    (0, 0, "-X"), (0, 1, "-Y"), (0, 2, "-Z"), (1, 0, "+X"), (1, 1, "+Y"), (1, 2, "+Z")])
+def test_a_box_the_part_stands_out_of(corner, axis, side):
+    box = [[-12.0, -7.0, -1.0], [12.0, 7.0, 9.0]]
+    box[corner][axis] = float(PART.bounds[corner][axis]) + (0.02 if corner == 0 else -0.02)
+    found = refused("stock_misses_part", stock={"kind": "box", "box_mm": box})
+    assert found.subjects == ("stock.box_mm", side) and side in found.message
+    assert found.measured == pytest.approx(0.02) and found.limit == 0
+    box[corner][axis] += -0.015 if corner == 0 else 0.015
+    accepted(stock={"kind": "box", "box_mm": box})
+
+
+def test_a_box_somewhere_else_names_every_side_the_worst_first():
+    found = refused("stock_misses_part", stock={"kind": "box", "box_mm": [[100, 0, 0], [150, 50, 20]]})
+    assert found.subjects == ("stock.box_mm", "-X", "-Y") and found.measured == 110
+    assert "-10.000 to 10.000" in found.remedy
+
+
+def test_uncertainty_does_not_make_a_box_hold_the_part():
+    refused("stock_misses_part", stock={"kind": "box", "box_mm": [[-9, -5, 0], [10, 5, 9]], "uncertainty_mm": 5})
+
+
+def test_no_stock():
+    refused("no_stock", stock={"margin_mm": 0, "uncertainty_mm": 0})
+    accepted(stock={"margin_mm": 0, "uncertainty_mm": 0.1})
+    box = {"kind": "box", "margin_mm": 0, "uncertainty_mm": 0}
+    refused("no_stock", stock=box)
+    refused("no_stock", stock={**box, "box_mm": PART.bounds.tolist()})
+    accepted(stock={**box, "uncertainty_mm": 0.5, "box_mm": PART.bounds.tolist()})
+
+
+def test_a_box_at_finished_size_round_a_part_with_pockets_is_stock():
+    pocketed = SimpleNamespace(mesh=PART.mesh, bounds=PART.bounds, volume=0.9 * PART.volume)
+    check_against_part(parse_setup({"tools": TOOLS, "stock": {"kind": "box", "margin_mm": 0, "uncertainty_mm": 0}}),
+                       pocketed)
+
+
+@pytest.mark.parametrize("allowance", [5.0, 1.5])
+def test_an_allowance_beyond_the_stock(allowance):
+    found = refused("allowance_beyond_stock", quality={"stock_allowance_mm": allowance})
+    assert (found.measured, found.limit) == (allowance, 1.5)
+    assert f"{allowance:g}" in found.message and "1.5 mm" in found.message
+    accepted(quality={"stock_allowance_mm": 1.4})
+    accepted(quality={"stock_allowance_mm": allowance}, stock={"margin_mm": 5})
+
+
+def test_a_fixture_in_the_part():
+    clear = {"box_mm": [[-20, -5, 0], [-10.0, 5, 30]]}  # touches
+    found = refused("fixture_in_part", fixtures=[clear, {"box_mm": [[-2, -2, 0], [2, 2, 30]]}])
+    assert found.subjects[0] == "fixtures[1]" and "fixtures[1]" in found.message
+    point = np.array(found.measured)
+    assert (abs(point) <= [2, 2, 8.001]).all() and point[2] >= 0
+    accepted(fixtures=[clear, {"box_mm": [[-2, -2, 7.995], [2, 2, 30]]}])
+    refused("fixture_in_part", fixtures=[{"box_mm": [[0, 0, 4], [0.001, 0.001, 4.001]]}])
+
+
+def test_repeated_names_are_refused():
+    text = '{"tools": [], "tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3}]}'
+    with pytest.raises(SetupError) as caught:
+        parse_setup(text)
+    assert caught.value.code == "repeated_key" and caught.value.subjects == ("tools",) and caught.value.remedy
+    with pytest.raises(SetupError, match='"id"'):
+        parse_setup('{"tools": [{"id": "T1", "id": "T2", "kind": "ball", "diameter_mm": 3}]}')
+
+
+@pytest.mark.parametrize("text", ["[]", "3", '"x"', "null"])
+def test_a_setup_that_is_no_object(text):
+    with pytest.raises(CamError) as caught:
+        parse_setup(text)
+    assert caught.value.message == "the setup is to be a JSON object"
