@@ -16,6 +16,7 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface
 from geometry.step import read_part
 from schemas.setup import Setup
+from service.blank import check_against_part
 from service.convert import face_numbers, tool_bodies
 from zones.decompose import decompose
 from zones.model import Decomposition
@@ -104,6 +105,7 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     """
     progress("read", 0.0)
     part = load(path, setup)
+    check_against_part(setup, part)
     progress("zones", 0.12)
     tree = TriangleTree(part.mesh)
     obstacles = TriangleTree(obstacle_mesh(part, setup)) if setup.fixtures else tree
