@@ -19,6 +19,14 @@ class ArcError(ValueError):
     """An arc whose words contradict each other; the reader adds the line."""
 
 
+class ArcTooLong(ArcError):
+    """An arc that would need more points than allowed; ``points`` is how many."""
+
+    def __init__(self, points: float) -> None:
+        super().__init__(f"an arc of {points:.3g} points")
+        self.points = points
+
+
 def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axes: tuple[int, int, int]) -> F64:
     """Centre (2,) in plane axes of an arc given by R; a negative radius asks for the longer way.
 
@@ -37,15 +45,17 @@ def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axe
 
 
 def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1,
-               chord: float = CHORD) -> F64:
+               chord: float = CHORD, most: int = 200_000) -> F64:
     """Points of an arc or helix after its start.
 
     start, end : (3,) float64, mm; centre : (2,) float64, mm, in plane axes
     turns      : as the P word: full turns begun
     chord      : mm, largest distance of the polyline from the arc; the points lie on it
+    most       : points at most
 
     Returns (k, 3) float64, mm, the last row equal to ``end``. Equal ends in the plane make a full circle.
-    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %.
+    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %, ArcTooLong where ``most`` would not do,
+    before any memory is taken.
     """
     i, j, k = axes
     u, v = start[[i, j]] - centre, end[[i, j]] - centre
@@ -61,8 +71,11 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
         same = float(np.hypot(*(end[[i, j]] - start[[i, j]]))) < 1e-6
         sweep = (-math.tau if clockwise else math.tau) if same else sweep
     sweep += (turns - 1) * (-math.tau if clockwise else math.tau)
-    step = 2 * math.acos(max(1 - chord / max(r0, r1), 0.5))
+    # 4 asin(sqrt(c / 2r)) is 2 acos(1 - c / r) without its loss of digits on large radii
+    step = 4 * math.asin(math.sqrt(min(chord / max(r0, r1), 0.5) / 2))
     n = max(1, math.ceil(abs(sweep) / step))
+    if n > most:
+        raise ArcTooLong(n)
     f = np.arange(1, n + 1) / n
     radius = r0 + (r1 - r0) * f
     out = np.empty((n, 3))

@@ -64,7 +64,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     _check(tools, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
     tell = progress or (lambda _share: None)
-    read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset)
+    read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
+                         blend_limit=setup.gouge_tolerance)
             for name, text in programs]
     moves, source = _moves(read, tools)
     tell(0.1)

@@ -1,146 +1,77 @@
 """NC text to moves of the tool tip: a 3-axis LinuxCNC / Fanuc reader of its own.
 
 A program is read line by line by one modal machine. The common line, one straight move in modal
-coordinates, is taken by one regular expression; everything else goes through the full block.
+coordinates, is taken by one regular expression; everything else goes through the full block (``words``).
 What the reader does not know it names with its line (``ProgramError``): nothing is skipped in silence.
 What it understands but a machinist should not run (length offset off, another work offset, spindle
-standing) becomes a ``Remark`` and the reading goes on.
+standing, path blending beyond the tolerance, a word no code takes) becomes a ``Remark`` and the reading goes on.
 
-Assumptions: a machine-coordinate move (G53, G28, G30) and a tool change go to a place above everything;
-the axes they leave unknown are known again once programmed. A rapid is one straight line.
+Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; the axes
+left unknown are known again once programmed. A rapid is one straight line. Before the first G20 the unit is mm.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Collection
-from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.errors import ProgramError
-from geometry.mesh import F64, I32
-from verify.arcs import PLANE_AXES, ArcError, arc_points, centre_from_radius
+from verify.arcs import PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
+from verify.cycles import FEED, RAPID, Hole, hole_moves
+from verify.log import MAX_ERRORS, MOST_MOVES_A_BLOCK, Log
+from verify.program import NAN, Program, Remark, State
+from verify.words import (
+    CYCLES,
+    MOTION_CODES,
+    STRAIGHT,
+    WORK_OFFSETS,
+    Block,
+    BlockError,
+    parse_block,
+    used_letters,
+    whole,
+)
 
-RAPID, FEED = 0, 1
 INCH = 25.4
-MAX_ERRORS = 20
-NAN = math.nan
-
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
-_FAST = re.compile(rf"(?:N\d+ ?)?(?:G0?([01]) ?)?(?:X({_NUMBER}) ?)?(?:Y({_NUMBER}) ?)?(?:Z({_NUMBER}) ?)?"
-                   rf"(?:F({_NUMBER}) ?)?\r?").fullmatch
-_WORD = re.compile(rf"([A-Z])({_NUMBER})")
-_COMMENT = re.compile(r"\([^()]*\)")
-_KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
-_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
-            59.3: "G59.3"}
-_CYCLES = frozenset({73, 81, 82, 83})
-_IGNORED_G = frozenset({15, 40, 50, 61, 61.1, 64, 69})
-_MOTION = frozenset({0, 1, 2, 3, 80}) | _CYCLES
-_UNKNOWN_G_HINT = {
-    10: "a changed offset table", 41: "cutter radius compensation", 42: "cutter radius compensation",
-    43.4: "tool centre point control", 43.5: "tool centre point control", 52: "a shifted origin",
-    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 92: "a shifted origin",
-}
-
-
-@dataclass(frozen=True)
-class Remark:
-    """Something readable that should not be run: where and what."""
-
-    line: int
-    message: str
-
-
-@dataclass(frozen=True, eq=False)
-class Program:
-    """A program as straight moves of the tool tip in the setup frame.
-
-    name    : of the program
-    start, end : (m, 3) float64, mm; an axis whose start is unknown starts where it ends
-    kind    : (m,) int8, RAPID or FEED (arcs are FEED polylines within 1e-3 mm)
-    feed    : (m,) float64, mm/min; nan for rapids
-    tool    : (m,) int32, T number in the spindle, 0 for none
-    line    : (m,) int32, 1-based line of the source
-    dwell   : s of G4 and drilling dwells
-    lines   : number of lines read
-    remarks : what should not be run
-    """
-
-    name: str
-    start: F64
-    end: F64
-    kind: NDArray[np.int8]
-    feed: F64
-    tool: I32
-    line: I32
-    dwell: float
-    lines: int
-    remarks: tuple[Remark, ...]
-
-    def __len__(self) -> int:
-        return len(self.start)
-
-
-@dataclass
-class _State:
-    """Everything modal."""
-
-    position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
-    motion: float | None = None
-    plane: int = 17
-    scale: float = 1.0
-    relative: bool = False
-    centre_absolute: bool = False
-    feed_mode: int = 94
-    feed: float = NAN
-    speed: float = 0.0
-    spindle: bool = False
-    selected: int = 0
-    tool: int = 0
-    offset: int | None = None
-    work_offset: str = "G54"
-    retract_to_r: bool = False
-    cycle: dict[str, float] = field(default_factory=dict)
-    ended: bool = False
+BLEND_LIMIT = 0.01
 
 
 class Reader:
     """One reading of one program; use ``read_program``."""
 
-    def __init__(self, name: str, tools: Collection[int] | None, work_offset: str) -> None:
-        self.name, self.tools, self.work_offset = name, tools, work_offset
-        self.s = _State()
-        self.rows: list[tuple[float, float, float, float, float, float, int, float, int, int]] = []
-        self.remarks: dict[tuple[str, object], Remark] = {}
-        self.errors: list[tuple[int, str]] = []
+    def __init__(self, name: str, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
+        self.tools, self.work_offset, self.blend_limit = tools, work_offset, blend_limit
+        self.s = State()
+        self.log = Log(name)
         self.dwell = 0.0
-        self.line = 0
+        self.incremental_line = 0
+        self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
 
     # ---------------------------------------------------------------- text
 
     def read(self, text: str) -> Program:
-        lines = text.split("\n")
+        """Moves and remarks of ``text``; raises as ``read_program`` says."""
+        log, lines = self.log, text.split("\n")
         percents = self._scan(lines)
         if not self.s.ended and percents < 2:
-            self._error(f"{self.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
-        if self.errors:
-            self._raise()
-        table = np.array(self.rows, dtype=np.float64).reshape(-1, 10)
-        return Program(self.name, np.ascontiguousarray(table[:, 0:3]), np.ascontiguousarray(table[:, 3:6]),
+            log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
+        log.raise_errors()
+        if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
+            log.remark("incremental", "the program turns to incremental coordinates (G91) after cuts in absolute ones "
+                       "and never turns back", line=self.incremental_line)
+        table = log.table()
+        return Program(log.name, np.ascontiguousarray(table[:, 0:3]), np.ascontiguousarray(table[:, 3:6]),
                        table[:, 6].astype(np.int8), np.ascontiguousarray(table[:, 7]), table[:, 8].astype(np.int32),
-                       table[:, 9].astype(np.int32), self.dwell, len(lines),
-                       tuple(sorted(self.remarks.values(), key=lambda r: (r.line, r.message))))
+                       table[:, 9].astype(np.int32), self.dwell, len(lines), log.remarks())
 
     def _scan(self, lines: list[str]) -> int:
         """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""
-        s, fast, rows = self.s, _FAST, self.rows
+        s, log, fast, rows, full = self.s, self.log, STRAIGHT, self.log.rows, Log.full
         percents = 0
-        plain = False
+        plain = begun = False
         for number, raw in enumerate(lines, 1):
             if plain and (m := fast(raw)):
                 g, x, y, z, f = m.groups()
@@ -156,6 +87,8 @@ class Reader:
                     ey = py if y is None else float(y)
                     ez = pz if z is None else float(z)
                     s.position = [ex, ey, ez]
+                    if len(rows) >= full:
+                        log.flush()
                     if s.motion == 0:
                         rows.append((px, py, pz, ex, ey, ez, RAPID, NAN, s.tool, number))
                         continue
@@ -163,103 +96,77 @@ class Reader:
                         rows.append((px, py, pz, ex, ey, ez, FEED, s.feed, s.tool, number))
                         continue
                     s.position = [px, py, pz]
-            self.line = number
+            log.line = number
             text = raw.strip()
             if text == "%":
                 percents += 1
+                if percents == 1 and begun:
+                    log.error("a % in the middle of the program, which does not begin with one")
                 if percents == 2:
                     break
                 continue
             if text:
+                begun = True
                 self._block(text)
-            if s.ended:
+            if s.ended or len(log.errors) >= MAX_ERRORS:
                 break
             plain = self._is_plain()
-            if len(self.errors) >= MAX_ERRORS:
-                break
         return percents
 
     def _is_plain(self) -> bool:
         """Whether a straight move needs nothing but its numbers now."""
         s = self.s
-        return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.spindle and s.tool > 0
+        return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset
                 and not any(math.isnan(v) for v in s.position))
 
-    def _block(self, text: str) -> None:
-        text = _COMMENT.sub(" ", text).split(";", 1)[0].upper()
-        if "(" in text or ")" in text:
-            return self._error("a comment is not closed")
-        text = "".join(text.split())
-        if not text:
-            return None
-        if text.startswith("/"):
-            self._remark("block_delete", "a block with / depends on a switch of the machine; it is taken as run")
-            text = text[1:]
-        if text.startswith("O"):
-            if re.fullmatch(r"O\d+", text):
-                return None
-            return self._error(f"cannot read the subroutine or macro word '{text[:40]}'")
-        words = _WORD.findall(text)
-        if "".join(a + b for a, b in words) != text:
-            return self._error(f"cannot read '{text[:60]}'")
-        self._run(words)
-        return None
-
-    def _error(self, message: str, line: int | None = None) -> None:
-        self.errors.append((line or self.line, message))
-
-    def _remark(self, key: str, message: str, detail: object = None) -> None:
-        self.remarks.setdefault((key, detail), Remark(self.line, message))
-
-    def _raise(self) -> None:
-        line, message = self.errors[0]
-        more = f" (and {len(self.errors) - 1} more)" if len(self.errors) > 1 else ""
-        raise ProgramError(f"{self.name}, line {line}: {message}{more}",
-                           subjects=tuple(f"line {n}" for n, _ in self.errors), measured=[m for _, m in self.errors],
-                           remedy="correct the lines named, or leave out what a 3-axis reader does not know")
-
     # ---------------------------------------------------------------- one block
 
-    def _run(self, words: list[tuple[str, str]]) -> None:
-        codes: list[float] = []
-        ms: list[int] = []
-        values: dict[str, float] = {}
-        for letter, text in words:
-            number = float(text)
-            if letter == "G":
-                codes.append(round(number, 1))
-            elif letter == "M":
-                if number not in _KNOWN_M:
-                    return self._error(f"unknown word M{text}")
-                ms.append(int(number))
-            elif letter in "NO":
-                continue
-            elif letter in "XYZIJKRPQLFSTHD":
-                if letter in values:
-                    return self._error(f"the word {letter} stands twice")
-                values[letter] = number
-            else:
-                return self._error(f"unknown word {letter}{text}")
-        if "S" in values:
-            self.s.speed = values["S"]
-        if "T" in values:
-            self._select(int(values["T"]))
-        self._spindle(ms)
-        if not self._modal(codes, values):
-            return None
-        if "F" in values:
-            self.s.feed = values["F"] * (1.0 if self.s.feed_mode == 93 else self.s.scale)
-        self._move(codes, values)
-        if 5 in ms:
-            self.s.spindle = False
-        if 2 in ms or 30 in ms:
+    def _block(self, text: str) -> None:
+        """Run one block. Order as on the control: speed, tool, spindle, modes, feed, motion, end."""
+        before = len(self.log.errors)
+        try:
+            block = parse_block(text)
+            self._run(block)
+        except BlockError as problem:
+            return self.log.error(str(problem))
+        if block.deleted:
+            self.log.remark("block_delete", "a block with / depends on a switch of the machine; it is taken as run")
+        if len(self.log.errors) == before:
+            self._name_unused(block)
+        if 2 in block.ms or 30 in block.ms:
             self.s.ended = True
         return None
 
+    def _run(self, block: Block) -> None:
+        s, values = self.s, block.values
+        if "S" in values:
+            s.speed = values["S"]
+            if s.speed < 0:
+                self.log.remark("speed", f"S{s.speed:g} is no spindle speed", self.log.line)
+        if "T" in values:
+            self._select(int(values["T"]))
+        self._spindle(block.ms)
+        for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it
+            self._mode(g, values)
+        if 64 in block.codes:
+            self._blending(values)
+        if "F" in values:
+            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
+        self._move(block)
+
+    def _name_unused(self, block: Block) -> None:
+        s = self.s
+        moves = not {28, 30, 53} & set(block.codes) and (not {"X", "Y", "Z"}.isdisjoint(block.values)
+                                                         or s.motion in (2, 3))
+        used = used_letters(block, s.motion, moves)
+        idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
+        if idle:
+            self.log.remark("unused", f"no code of this block takes {', '.join(idle)}", self.log.line)
+
     def _select(self, number: int) -> None:
         if self.tools is not None and number not in self.tools and number != 0:
-            self._error(f"T{number} is not in the tool table")
+            self.log.error(f"T{number} is not in the tool table")
         self.s.selected = number
 
     def _spindle(self, ms: list[int]) -> None:
@@ -268,72 +175,110 @@ class Reader:
             if s.selected != s.tool:
                 s.position[2] = NAN
             s.tool, s.spindle = s.selected, False
-        if 3 in ms:
+        if 3 in ms or 4 in ms:
             s.spindle = True
         if 4 in ms:
-            s.spindle = True
-            self._remark("m4", "M4 turns the spindle backwards")
+            self.log.remark("m4", "M4 turns the spindle backwards")
+        if 5 in ms:  # LinuxCNC stops the spindle before the motion of the block
+            s.spindle = False
 
-    def _modal(self, codes: list[float], values: dict[str, float]) -> bool:
-        """Apply every G word that sets a state; False where the block cannot be run."""
+    def _mode(self, g: float, values: dict[str, float]) -> None:
+        """Apply one G word that sets a state."""
         s = self.s
-        for g in codes:
-            if g in _MOTION:
-                s.motion = g
-                if g == 80:
-                    s.cycle = {}
-            elif g in (17, 18, 19):
-                s.plane = int(g)
-            elif g in (20, 21):
-                s.scale = INCH if g == 20 else 1.0
-            elif g in (90, 91):
-                s.relative = g == 91
-            elif g in (90.1, 91.1):
-                s.centre_absolute = g == 90.1
-            elif g in (93, 94, 95):
-                s.feed_mode = int(g)
-                s.feed = NAN
-            elif g in (98, 99):
-                s.retract_to_r = g == 99
-            elif g == 43:
-                self._length_offset(values)
-            elif g == 49:
-                s.offset = None
-            elif g in _OFFSETS:
-                s.work_offset = _OFFSETS[g]
-                if s.work_offset != self.work_offset:
-                    self._remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
-                                 f"({self.work_offset})", s.work_offset)
-            elif g not in _IGNORED_G and g not in (4, 28, 30, 53):
-                hint = _UNKNOWN_G_HINT.get(g)
-                self._error(f"unknown word G{g:g}" + (f" ({hint})" if hint else ""))
-                return False
-        return True
+        if g in MOTION_CODES:
+            self._motion(g)
+        elif g in (17, 18, 19):
+            s.plane = int(g)
+        elif g in (20, 21):
+            self._unit(int(g))
+        elif g in (90, 91):
+            self._distance(g == 91)
+        elif g in (90.1, 91.1):
+            s.centre_absolute = g == 90.1
+        elif g in (93, 94, 95):
+            s.feed_mode = int(g)
+            s.feed = NAN
+        elif g in (98, 99):
+            s.retract_to_r = g == 99
+        elif g == 43:
+            self._length_offset(values)
+        elif g == 49:
+            s.offset = None
+        elif g in WORK_OFFSETS:
+            s.work_offset = WORK_OFFSETS[g]
+            if s.work_offset != self.work_offset:
+                self.log.remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
+                                f"({self.work_offset})", s.work_offset)
+
+    def _motion(self, g: float) -> None:
+        """A cycle begun anew keeps nothing of the one before."""
+        s = self.s
+        if s.motion not in CYCLES:
+            s.cycle = {}
+        s.motion = g
+
+    def _unit(self, g: int) -> None:
+        s = self.s
+        scale = INCH if g == 20 else 1.0
+        if scale != s.scale and (self.log.moved or any(v == v for v in s.position)):
+            self.log.remark("unit", f"G{g} changes the unit in the middle of the program", self.log.line)
+        s.scale = scale
+
+    def _distance(self, relative: bool) -> None:
+        """Enter or leave incremental coordinates.
+
+        Incremental moves are simulated exactly, and a program that states a place and then runs in G91 is right.
+        A G91 after cuts in absolute coordinates which no G90 follows is a slip far more often than meant, and what
+        it breaks may show hundreds of lines later: ``read`` puts a remark on its line. One that is turned back
+        needs none, its moves are known.
+        """
+        s = self.s
+        if relative == s.relative:
+            return
+        feeds = self.log.take_feeds()
+        if relative:
+            self.cut_absolute |= feeds
+            self.incremental_line, self.incremental_after_cuts = self.log.line, self.cut_absolute
+            self.incremental_moved = False
+        s.relative = relative
 
     def _length_offset(self, values: dict[str, float]) -> None:
         s = self.s
         s.offset = int(values["H"]) if "H" in values else s.tool
         if s.offset != s.tool:
-            self._remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle", self.line)
+            self.log.remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle",
+                            self.log.line)
+
+    def _blending(self, values: dict[str, float]) -> None:
+        """G64: the control may leave the path by P (0 and none: without bound) and by Q of its own line fitting."""
+        limit = self.blend_limit
+        p, q = values.get("P", 0.0) * self.s.scale, values.get("Q", 0.0) * self.s.scale
+        if p == 0:
+            self.log.remark("blending", f"G64 without a P above 0 lets the control leave the path by any amount (limit "
+                            f"P{limit:g} mm)", self.log.line)
+        elif not 0 < p <= limit + 1e-12:
+            self.log.remark("blending", f"G64 P{values['P']:g} lets the control leave the path by {p:g} mm (limit "
+                            f"{limit:g} mm)", self.log.line)
+        if not 0 <= q <= limit + 1e-12:
+            self.log.remark("line_fitting", f"G64 Q{values['Q']:g} lets the control leave the path by {q:g} mm (limit "
+                            f"{limit:g} mm)", self.log.line)
 
     # ---------------------------------------------------------------- motion
 
-    def _move(self, codes: list[float], values: dict[str, float]) -> None:
-        s = self.s
+    def _move(self, block: Block) -> None:
+        s, values = self.s, block.values
         axes = [values.get(a) for a in "XYZ"]
-        if 4 in codes:
-            if "P" not in values:
-                return self._error("G4 needs P")
-            self.dwell += values["P"]
-            return None
-        if 53 in codes or 28 in codes or 30 in codes:
-            return self._machine_move(codes, axes)
+        if 4 in block.codes:
+            return self._wait(axes, values)
+        if not {28, 30, 53}.isdisjoint(block.codes):
+            return self._machine_move(53 in block.codes, axes)
         full_circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
         if all(a is None for a in axes) and not full_circle:
             return None
         if s.motion is None or s.motion == 80:
-            return self._error("coordinates without a motion word")
-        if s.motion in _CYCLES:
+            return self.log.error("coordinates without a motion word")
+        self.incremental_moved = True
+        if s.motion in CYCLES:
             return self._cycle(axes, values)
         target = self._target(axes)
         if s.motion == 0:
@@ -346,35 +291,64 @@ class Reader:
             return self._line_to(target, FEED, self._rate(feed, [s.position, target]))
         return self._arc(target, values, feed)
 
+    def _wait(self, axes: list[float | None], values: dict[str, float]) -> None:
+        if "P" not in values:
+            return self.log.error("G4 needs P")
+        if values["P"] < 0:
+            return self.log.error(f"G4 P{values['P']:g} waits a negative time")
+        if any(a is not None for a in axes):
+            return self.log.error("coordinates in a block with G4: some controls move, some wait")
+        self.dwell += values["P"]
+        return None
+
     def _target(self, axes: list[float | None]) -> list[float]:
         s = self.s
+        if s.relative:
+            for letter, a, p in zip("XYZ", axes, s.position, strict=True):
+                if a and math.isnan(p):
+                    self.log.remark("incremental_unknown", f"an incremental move ({letter}{a:g}, G91 of line "
+                                    f"{self.incremental_line}) from a place the program has not stated")
         return [p if a is None else (p + a * s.scale if s.relative else a * s.scale)
                 for a, p in zip(axes, s.position, strict=True)]
 
-    def _machine_move(self, codes: list[float], axes: list[float | None]) -> None:
-        """G28 and G30 pass a programmed point, then the axes named (all without any) are unknown; so after G53."""
+    def _machine_move(self, absolute: bool, axes: list[float | None]) -> None:
+        """G28 and G30 pass a programmed point, then the axes named (all without any) are unknown; so after G53.
+
+        Only home is known to lie above everything: another Z of G53 is remarked, and so is a way in X or Y to a
+        place of the machine's own before Z is home.
+        """
         s = self.s
         named = [a is not None for a in axes]
-        if 53 in codes:
-            if s.motion not in (0, 1):
-                return self._error("G53 needs G0 or G1")
+        if absolute:
+            if s.motion != 0:
+                return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
+            if axes[2]:
+                self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height the proof does not know; only "
+                                "Z0, home, is taken to be above everything", self.log.line)
+            if s.relative and any(named):
+                self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
+                                "differently", self.log.line)
         elif any(named):
             self._line_to(self._target(axes), RAPID, NAN)
         else:
             named = [True] * 3
+        if (named[0] or named[1]) and not math.isnan(s.position[2]):
+            self.log.remark("machine_way", f"X or Y goes to a place of the machine's own from Z{s.position[2]:g}, a "
+                            "way the proof cannot see: send Z home first", self.log.line)
         s.position = [NAN if n else p for n, p in zip(named, s.position, strict=True)]
+        s.parked |= named[0] or named[1]
         return None
 
     def _feed(self, values: dict[str, float]) -> float | None:
         s = self.s
         feed = values.get("F", NAN) if s.feed_mode == 93 else s.feed
         if not feed > 0:
-            self._error("inverse time feed (G93) needs F on every line" if s.feed_mode == 93
-                        else "a feed move without a feed (F)")
+            self.log.error("inverse time feed (G93) needs F on every line" if s.feed_mode == 93
+                           else "a feed move without a feed (F)")
             return None
         if s.feed_mode == 95:
-            if s.speed <= 0:
-                self._error("feed per turn (G95) without a spindle speed")
+            if not s.speed > 0:
+                self.log.error("feed per turn (G95) without a spindle speed")
                 return None
             return feed * s.speed
         return feed
@@ -386,115 +360,123 @@ class Reader:
         return feed * sum(math.dist(a, b) for a, b in itertools.pairwise(points))
 
     def _check_cutting(self, target: list[float]) -> None:
-        s = self.s
+        s, remark = self.s, self.log.remark
         if s.tool == 0:
-            self._remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before)")
+            remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before)")
         if s.offset is None:
-            self._remark("offset_off", f"a feed move with the length offset off (no G43 H{s.tool})", s.tool)
+            remark("offset_off", f"a feed move with the length offset off (no G43 H{s.tool})", s.tool)
         elif s.offset != s.tool:
-            self._remark("offset_stale", f"a feed move with length offset H{s.offset} and tool T{s.tool}",
-                         (s.offset, s.tool))
-        if not s.spindle:
-            self._remark("spindle", "a feed move with the spindle standing", s.tool)
+            remark("offset_stale", f"a feed move with length offset H{s.offset} and tool T{s.tool}", (s.offset, s.tool))
+        if not s.turning:
+            why = "no M3" if not s.spindle else "no S given" if math.isnan(s.speed) else f"S{s.speed:g}"
+            remark("spindle", f"a feed move with the spindle standing ({why})", (s.tool, why))
         if any(math.isnan(v) for v in target):
-            self._remark("unknown", "a feed move from a place the program has not stated")
+            remark("unknown", "a feed move from a place the program has not stated")
 
     def _line_to(self, target: list[float], kind: int, feed: float) -> None:
         s = self.s
         start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
         was, s.position = s.position, target
-        if kind == RAPID and s.offset is None and s.tool > 0 and target[2] == target[2] and was[2] != target[2]:
-            self._remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
-        if not any(math.isnan(v) for v in target):
-            self.rows.append((*start, *target, kind, feed, s.tool, self.line))  # type: ignore[arg-type]
+        level = target[2] == target[2] and was[2] != target[2]
+        if kind == RAPID and s.offset is None and s.tool > 0 and level:
+            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+        known = not any(math.isnan(v) for v in target)
+        if s.parked and level and not known:
+            self.log.remark("parked", "Z comes down where the machine's own coordinates left X or Y: state X and Y "
+                            "first", self.log.line)
+        s.parked &= math.isnan(target[0]) or math.isnan(target[1])
+        if known:
+            if len(self.log.rows) >= Log.full:
+                self.log.flush()
+            self.log.rows.append((*start, *target, kind, feed, s.tool, self.log.line))  # type: ignore[arg-type]
 
     def _arc(self, target: list[float], values: dict[str, float], feed: float) -> None:
-        s = self.s
+        s, error = self.s, self.log.error
         if any(math.isnan(v) for v in s.position):
-            return self._error("an arc from a place the program has not stated")
+            return error("an arc from a place the program has not stated")
         axes = PLANE_AXES[s.plane]
         start, end = np.array(s.position), np.array(target)
         letters = ["IJK"[axes[0]], "IJK"[axes[1]]]
+        turns = whole(values, "P", 1)
         try:
             if "R" in values:
                 centre = centre_from_radius(start, end, values["R"] * s.scale, s.motion == 2, axes)
             elif any(c in values for c in letters):
                 offset = np.array([values.get(c, 0.0) * s.scale for c in letters])
                 if s.centre_absolute and not all(c in values for c in letters):
-                    return self._error(f"absolute arc centres (G90.1) need both {letters[0]} and {letters[1]}")
+                    return error(f"absolute arc centres (G90.1) need both {letters[0]} and {letters[1]}")
                 centre = offset if s.centre_absolute else start[list(axes[:2])] + offset
             else:
-                return self._error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
-            if "IJK"[axes[2]] in values and values["IJK"[axes[2]]] != 0 and "R" not in values:
-                return self._error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
-            points = arc_points(start, end, centre, s.motion == 2, axes, max(1, int(values.get("P", 1)))).tolist()
+                return error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
+            if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
+                return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
+            points = arc_points(start, end, centre, s.motion == 2, axes, turns, most=MOST_MOVES_A_BLOCK).tolist()
+        except ArcTooLong as problem:
+            return self.log.room(problem.points)
         except ArcError as problem:
-            return self._error(str(problem))
+            return error(str(problem))
+        self.log.room(len(points))
         rate = self._rate(feed, [s.position, *points])
         for p in points:
             self._line_to(p, FEED, rate)
         return None
 
-    # ---------------------------------------------------------------- drilling cycles
-
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """G81, G82, G83, G73 in the XY plane, written out as rapids and feeds."""
-        s = self.s
+        s, error = self.s, self.log.error
         if s.plane != 17:
-            return self._error(f"a drilling cycle in plane G{s.plane}")
+            return error(f"a drilling cycle in plane G{s.plane}")
         s.cycle.update({k: values[k] for k in "RQP" if k in values})
         if axes[2] is not None:
             s.cycle["Z"] = axes[2]
         missing = [k for k in ("Z", "R", *(("Q",) if s.motion in (73, 83) else ())) if k not in s.cycle]
         if missing:
-            return self._error(f"a drilling cycle without {', '.join(missing)}")
-        if any(math.isnan(v) for v in (s.position[2],)):
-            return self._error("a drilling cycle from a height the program has not stated")
+            return error(f"a drilling cycle without {', '.join(missing)}")
+        if math.isnan(s.position[2]):
+            return error("a drilling cycle from a height the program has not stated")
+        if s.cycle.get("P", 0.0) < 0:
+            return error(f"P{s.cycle['P']:g} waits a negative time")
         feed = self._feed(values)
+        repeats = whole(values, "L" if "L" in values else "K", 1)
         if feed is None:
             return None
-        for _ in range(max(1, int(values.get("L", values.get("K", 1))))):
-            self._drill(self._target([axes[0], axes[1], None]), feed)
+        for _ in range(repeats):
+            hole = self._hole()
+            if hole is None:
+                return None
+            self.log.room(repeats * hole.moves)
+            at = self._target([axes[0], axes[1], None])
+            self._check_cutting(at)
+            for point, kind in hole_moves(hole, s.position, at[0], at[1]):
+                self._line_to(point, kind, feed if kind == FEED else NAN)
+            self.dwell += 0.0 if s.motion == 81 else s.cycle.get("P", 0.0)
         return None
 
-    def _drill(self, at: list[float], feed: float) -> None:
+    def _hole(self) -> Hole | None:
+        """The hole of the cycle in force from the present height."""
         s = self.s
         top = s.position[2]
-        clear = top + s.cycle["R"] * s.scale if s.relative else s.cycle["R"] * s.scale
-        bottom = clear + s.cycle["Z"] * s.scale if s.relative else s.cycle["Z"] * s.scale
+        clear = s.cycle["R"] * s.scale + (top if s.relative else 0.0)
+        bottom = s.cycle["Z"] * s.scale + (clear if s.relative else 0.0)
         if bottom > clear:
-            return self._error("the drilling depth Z lies above R")
-        x, y = at[0], at[1]
-        self._check_cutting(at)
-        if clear > top:
-            self._line_to([s.position[0], s.position[1], clear], RAPID, NAN)
-        self._line_to([x, y, s.position[2]], RAPID, NAN)
-        self._line_to([x, y, clear], RAPID, NAN)
-        peck = abs(s.cycle.get("Q", 0.0)) * s.scale if s.motion in (73, 83) else clear - bottom
+            self.log.error("the drilling depth Z lies above R")
+            return None
+        pecking = s.motion in (73, 83)
+        peck = abs(s.cycle["Q"]) * s.scale if pecking else max(clear - bottom, 1e-9)
         if peck <= 0 and clear > bottom:
-            return self._error("a drilling cycle with Q0 never ends")
-        depth = clear
-        while depth > bottom + 1e-9:
-            depth = max(depth - peck, bottom)
-            self._line_to([x, y, depth], FEED, feed)
-            if depth > bottom + 1e-9:
-                back = clear if s.motion == 83 else depth + 0.25
-                self._line_to([x, y, back], RAPID, NAN)
-                if s.motion == 83:
-                    self._line_to([x, y, min(depth + 0.25, clear)], RAPID, NAN)
-        if s.motion == 82:
-            self.dwell += s.cycle.get("P", 0.0)
-        self._line_to([x, y, clear if s.retract_to_r else max(top, clear)], RAPID, NAN)
-        return None
+            self.log.error("a drilling cycle with Q0 never ends")
+            return None
+        return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83)
 
 
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
-                 work_offset: str = "G54") -> Program:
+                 work_offset: str = "G54", blend_limit: float = BLEND_LIMIT) -> Program:
     """Read a 3-axis program.
 
     text        : the program
     tools       : T numbers of the tool table; any number is accepted when None
     work_offset : the one of the setup, for example 'G54'
+    blend_limit : mm, what path blending (G64 P, Q) may leave the path by without a remark
 
     Returns
     -------
@@ -504,9 +486,15 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     Raises
     ------
     ProgramError
-        With every line that cannot be read: unknown words, a feed move without a feed, an arc without a
-        centre or whose ends lie on two circles, a tool that is not in the table, a program that breaks off.
+        With every line that cannot be read: unknown words, two words of one modal group, a feed move without a
+        feed, an arc without a centre or whose ends lie on two circles, a tool that is not in the table, a program
+        that breaks off.
+    VerificationError
+        Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000.
     """
     if "\x00" in text:
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
-    return Reader(name, tools, work_offset).read(text)
+    return Reader(name, tools, work_offset, blend_limit).read(text)
+
+
+__all__ = ["FEED", "RAPID", "Program", "Reader", "Remark", "read_program"]

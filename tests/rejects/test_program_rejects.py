@@ -37,7 +37,7 @@ TAIL = "M30\n%\n"
     ("G93 G1 X5 F2\nX6\n", "needs F on every line"),
     ("G95 S0\nG1 X5 F0.1\n", "without a spindle speed"),
     ("G4\n", "G4 needs P"),
-    ("G53 G2 X1 Y1 R1\n", "G53 needs G0 or G1"),
+    ("G53 G2 X1 Y1 R1\n", "G53 needs G0"),
 ])
 def test_named_with_its_line(body, message):
     with pytest.raises(ProgramError) as caught:

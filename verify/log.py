@@ -1,0 +1,116 @@
+"""What a reading writes down: moves, remarks, errors, each with its line, none of them without bound."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.errors import ProgramError, VerificationError
+from geometry.mesh import F64
+from verify.cycles import FEED
+from verify.program import Remark
+
+MAX_ERRORS = 20
+MAX_REMARKS = 20
+MOST_MOVES = 5_000_000
+MOST_MOVES_A_BLOCK = 200_000
+_CHUNK = 65_536
+Row = tuple[float, float, float, float, float, float, int, float, int, int]
+
+
+class Log:
+    """Notes of one reading.
+
+    name : of the program
+    line : 1-based, the one being read
+    rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
+    """
+
+    full = _CHUNK
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.line = 0
+        self.rows: list[Row] = []
+        self.errors: list[tuple[int, str]] = []
+        self._remarks: dict[tuple[str, object], Remark] = {}
+        self._count: dict[str, int] = {}
+        self._chunks: list[F64] = []
+        self._moves = 0
+        self._feeds = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether any move was written."""
+        return bool(self.rows) or self._moves > 0
+
+    def error(self, message: str, line: int | None = None) -> None:
+        """Note a line that cannot be read; the present one where ``line`` is None."""
+        self.errors.append((line or self.line, message))
+
+    def remark(self, key: str, message: str, detail: object = None, line: int | None = None) -> None:
+        """Note what should not be run, once for each key and detail; of one key 20 are kept and the rest counted."""
+        if (key, detail) in self._remarks:
+            return
+        self._count[key] = self._count.get(key, 0) + 1
+        if self._count[key] <= MAX_REMARKS:
+            self._remarks[key, detail] = Remark(line or self.line, message)
+
+    def remarks(self) -> tuple[Remark, ...]:
+        """All remarks by line; the last kept of a key says how many more there are."""
+        kept = {key: max((r for (k, _), r in self._remarks.items() if k == key), key=lambda r: r.line)
+                for key, n in self._count.items() if n > MAX_REMARKS}
+        more = {id(r): f" (and {self._count[key] - MAX_REMARKS} more such lines)" for key, r in kept.items()}
+        return tuple(sorted((Remark(r.line, r.message + more.get(id(r), "")) for r in self._remarks.values()),
+                            key=lambda r: (r.line, r.message)))
+
+    def room(self, moves: float) -> None:
+        """Refuse a block of ``moves`` moves that would be too long, before it is written out.
+
+        Raises
+        ------
+        VerificationError
+            Code program_too_long: over 200 000 moves in the block or 5 000 000 in the program.
+        """
+        if moves > MOST_MOVES_A_BLOCK:
+            self._too_long(f"one block makes {moves:.6g} moves", moves, MOST_MOVES_A_BLOCK, self.line)
+        if self._moves + len(self.rows) + moves > MOST_MOVES:
+            self._too_long("the program makes too many moves", self._moves + len(self.rows) + moves, MOST_MOVES,
+                           self.line)
+
+    def flush(self) -> None:
+        """Pack the latest moves; refuses the program as ``room`` does where they are too many by now."""
+        if not self.rows:
+            return
+        self._moves += len(self.rows)
+        if self._moves > MOST_MOVES:
+            self._too_long("the program makes too many moves", self._moves, MOST_MOVES, self.rows[-1][9])
+        chunk = np.array(self.rows, dtype=np.float64)
+        self._feeds |= bool((chunk[:, 6] == FEED).any())
+        self._chunks.append(chunk)
+        self.rows.clear()
+
+    def take_feeds(self) -> bool:
+        """Whether any feed move was written since the last call."""
+        self.flush()
+        feeds, self._feeds = self._feeds, False
+        return feeds
+
+    def table(self) -> F64:
+        """(m, 10) float64, mm: all rows."""
+        self.flush()
+        return np.concatenate(self._chunks) if self._chunks else np.zeros((0, 10))
+
+    def raise_errors(self) -> None:
+        """Raise ProgramError where a line could not be read."""
+        if not self.errors:
+            return
+        line, message = self.errors[0]
+        more = f" (and {len(self.errors) - 1} more)" if len(self.errors) > 1 else ""
+        raise ProgramError(f"{self.name}, line {line}: {message}{more}",
+                           subjects=tuple(f"line {n}" for n, _ in self.errors), measured=[m for _, m in self.errors],
+                           remedy="correct the lines named, or leave out what a 3-axis reader does not know")
+
+    def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:
+        raise VerificationError(f"{self.name}, line {line}: {what}, and {limit} are allowed", code="program_too_long",
+                                subjects=(f"line {line}",), measured=moves, limit=limit,
+                                remedy="correct the turns, radius, peck or repeats of the line, or split the program")

@@ -1,0 +1,85 @@
+"""What a reading gives, and the modal state it keeps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32
+
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something readable that should not be run: where and what."""
+
+    line: int
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A program as straight moves of the tool tip in the setup frame.
+
+    name    : of the program
+    start, end : (m, 3) float64, mm; an axis whose start is unknown starts where it ends
+    kind    : (m,) int8, RAPID or FEED (arcs are FEED polylines within 1e-3 mm)
+    feed    : (m,) float64, mm/min; nan for rapids
+    tool    : (m,) int32, T number in the spindle, 0 for none
+    line    : (m,) int32, 1-based line of the source
+    dwell   : s of G4 and drilling dwells
+    lines   : number of lines read
+    remarks : what should not be run
+    """
+
+    name: str
+    start: F64
+    end: F64
+    kind: NDArray[np.int8]
+    feed: F64
+    tool: I32
+    line: I32
+    dwell: float
+    lines: int
+    remarks: tuple[Remark, ...]
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+@dataclass
+class State:
+    """Everything modal.
+
+    position  : mm, nan where the program has not stated it or a machine move left it
+    speed     : as S, nan before the first
+    parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
+    """
+
+    position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
+    motion: float | None = None
+    plane: int = 17
+    scale: float = 1.0
+    relative: bool = False
+    centre_absolute: bool = False
+    feed_mode: int = 94
+    feed: float = NAN
+    speed: float = NAN
+    spindle: bool = False
+    selected: int = 0
+    tool: int = 0
+    offset: int | None = None
+    work_offset: str = "G54"
+    retract_to_r: bool = False
+    cycle: dict[str, float] = field(default_factory=dict)
+    parked: bool = False
+    ended: bool = False
+
+    @property
+    def turning(self) -> bool:
+        """Whether the spindle runs."""
+        return self.spindle and self.speed > 0

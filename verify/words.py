@@ -1,0 +1,170 @@
+"""Text of one block to its words, and what may stand together in it.
+
+A block whose text a control could read in two ways is refused here: two words of one modal group, a number cut off by a
+whole-number address, a letter or digit that is not ASCII.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+
+MOTION_CODES = frozenset({0, 1, 2, 3, 80, 73, 81, 82, 83})
+CYCLES = frozenset({73, 81, 82, 83})
+WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
+                59.3: "G59.3"}
+LARGEST = 1e15
+"""The largest number a word may hold: above it whole millimetres are no longer told apart."""
+
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
+# at most 15 digits before the point, so whatever this matches is finite; longer numbers take the slow way and are named
+_SHORT = r"[+-]?(?:[0-9]{1,15}\.?[0-9]*|\.[0-9]+)"
+STRAIGHT = re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?(?:X({_SHORT}) ?)?(?:Y({_SHORT}) ?)?(?:Z({_SHORT}) ?)?"
+                      rf"(?:F({_SHORT}) ?)?\r?").fullmatch
+_WORD = re.compile(rf"([A-Z])({NUMBER})")
+_COMMENT = re.compile(r"\([^()]*\)")
+_FOREIGN = re.compile(r"[^\t -~]")
+_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+_WHOLE = "THDLM"
+
+# The modal groups of RS274: a control refuses two words of one, or takes the last; G80 has a group of its own on Fanuc.
+_G_GROUPS: tuple[frozenset[float], ...] = (
+    frozenset({4, 28, 30, 53}), MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}), frozenset({90, 91}),
+    frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}), frozenset({43, 49}), frozenset({98, 99}),
+    frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}), frozenset({50}),
+    frozenset({69}),
+)
+_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
+                                           frozenset({7, 8, 9}))
+_G_CODES = frozenset().union(*_G_GROUPS)
+_HINTS = {
+    10: "a changed offset table", 41: "cutter radius compensation", 42: "cutter radius compensation",
+    43.4: "tool centre point control", 43.5: "tool centre point control", 52: "a shifted origin",
+    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 92: "a shifted origin",
+}
+
+
+class BlockError(ValueError):
+    """A block that cannot be read, or could be read in two ways; the reader adds the line."""
+
+
+@dataclass
+class Block:
+    """Words of one block.
+
+    codes   : G words in the order written
+    ms      : M words
+    values  : number of every other letter but N, as written (units and modes of the program)
+    deleted : whether it begins with the block delete sign /
+    """
+
+    codes: list[float] = field(default_factory=list)
+    ms: list[int] = field(default_factory=list)
+    values: dict[str, float] = field(default_factory=dict)
+    deleted: bool = False
+
+
+def parse_block(text: str) -> Block:
+    """Words of one line of a program; comments, blank lines and Fanuc O numbers give an empty block.
+
+    Raises
+    ------
+    BlockError
+        Text that is no word, an open comment, a character outside ASCII, an unknown word, a letter that stands twice,
+        two words of one modal group, a fraction where the address takes whole numbers, a number above 1e15.
+    """
+    text = _COMMENT.sub(" ", text).split(";", 1)[0]
+    if "(" in text or ")" in text:
+        raise BlockError("a comment is not closed")
+    if strange := _FOREIGN.search(text.strip()):
+        raise BlockError(f"a character that is no part of a word: {ascii(strange.group())}")
+    text = "".join(text.upper().split())
+    block = Block(deleted=text.startswith("/"))
+    text = text[1:] if block.deleted else text
+    if text.startswith("O"):
+        if re.fullmatch(r"O[0-9]+", text):
+            return block
+        raise BlockError(f"cannot read the subroutine or macro word '{text[:40]}'")
+    words = _WORD.findall(text)
+    if "".join(a + b for a, b in words) != text:
+        raise BlockError(f"cannot read '{text[:60]}'")
+    for letter, digits in words:
+        _add(block, letter, digits)
+    _check_groups("G", block.codes, _G_GROUPS)
+    _check_groups("M", block.ms, _M_GROUPS)
+    return block
+
+
+def _add(block: Block, letter: str, digits: str) -> None:
+    number = float(digits)
+    if not abs(number) <= LARGEST:
+        raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, beyond {LARGEST:g}")
+    if letter == "G":
+        if number not in _G_CODES:
+            hint = _HINTS.get(number)
+            name = digits if "." in digits else f"{number:g}"
+            raise BlockError(f"unknown word G{name}" + (f" ({hint})" if hint else ""))
+        block.codes.append(number)
+        return
+    if letter == "N":
+        return
+    if letter not in "XYZIJKRPQLFSTHDM":
+        raise BlockError(f"unknown word {letter}{digits}")
+    if letter in _WHOLE and (number != int(number) or number < 0):
+        raise BlockError(f"unknown word {letter}{digits}: {letter} takes a whole number from 0")
+    if letter == "M":
+        if number not in _M_CODES:
+            raise BlockError(f"unknown word M{digits}")
+        block.ms.append(int(number))
+    elif letter in block.values:
+        raise BlockError(f"the word {letter} stands twice")
+    else:
+        block.values[letter] = number
+
+
+def _check_groups(letter: str, codes: list[float] | list[int], groups: tuple[frozenset[float], ...]) -> None:
+    if len(codes) < 2:
+        return
+    for group in groups:
+        found = [c for c in codes if c in group]
+        if len(found) > 1:
+            names = " and ".join(f"{letter}{c:g}" for c in found)
+            raise BlockError(f"{names} in one block: words of one modal group, and controls differ in which one counts")
+
+
+def used_letters(block: Block, motion: float | None, moves: bool) -> str:
+    """Letters that some code of the block takes a number for.
+
+    motion : G number in force
+    moves  : whether the block makes a move of that motion
+    """
+    used = "XYZFST"
+    if 43 in block.codes:
+        used += "H"
+    if 64 in block.codes:
+        used += "PQ"
+    if 4 in block.codes:
+        return used + "P"
+    if not moves:
+        return used
+    if motion in (2, 3):
+        return used + ("RP" if "R" in block.values else "IJKP")
+    if motion in CYCLES:
+        used += "R" + ("L" if "L" in block.values else "K")
+        return used + {81: "", 82: "P"}.get(int(motion or 0), "PQ")
+    return used
+
+
+def whole(values: dict[str, float], letter: str, otherwise: int) -> int:
+    """The whole number from 1 of a count such as turns or repeats; ``otherwise`` where the letter is absent.
+
+    Raises
+    ------
+    BlockError
+        A fraction, zero or a negative number.
+    """
+    number = values.get(letter, float(otherwise))
+    if number < 1 or math.modf(number)[0] != 0:
+        raise BlockError(f"{letter}{number:g} is no count: {letter} takes a whole number from 1")
+    return int(number)
