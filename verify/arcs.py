@@ -54,15 +54,15 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     most       : points at most
 
     Returns (k, 3) float64, mm, the last row equal to ``end``. Equal ends in the plane make a full circle.
-    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %, ArcTooLong where ``most`` would not do,
-    before any memory is taken.
+    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %, or 0.5 mm; ArcTooLong, before any
+    memory is taken, where ``most`` would not do.
     """
     i, j, k = axes
     u, v = start[[i, j]] - centre, end[[i, j]] - centre
     r0, r1 = float(np.hypot(*u)), float(np.hypot(*v))
     if r0 < 1e-9:
         raise ArcError("the centre of the arc lies on its start")
-    if abs(r0 - r1) > max(0.01, 1e-3 * r0):
+    if abs(r0 - r1) > min(max(0.01, 1e-3 * r0), 0.5):
         raise ArcError(f"start and end lie {abs(r0 - r1):.4g} mm off one circle (radii {r0:g} and {r1:g})")
     a0 = math.atan2(u[1], u[0])
     sweep = math.atan2(v[1], v[0]) - a0

@@ -81,9 +81,10 @@ class Log:
         """Pack the latest moves; refuses the program as ``room`` does where they are too many by now."""
         if not self.rows:
             return
+        if self._moves + len(self.rows) > MOST_MOVES:
+            self._too_long("the program makes too many moves", self._moves + len(self.rows), MOST_MOVES,
+                           self.rows[MOST_MOVES - self._moves][9])
         self._moves += len(self.rows)
-        if self._moves > MOST_MOVES:
-            self._too_long("the program makes too many moves", self._moves, MOST_MOVES, self.rows[-1][9])
         chunk = np.array(self.rows, dtype=np.float64)
         self._feeds |= bool((chunk[:, 6] == FEED).any())
         self._chunks.append(chunk)
@@ -112,5 +113,5 @@ class Log:
 
     def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:
         raise VerificationError(f"{self.name}, line {line}: {what}, and {limit} are allowed", code="program_too_long",
-                                subjects=(f"line {line}",), measured=moves, limit=limit,
+                                subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
                                 remedy="correct the turns, radius, peck or repeats of the line, or split the program")

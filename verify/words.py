@@ -19,7 +19,7 @@ LARGEST = 1e15
 
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 # at most 15 digits before the point, so whatever this matches is finite; longer numbers take the slow way and are named
-_SHORT = r"[+-]?(?:[0-9]{1,15}\.?[0-9]*|\.[0-9]+)"
+_SHORT = r"[+-]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)"
 STRAIGHT = re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?(?:X({_SHORT}) ?)?(?:Y({_SHORT}) ?)?(?:Z({_SHORT}) ?)?"
                       rf"(?:F({_SHORT}) ?)?\r?").fullmatch
 _WORD = re.compile(rf"([A-Z])({NUMBER})")

@@ -1,14 +1,23 @@
 """The NC reader: moves by hand, modal states, arcs, cycles."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from geometry.sampling import sample_surface
+from tests.pocket_case import SETUP, TOOL, ZONES, block, program
+from tests.pocket_case import text as joined
+from verify.log import Log
+from verify.model import FindingKind, ScoredSamples
+from verify.prove import prove
 from verify.reader import FEED, RAPID, read_program
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"
+_FEW = sample_surface(block().mesh, 1.0, seed=3)
+SAMPLES = ScoredSamples(_FEW, np.zeros(len(_FEW), np.int32))
 
 
 def read(body, **options):
@@ -116,6 +125,89 @@ def test_tool_change_needs_its_length_again():
 def test_remarks_name_what_should_not_run(body, word):
     p = read(body)
     assert any(word in r.message for r in p.remarks) and all(r.line >= 7 for r in p.remarks)
+
+
+@pytest.mark.parametrize("body, line, words", [
+    # path blending: bare and P0 are without bound, P and Q in the unit of the program
+    ("G64\n", 7, ("G64", "any amount", "0.01 mm")), ("G64 P0\n", 7, ("any amount",)),
+    ("G64 P1.0\n", 7, ("G64 P1", "1 mm", "limit 0.01 mm")), ("G64 P0.011\n", 7, ("0.011 mm",)),
+    ("G64 P-1\n", 7, ("G64 P-1",)), ("G64 P0.005 Q1\n", 7, ("G64 Q1",)),
+    # spindle
+    ("S0\nG1 Z1 F100\n", 8, ("spindle standing", "S0")), ("S0 M3\nG1 Z1 F100\n", 8, ("S0",)),
+    ("G1 Z1 F100\nS0\nZ2\n", 9, ("S0",)), ("M5 G1 Z1 F100\n", 7, ("no M3",)), ("G2 I5 S0 F100\n", 7, ("S0",)),
+    ("G81 X1 Y1 Z-1 R1 S0 F100\nG80\n", 7, ("S0",)), ("T2 M6\nG43 H2 Z5\nG1 Z1 F100\n", 9, ("no M3",)),
+    ("S-5\n", 7, ("S-5",)),
+    # machine coordinates: only home is above everything, and only from home may X and Y go to the machine's places
+    ("G53 G0 Z-200\n", 7, ("G53 Z-200",)), ("G53 G0 X0 Y0 Z0\n", 7, ("Z10", "home first")),
+    ("G53 G0 X5\n", 7, ("home first",)), ("G28\n", 7, ("home first",)),
+    ("G53 G0 Z0\nG53 G0 X0 Y0\nG0 Z5\nX1 Y1\n", 9, ("state X and Y",)), ("G91 G53 G0 Z0\nG90\n", 7, ("G91",)),
+    ("G53 G0 Z0\nG1 X5 F100\n", 8, ("not stated",)),
+    # unit
+    ("G20\nG0 Z1\n", 7, ("G20", "middle")),
+    # words no code takes
+    ("D1 L5 Q17\n", 7, ("D1, L5, Q17",)), ("G1 X1 K5 F100\n", 7, ("K5",)), ("X1 I5\n", 7, ("I5",)),
+    ("G1 X1 R9 P9 F100\n", 7, ("R9, P9",)), ("G0 X1\nX2 H1\n", 8, ("H1",)), ("G2 X10 R5 I5 F100\n", 7, ("I5",)),
+    ("G0 R5\n", 7, ("R5",)), ("G81 X1 Y1 Z-1 R1 Q2 F100\nG80\n", 7, ("Q2",)), ("G28 R1\n", 7, ("R1",)),
+    # incremental coordinates forgotten
+    ("G1 X1 F100\nG91\n" + "X1\n" * 50, 8, ("G91", "never turns back")),
+    ("G0 Z20\nT2 M6\nG43 H2 M3\nG91 G0 Z-5\nG90 Z20\n", 10, ("Z-5", "line 10", "not stated")),
+])
+def test_what_a_machine_might_do_otherwise_is_named_on_its_line(body, line, words):
+    assert [r for r in read(body).remarks if r.line == line and all(w in r.message for w in words)], read(body).remarks
+
+
+@pytest.mark.parametrize("body", [
+    "G64 P0.01\nG1 Z1 F100\n", "G61\n", "G61.1\n", "G64 P0.002 Q0.002\n", "G53 G0 Z0\nX5 Y5\nZ5\nG1 Z1 F100\n",
+    "G53 G0 Z0\nG53 G0 X0 Y0\nG0 X1 Y1\nZ5\n", "G91 G28 Z0\nG28 X0 Y0\nG90\nG0 X1 Y1\nZ5\n",
+    "G1 X1 F100\nG91 G28 Z0\n", "G91\nG1 X1 F100\nX1\n", "G1 X1 F100\nG91 X1\nG90 X5\n",
+    "G91\nG1 X1 F9\nG90 G0 X9\nG91\nG1 X1\n", "G80 G0 X1\n", "G0 G80 X1\n", "G17 G40 G49 G80 G90\nG43 H1\n",
+    "G2 X10 I5 K0 F100\n", "G2 I5 P3 F100\n", "G81 X1 Y1 Z-1 R1 K2 F100\nG80\n", "G73 X1 Y1 Z-1 R1 Q1 P1 F100\nG80\n",
+    "S500\nG1 X1 F100\n", "M7\nM8\nM9\n", "G21\n"])
+def test_harmless_habits_are_not_remarked(body):
+    assert read(body).remarks == ()
+
+
+def test_speed_never_given():
+    p = read_program("%\nG21 G90\nT1 M6\nM3\nG43 H1\nG0 X0 Y0\nZ5\nG1 Z1 F100\nM30\n%\n")
+    assert [(r.line, "no S given" in r.message) for r in p.remarks] == [(8, True)]
+
+
+def test_blending_limit_is_the_tolerance_of_the_setup():
+    assert read("G64 P0.02\n", blend_limit=0.03).remarks == ()
+    assert "0.001 mm" in read("G64 P0.002\n", blend_limit=0.001).remarks[0].message
+    lines = program()
+    lines.insert(2, "G64 P0.02")
+    found = {tolerance: prove([("a", joined(lines))], block(), (TOOL,), replace(SETUP, gouge_tolerance=tolerance),
+                              SAMPLES, ZONES).findings for tolerance in (0.01, 0.03)}
+    assert [(f.kind, f.line) for f in found[0.01]] == [(FindingKind.PROGRAM, 3)] and found[0.03] == ()
+
+
+def test_unit_in_force_scales_what_blending_may_take():
+    p = read_program("%\nG20 G90 G64 P0.001\nT1 M6\nM30\n%\n")
+    assert "0.0254 mm" in p.remarks[0].message and p.remarks[0].line == 2
+
+
+def test_remarks_of_one_kind_are_bounded_and_counted():
+    p = read("X1 D1\n" * 1000)
+    assert len(p.remarks) == 20 and "980 more" in p.remarks[-1].message
+
+
+def test_incremental_slip_is_simulated_exactly():
+    p = read("G1 X1 F100\nG91\nX1\nX-3 Z1\n")
+    np.testing.assert_array_equal(p.end[1:], [[1, 0, 10], [2, 0, 10], [-1, 0, 11]])
+    assert p.line[1:].tolist() == [7, 9, 10]
+
+
+def test_many_moves_keep_their_order_across_chunks(monkeypatch):
+    monkeypatch.setattr(Log, "full", 7)
+    p = read("G1 F100\n" + "".join(f"X{k}\n" for k in range(1, 50)) + "G2 I1\nG91 G1 X1\nG90 X0\n")
+    np.testing.assert_array_equal(p.start[1:], p.end[:-1])
+    assert p.end[1:50, 0].tolist() == list(range(1, 50)) and (np.diff(p.line) >= 0).all()
+
+
+def test_pecks_end_on_the_depth():
+    down = read("G83 X0 Y0 Z-1 R1 Q0.3 F80\nG80\n")
+    np.testing.assert_allclose(down.end[down.kind == FEED][:, 2], [0.7, 0.4, 0.1, -0.2, -0.5, -0.8, -1.0])
 
 
 def test_file_without_percent_and_windows_lines():
