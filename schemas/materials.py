@@ -22,8 +22,8 @@ SOURCE = "stated default, conservative"
 class FeedPoint(WireModel):
     """Feed per tooth at one cutter diameter; values between two points are interpolated linearly."""
 
-    diameter_mm: Annotated[Number, Field(gt=0, description="Cutter diameter, mm.")]
-    feed_per_tooth_mm: Annotated[Number, Field(gt=0, le=2, description="Feed per tooth at that diameter, mm.")]
+    diameter_mm: Annotated[Number, Field(ge=1e-3, le=2000, description="Cutter diameter, mm.")]
+    feed_per_tooth_mm: Annotated[Number, Field(ge=1e-5, le=2, description="Feed per tooth at that diameter, mm.")]
 
 
 class Material(WireModel):
@@ -31,8 +31,8 @@ class Material(WireModel):
 
     name: Annotated[str, Field(min_length=1, max_length=64, description="Name, as it stands in programs.",
                                examples=["Ti-6Al-4V"])]
-    cutting_speed_m_min: Annotated[Number, Field(gt=0, le=5000, description="Cutting speed at the full diameter, "
-                                                                            "m/min.")]
+    cutting_speed_m_min: Annotated[Number, Field(ge=0.1, le=5000, description="Cutting speed at the full diameter, "
+                                                                              "m/min.")]
     feed_per_tooth: Annotated[list[FeedPoint], Field(
         min_length=1, description="Feed per tooth by diameter, ascending; beyond the ends it scales with diameter.")]
     source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"

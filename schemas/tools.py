@@ -13,7 +13,7 @@ ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel"]
 BUILT_KINDS = ("ball", "flat", "bull")
 LENGTH_EPSILON = 1e-9
 
-Length = Annotated[Number, Field(gt=0, le=2000)]
+Length = Annotated[Number, Field(ge=1e-3, le=2000)]
 
 
 class HolderSegment(WireModel):
@@ -45,7 +45,7 @@ class Tool(WireModel):
         ge=1, le=99999, description="T and H word of the program; default: the digits of the id where unique, else "
                                     "the place in the list.")] = None
     kind: Annotated[ToolKind, Field(description="Shape of the cutting end; tapered_ball and barrel are not built yet.")]
-    diameter_mm: Annotated[Length, Field(description="Diameter of the cutting part, mm.")]
+    diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm; from 0.01.")]
     corner_radius_mm: Annotated[Number, Field(
         ge=0, description="Corner radius, mm: a bull nose needs it, a flat has 0; for a ball 0 means half the "
                           "diameter.")] = 0.0

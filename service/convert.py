@@ -61,20 +61,23 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def check_blank(setup: Setup) -> None:
     """Refuse a blank grown from the part that leaves nothing to cut, or less than is to stay on the part.
 
+    A box grown by 0 still holds stock in the pockets of the part; what fills a box wholly is found with the part.
+
     Raises
     ------
     SetupError
         Code 'no_stock' or 'allowance_beyond_stock'.
     """
     stock, allowance = setup.stock, setup.quality.stock_allowance_mm
-    if stock.kind != "part_offset":
+    if stock.box_mm is not None:
         return
     grown = stock.margin_mm + stock.uncertainty_mm
-    if grown <= 0:
+    offset = stock.kind == "part_offset"
+    if offset and grown <= 0:
         raise SetupError("nothing stands on the part that could be cut: stock.margin_mm and stock.uncertainty_mm are "
                          "both 0", code="no_stock", subjects=("stock.margin_mm", "stock.uncertainty_mm"),
                          measured=grown, limit=0.0, remedy="give a stock.margin_mm above 0, or the real blank as a box")
-    if allowance >= grown:
+    if allowance > grown or (offset and allowance == grown):
         raise SetupError(f"quality.stock_allowance_mm {allowance:g} is not below the {grown:g} mm (margin_mm "
                          f"{stock.margin_mm:g} + uncertainty_mm {stock.uncertainty_mm:g}) of stock on the part",
                          code="allowance_beyond_stock",

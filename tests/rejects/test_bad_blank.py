@@ -74,6 +74,8 @@ def test_an_allowance_beyond_the_stock(allowance):
     assert (found.measured, found.limit) == (allowance, 1.5)
     assert f"{allowance:g}" in found.message and "1.5 mm" in found.message
     accepted(quality={"stock_allowance_mm": 1.4})
+    accepted(quality={"stock_allowance_mm": 1.5}, stock={"kind": "box"})
+    refused("allowance_beyond_stock", quality={"stock_allowance_mm": 1.6}, stock={"kind": "box"})
     accepted(quality={"stock_allowance_mm": allowance}, stock={"margin_mm": 5})
 
 

@@ -67,6 +67,19 @@ CASES = {
     "a scallop larger than the tool": Bad("bad_setup", "bad-setup", "radius 1.5 of the smallest tool T1",
                                           setup=tools(BALL, quality={"scallop_height_mm": 2})),
     "a setup that is no JSON": Bad("setup_not_json", "bad-setup", "JSON", setup="{tools: ball}"),
+    "a coordinate that is no number": Bad("bad_number", "bad-step", "NAN", "nan"),
+    "a name that stands twice": Bad("repeated_key", "bad-setup", "tools", setup='{"tools": [], "tools": []}'),
+    "an origin beyond all bounds": Bad("bad_setup", "bad-setup", "placement.origin_mm[0]",
+                                       setup=tools(BALL, placement={"origin_mm": [1e300, 0, 0]})),
+    "a blank without a margin": Bad("no_stock", "bad-setup", "margin_mm",
+                                    setup=tools(BALL, stock={"margin_mm": 0, "uncertainty_mm": 0})),
+    "an allowance beyond the blank": Bad("allowance_beyond_stock", "bad-setup", "stock_allowance_mm 5",
+                                         setup={**GOOD, "quality": {"scallop_height_mm": 0.05,
+                                                                    "stock_allowance_mm": 5}}),
+    "a blank beside the part": Bad("stock_misses_part", "bad-setup", "-X", late=True, setup=tools(
+        BALL, stock={"kind": "box", "box_mm": [[100, -50, -50], [200, 50, 50]]})),
+    "a fixture in the part": Bad("fixture_in_part", "bad-setup", "fixtures[0]", late=True, setup=tools(
+        BALL, fixtures=[{"box_mm": [[-1, -1, -1], [1, 1, 1]]}])),
     "a face that is not there": Bad("no_such_face", "bad-setup", "F99", late=True,
                                     setup=tools(BALL, operations={"faces": ["F99"]})),
 }
@@ -87,7 +100,8 @@ def parts(tmp_path_factory):
     paths["inch"] = write_step(box, folder / "inch.step", "INCH")
     whole = paths["box"].read_bytes()
     for name, data in (("empty", b""), ("letter", b"Dear machinist,\nplease mill this.\n"),
-                       ("cut", whole[:len(whole) // 2])):
+                       ("cut", whole[:len(whole) // 2]),
+                       ("nan", whole.replace(b"CARTESIAN_POINT('',(0.,", b"CARTESIAN_POINT('',(NAN,", 1))):
         paths[name] = folder / f"{name}.step"
         paths[name].write_bytes(data)
     return paths

@@ -46,7 +46,10 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
 
 @pytest.mark.parametrize(("given_setup", "words"), [
     ({}, "no tools"), ({"tools": []}, "no tools"),
-    (tool(diameter_mm=-3), "greater than 0"), (tool(stickout_mm=-1), "greater than 0"),
+    (tool(diameter_mm=-3), "equal to 0.01"), (tool(stickout_mm=-1), "greater than or equal to 0.001"),
+    (tool(diameter_mm=1e-300), "greater than or equal to 0.01"),
+    (setup(material={"name": "x", "cutting_speed_m_min": 1e-300, "feed_per_tooth": [
+        {"diameter_mm": 1, "feed_per_tooth_mm": 0.01}]}), "greater than or equal to 0.1"),
     (tool(diameter_mm="3"), "valid number"), (tool(diameter_mm=True), "valid number"),
     (tool(diameter_in=0.1), "unknown field"), (setup(units="inch"), "unknown field"),
     (tool(flute_length_mm=30, neck_length_mm=10), "flute_length_mm <= neck_length_mm <= stickout_mm"),
