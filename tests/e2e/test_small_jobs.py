@@ -29,8 +29,21 @@ def run(command, part, folder, setup, *more):
     return CliRunner().invoke(app, [command, str(part), "--setup", str(path), *more])
 
 
-@pytest.mark.parametrize("text", ["%\nM30\n%\n", "G21 G90 G94 G17 G54\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X40 Y40\nG0 Z12\n"
-                                  "G1 X50 F300\nG0 Z30\nM5\nM30\n"], ids=["nothing", "air"])
+AIR_ONLY = """G21 G90 G94 G17 G54
+T1 M6
+G43 H1
+S3000 M3
+G0 Z30
+G0 X40 Y40
+G0 Z12
+G1 X50 F300
+G0 Z30
+M5
+M30
+"""
+
+
+@pytest.mark.parametrize("text", ["%\nM30\n%\n", AIR_ONLY], ids=["nothing", "air"])
 def test_a_program_that_cuts_nothing_is_not_proved(part, tmp_path, text):
     program = tmp_path / "p.ngc"
     program.write_text(text)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.errors import CamError
 from geometry.sampling import sample_surface
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program
 from tests.pocket_case import text as joined
@@ -147,7 +148,8 @@ def test_remarks_name_what_should_not_run(body, word):
     # words no code takes
     ("D1 L5 Q17\n", 7, ("D1, L5, Q17",)), ("G1 X1 K5 F100\n", 7, ("K5",)), ("X1 I5\n", 7, ("I5",)),
     ("G1 X1 R9 P9 F100\n", 7, ("R9, P9",)), ("G0 X1\nX2 H1\n", 8, ("H1",)), ("G2 X10 R5 I5 F100\n", 7, ("I5",)),
-    ("G0 R5\n", 7, ("R5",)), ("G81 X1 Y1 Z-1 R1 Q2 F100\nG80\n", 7, ("Q2",)), ("G28 R1\n", 7, ("R1",)),
+    ("G0 R5\n", 7, ("R5",)), ("G2 I5 F100\nR5 P2\n", 8, ("R5, P2",)), ("G28 R1\n", 7, ("R1",)),
+    ("G81 X1 Y1 Z-1 R1 Q2 F100\nG80\n", 7, ("Q2",)),
     # incremental coordinates forgotten
     ("G1 X1 F100\nG91\n" + "X1\n" * 50, 8, ("G91", "never turns back")),
     ("G0 Z20\nT2 M6\nG43 H2 M3\nG91 G0 Z-5\nG90 Z20\n", 10, ("Z-5", "line 10", "not stated")),
@@ -208,6 +210,30 @@ def test_many_moves_keep_their_order_across_chunks(monkeypatch):
 def test_pecks_end_on_the_depth():
     down = read("G83 X0 Y0 Z-1 R1 Q0.3 F80\nG80\n")
     np.testing.assert_allclose(down.end[down.kind == FEED][:, 2], [0.7, 0.4, 0.1, -0.2, -0.5, -0.8, -1.0])
+
+
+def test_any_words_give_a_program_or_an_error_with_a_line():
+    """Random words: a reading ends in moves that are finite, or names a line; nothing else escapes."""
+    rng = np.random.default_rng(7)
+    words = ("G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G28 G30 G40 G43 G49 G53 G54 G61 G64 G73 G80 G81 G82 G83 G90 G91 G90.1 "
+             "G93 G94 G95 G98 G99 M3 M5 M6 M0").split()
+    numbers = "0 1 2 5 -3 0.5 .001 12.75 1e3 100000 999999999999 0.0000001 -0".split()
+    read_through = 0
+    for _ in range(1500):
+        body = ""
+        for _ in range(rng.integers(1, 5)):
+            letters = rng.choice(list("XYZIJKRPQLFSTHD"), rng.integers(0, 6), replace=False)
+            body += " ".join([*rng.choice(words, rng.integers(0, 3)), *(a + str(rng.choice(numbers)) for a in letters)])
+            body += "\n"
+        try:
+            p = read("G0 F100\n" + body)
+        except CamError as error:
+            assert error.subjects[0].startswith("line ") and error.code in ("bad_program", "program_too_long"), body
+            continue
+        read_through += 1
+        assert np.isfinite(p.start).all() and np.isfinite(p.end).all() and math.isfinite(p.dwell), body
+        assert (p.feed[p.kind == FEED] >= 0).all(), body
+    assert read_through > 50
 
 
 def test_file_without_percent_and_windows_lines():

@@ -1,0 +1,141 @@
+"""The modal state of a program and the words that set it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from verify.log import Log
+from verify.program import NAN, State
+from verify.words import CYCLES, MOTION_CODES, WORK_OFFSETS, Block
+
+INCH = 25.4
+
+
+class Modes:
+    """State, log, and everything a block sets before it moves.
+
+    tools       : T numbers of the tool table; any number where None
+    work_offset : the one of the setup
+    blend_limit : mm, what path blending may leave the path by without a remark
+    """
+
+    def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
+        self.log, self.tools, self.work_offset, self.blend_limit = log, tools, work_offset, blend_limit
+        self.s = State()
+        self.incremental_line = 0
+        self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
+
+    def _set_modes(self, block: Block) -> None:
+        s, values = self.s, block.values
+        if "S" in values:
+            s.speed = values["S"]
+            if s.speed < 0:
+                self.log.remark("speed", f"S{s.speed:g} is no spindle speed", self.log.line)
+        if "T" in values:
+            self._select(int(values["T"]))
+        self._spindle(block.ms)
+        for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it
+            self._mode(g, values)
+        if 64 in block.codes:
+            self._blending(values)
+        if "F" in values:
+            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
+
+    def _select(self, number: int) -> None:
+        if self.tools is not None and number not in self.tools and number != 0:
+            self.log.error(f"T{number} is not in the tool table")
+        self.s.selected = number
+
+    def _spindle(self, ms: list[int]) -> None:
+        s = self.s
+        if 6 in ms:
+            if s.selected != s.tool:
+                s.position[2] = NAN
+            s.tool, s.spindle = s.selected, False
+        if 3 in ms or 4 in ms:
+            s.spindle = True
+        if 4 in ms:
+            self.log.remark("m4", "M4 turns the spindle backwards")
+        if 5 in ms:  # LinuxCNC stops the spindle before the motion of the block
+            s.spindle = False
+
+    def _mode(self, g: float, values: dict[str, float]) -> None:
+        """Apply one G word that sets a state."""
+        s = self.s
+        if g in MOTION_CODES:
+            self._motion(g)
+        elif g in (17, 18, 19):
+            s.plane = int(g)
+        elif g in (20, 21):
+            self._unit(int(g))
+        elif g in (90, 91):
+            self._distance(g == 91)
+        elif g in (90.1, 91.1):
+            s.centre_absolute = g == 90.1
+        elif g in (93, 94, 95):
+            s.feed_mode = int(g)
+            s.feed = NAN
+        elif g in (98, 99):
+            s.retract_to_r = g == 99
+        elif g == 43:
+            self._length_offset(values)
+        elif g == 49:
+            s.offset = None
+        elif g in WORK_OFFSETS:
+            s.work_offset = WORK_OFFSETS[g]
+            if s.work_offset != self.work_offset:
+                self.log.remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
+                                f"({self.work_offset})", s.work_offset)
+
+    def _motion(self, g: float) -> None:
+        """A cycle begun anew keeps nothing of the one before."""
+        s = self.s
+        if s.motion not in CYCLES:
+            s.cycle = {}
+        s.motion = g
+
+    def _unit(self, g: int) -> None:
+        s = self.s
+        scale = INCH if g == 20 else 1.0
+        if scale != s.scale and (self.log.moved or any(v == v for v in s.position)):
+            self.log.remark("unit", f"G{g} changes the unit in the middle of the program", self.log.line)
+        s.scale = scale
+
+    def _distance(self, relative: bool) -> None:
+        """Enter or leave incremental coordinates.
+
+        Incremental moves are simulated exactly, and a program that states a place and then runs in G91 is right.
+        A G91 after cuts in absolute coordinates which no G90 follows is a slip far more often than meant, and what
+        it breaks may show hundreds of lines later: ``read`` puts a remark on its line. One that is turned back
+        needs none, its moves are known.
+        """
+        s = self.s
+        if relative == s.relative:
+            return
+        feeds = self.log.take_feeds()
+        if relative:
+            self.cut_absolute |= feeds
+            self.incremental_line, self.incremental_after_cuts = self.log.line, self.cut_absolute
+            self.incremental_moved = False
+        s.relative = relative
+
+    def _length_offset(self, values: dict[str, float]) -> None:
+        s = self.s
+        s.offset = int(values["H"]) if "H" in values else s.tool
+        if s.offset != s.tool:
+            self.log.remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle",
+                            self.log.line)
+
+    def _blending(self, values: dict[str, float]) -> None:
+        """G64: the control may leave the path by P (0 and none: without bound) and by Q of its own line fitting."""
+        limit = self.blend_limit
+        p, q = values.get("P", 0.0) * self.s.scale, values.get("Q", 0.0) * self.s.scale
+        if p == 0:
+            self.log.remark("blending", f"G64 without a P above 0 lets the control leave the path by any amount (limit "
+                            f"P{limit:g} mm)", self.log.line)
+        elif not 0 < p <= limit + 1e-12:
+            self.log.remark("blending", f"G64 P{values['P']:g} lets the control leave the path by {p:g} mm (limit "
+                            f"{limit:g} mm)", self.log.line)
+        if not 0 <= q <= limit + 1e-12:
+            self.log.remark("line_fitting", f"G64 Q{values['Q']:g} lets the control leave the path by {q:g} mm (limit "
+                            f"{limit:g} mm)", self.log.line)

@@ -1,0 +1,227 @@
+"""What a block moves: straight lines, arcs, drilling cycles, ways to the machine's own places."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from verify.arcs import PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
+from verify.cycles import FEED, RAPID, Hole, hole_moves
+from verify.log import MOST_MOVES_A_BLOCK, Log
+from verify.modes import Modes
+from verify.program import NAN
+from verify.words import CYCLES, Block, whole
+
+
+class Motion(Modes):
+    """Moves of the blocks, written to the log; ``dwell`` is what they wait, s."""
+
+    def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
+        super().__init__(log, tools, work_offset, blend_limit)
+        self.dwell = 0.0
+
+    def _move(self, block: Block) -> None:
+        s, values = self.s, block.values
+        axes = [values.get(a) for a in "XYZ"]
+        if 4 in block.codes:
+            return self._wait(axes, values)
+        if not {28, 30, 53}.isdisjoint(block.codes):
+            return self._machine_move(53 in block.codes, axes)
+        full_circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
+        if all(a is None for a in axes) and not full_circle:
+            return None
+        if s.motion is None or s.motion == 80:
+            return self.log.error("coordinates without a motion word")
+        self.incremental_moved = True
+        if s.motion in CYCLES:
+            return self._cycle(axes, values)
+        target = self._target(axes)
+        if s.motion == 0:
+            return self._line_to(target, RAPID, NAN)
+        feed = self._feed(values)
+        if feed is None:
+            return None
+        self._check_cutting(target)
+        if s.motion == 1:
+            return self._line_to(target, FEED, self._rate(feed, [s.position, target]))
+        return self._arc(target, values, feed)
+
+    def _wait(self, axes: list[float | None], values: dict[str, float]) -> None:
+        if "P" not in values:
+            return self.log.error("G4 needs P")
+        if values["P"] < 0:
+            return self.log.error(f"G4 P{values['P']:g} waits a negative time")
+        if any(a is not None for a in axes):
+            return self.log.error("coordinates in a block with G4: some controls move, some wait")
+        self.dwell += values["P"]
+        return None
+
+    def _target(self, axes: list[float | None]) -> list[float]:
+        s = self.s
+        if s.relative:
+            for letter, a, p in zip("XYZ", axes, s.position, strict=True):
+                if a and math.isnan(p):
+                    self.log.remark("incremental_unknown", f"an incremental move ({letter}{a:g}, G91 of line "
+                                    f"{self.incremental_line}) from a place the program has not stated")
+        return [p if a is None else (p + a * s.scale if s.relative else a * s.scale)
+                for a, p in zip(axes, s.position, strict=True)]
+
+    def _machine_move(self, absolute: bool, axes: list[float | None]) -> None:
+        """G28 and G30 pass a programmed point, then the axes named (all without any) are unknown; so after G53.
+
+        Only home is known to lie above everything: another Z of G53 is remarked, and so is a way in X or Y to a
+        place of the machine's own before Z is home.
+        """
+        s = self.s
+        named = [a is not None for a in axes]
+        if absolute:
+            if s.motion != 0:
+                return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
+            if axes[2]:
+                self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height the proof does not know; only "
+                                "Z0, home, is taken to be above everything", self.log.line)
+            if s.relative and any(named):
+                self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
+                                "differently", self.log.line)
+        elif any(named):
+            self._line_to(self._target(axes), RAPID, NAN)
+        else:
+            named = [True] * 3
+        if (named[0] or named[1]) and not math.isnan(s.position[2]):
+            self.log.remark("machine_way", f"X or Y goes to a place of the machine's own from Z{s.position[2]:g}, a "
+                            "way the proof cannot see: send Z home first", self.log.line)
+        s.position = [NAN if n else p for n, p in zip(named, s.position, strict=True)]
+        s.parked |= named[0] or named[1]
+        return None
+
+    def _feed(self, values: dict[str, float]) -> float | None:
+        s = self.s
+        feed = values.get("F", NAN) if s.feed_mode == 93 else s.feed
+        if not feed > 0:
+            self.log.error("inverse time feed (G93) needs F on every line" if s.feed_mode == 93
+                           else "a feed move without a feed (F)")
+            return None
+        if s.feed_mode == 95:
+            if not s.speed > 0:
+                self.log.error("feed per turn (G95) without a spindle speed")
+                return None
+            return feed * s.speed
+        return feed
+
+    def _rate(self, feed: float, points: list[list[float]]) -> float:
+        """mm/min of a move along ``points``; inverse time divides the whole length by its minutes."""
+        if self.s.feed_mode != 93:
+            return feed
+        return feed * sum(math.dist(a, b) for a, b in itertools.pairwise(points))
+
+    def _check_cutting(self, target: list[float]) -> None:
+        s, remark = self.s, self.log.remark
+        if s.tool == 0:
+            remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before)")
+        if s.offset is None:
+            remark("offset_off", f"a feed move with the length offset off (no G43 H{s.tool})", s.tool)
+        elif s.offset != s.tool:
+            remark("offset_stale", f"a feed move with length offset H{s.offset} and tool T{s.tool}", (s.offset, s.tool))
+        if not s.turning:
+            why = "no M3" if not s.spindle else "no S given" if math.isnan(s.speed) else f"S{s.speed:g}"
+            remark("spindle", f"a feed move with the spindle standing ({why})", (s.tool, why))
+        if any(math.isnan(v) for v in target):
+            remark("unknown", "a feed move from a place the program has not stated")
+
+    def _line_to(self, target: list[float], kind: int, feed: float) -> None:
+        s = self.s
+        start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
+        was, s.position = s.position, target
+        level = target[2] == target[2] and was[2] != target[2]
+        if kind == RAPID and s.offset is None and s.tool > 0 and level:
+            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+        known = not any(math.isnan(v) for v in target)
+        if s.parked and level and not known:
+            self.log.remark("parked", "Z comes down where the machine's own coordinates left X or Y: state X and Y "
+                            "first", self.log.line)
+        s.parked &= math.isnan(target[0]) or math.isnan(target[1])
+        if known:
+            if len(self.log.rows) >= Log.full:
+                self.log.flush()
+            self.log.rows.append((*start, *target, kind, feed, s.tool, self.log.line))  # type: ignore[arg-type]
+
+    def _arc(self, target: list[float], values: dict[str, float], feed: float) -> None:
+        s, error = self.s, self.log.error
+        if any(math.isnan(v) for v in s.position):
+            return error("an arc from a place the program has not stated")
+        axes = PLANE_AXES[s.plane]
+        start, end = np.array(s.position), np.array(target)
+        letters = ["IJK"[axes[0]], "IJK"[axes[1]]]
+        turns = whole(values, "P", 1)
+        try:
+            if "R" in values:
+                centre = centre_from_radius(start, end, values["R"] * s.scale, s.motion == 2, axes)
+            elif any(c in values for c in letters):
+                offset = np.array([values.get(c, 0.0) * s.scale for c in letters])
+                if s.centre_absolute and not all(c in values for c in letters):
+                    return error(f"absolute arc centres (G90.1) need both {letters[0]} and {letters[1]}")
+                centre = offset if s.centre_absolute else start[list(axes[:2])] + offset
+            else:
+                return error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
+            if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
+                return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
+            points = arc_points(start, end, centre, s.motion == 2, axes, turns, most=MOST_MOVES_A_BLOCK).tolist()
+        except ArcTooLong as problem:
+            return self.log.room(problem.points)
+        except ArcError as problem:
+            return error(str(problem))
+        self.log.room(len(points))
+        rate = self._rate(feed, [s.position, *points])
+        for p in points:
+            self._line_to(p, FEED, rate)
+        return None
+
+    def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
+        """G81, G82, G83, G73 in the XY plane, written out as rapids and feeds."""
+        s, error = self.s, self.log.error
+        if s.plane != 17:
+            return error(f"a drilling cycle in plane G{s.plane}")
+        s.cycle.update({k: values[k] for k in "RQP" if k in values})
+        if axes[2] is not None:
+            s.cycle["Z"] = axes[2]
+        missing = [k for k in ("Z", "R", *(("Q",) if s.motion in (73, 83) else ())) if k not in s.cycle]
+        if missing:
+            return error(f"a drilling cycle without {', '.join(missing)}")
+        if math.isnan(s.position[2]):
+            return error("a drilling cycle from a height the program has not stated")
+        if s.cycle.get("P", 0.0) < 0:
+            return error(f"P{s.cycle['P']:g} waits a negative time")
+        feed = self._feed(values)
+        repeats = whole(values, "L" if "L" in values else "K", 1)
+        if feed is None:
+            return None
+        for _ in range(repeats):
+            hole = self._hole()
+            if hole is None:
+                return None
+            self.log.room(repeats * hole.moves)
+            at = self._target([axes[0], axes[1], None])
+            self._check_cutting(at)
+            for point, kind in hole_moves(hole, s.position, at[0], at[1]):
+                self._line_to(point, kind, feed if kind == FEED else NAN)
+            self.dwell += 0.0 if s.motion == 81 else s.cycle.get("P", 0.0)
+        return None
+
+    def _hole(self) -> Hole | None:
+        """The hole of the cycle in force from the present height."""
+        s = self.s
+        top = s.position[2]
+        clear = s.cycle["R"] * s.scale + (top if s.relative else 0.0)
+        bottom = s.cycle["Z"] * s.scale + (clear if s.relative else 0.0)
+        if bottom > clear:
+            self.log.error("the drilling depth Z lies above R")
+            return None
+        pecking = s.motion in (73, 83)
+        peck = abs(s.cycle["Q"]) * s.scale if pecking else max(clear - bottom, 1e-9)
+        if peck <= 0 and clear > bottom:
+            self.log.error("a drilling cycle with Q0 never ends")
+            return None
+        return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83)
