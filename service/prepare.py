@@ -15,6 +15,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface
 from geometry.step import read_part
+from geometry.toolbody import ToolBody
 from schemas.setup import Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, tool_bodies
@@ -29,6 +30,7 @@ LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
 MOST_DENSITY = 150.0
 BORDER_SPACING = 0.2  # mm
 BORDER_INSET = 0.0  # mm: on the border itself
+MOST_ROOM = 60.0  # mm, the same beside a large block
 AIR = 4.0  # mm beyond the cutter's radius that the planning lattice covers round the part
 
 Progress = Callable[[str, float], None]
@@ -95,6 +97,17 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
 
 
+def _room(body: ToolBody, part: Part, setup: Setup) -> float:
+    """How far round the part a tool is planned, mm; beside a block it has to get round what stands there."""
+    beside = 0.0
+    if setup.stock.kind == "box":
+        box, spare = setup.stock.box_mm, setup.stock.margin_mm
+        if box is not None:
+            spare = float(np.max([part.bounds[0, :2] - box[0][:2], box[1][:2] - part.bounds[1, :2]]))
+        beside = min(spare + setup.stock.uncertainty_mm + body.radius, MOST_ROOM)
+    return body.radius + max(AIR, beside)
+
+
 def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     """Read, decompose, measure reach, build zones.
 
@@ -115,8 +128,8 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     fields = {}
     for k, body in enumerate(tool_bodies(setup)):
         step = lattice_step(body)
-        fields[body.id] = TipField(obstacles, body, clearances(setup), part.bounds, body.radius + AIR, step,
-                                   setup.quality.stock_allowance_mm)
+        fields[body.id] = TipField(obstacles, body, clearances(setup), part.bounds, _room(body, part, setup), step,
+                                   setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
         progress("zones", 0.14 + 0.08 * k / len(setup.tools))
     regions = face_regions(part, decomposition, samples, tree)
     zones = tuple(build_zones(samples, regions, fields, setup.quality.scallop_height_mm, lift))

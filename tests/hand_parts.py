@@ -178,8 +178,11 @@ class Case:
 def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.02, chord: float = 0.004,
               allowance: float = 0.0, climb: bool = True, either: bool = False, roughing: bool = True,
               near_net: bool = True, faces: set[int] | None = None, fixtures: tuple = (), density: float = 30.0,
-              step_down: float = 0.3) -> Case:
-    """Zones and plan of a part; ``step_down`` in tool diameters, ``fixtures`` as (lower, upper) boxes."""
+              step_down: float = 0.3, spare: float = 1.0) -> Case:
+    """Zones and plan of a part; ``step_down`` in tool diameters, ``fixtures`` as (lower, upper) boxes.
+
+    ``spare`` is what a block of stock stands wider than the part, mm.
+    """
     part = as_part(mesh)
     tree = TriangleTree(mesh)
     obstacles = TriangleTree(joined(mesh, *(box_mesh(*f) for f in fixtures))) if fixtures else tree
@@ -187,12 +190,12 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     everything = samples_of(mesh, density, None)
     samples = everything.subset(np.isin(everything.face, sorted(
         machinable_faces(everything, nothing, faces, {1}))))
-    fields = {t.id: TipField(obstacles, t, Clearances(), mesh.bounds, t.radius + 4.0, lattice_step(t), allowance)
-              for t in tools}
+    fields = {t.id: TipField(obstacles, t, Clearances(), mesh.bounds, t.radius + max(4.0, spare + t.radius),
+                             lattice_step(t), allowance, scallop) for t in tools}
     regions = face_regions(part, nothing, samples, tree)
     lift = max(0.1 * scallop, 0.002)
     zones = build_zones(samples, regions, fields, scallop, lift)
-    lo, hi = mesh.bounds[0] - 1.0, mesh.bounds[1] + 1.0
+    lo, hi = mesh.bounds[0] - [spare, spare, 1.0], mesh.bounds[1] + [spare, spare, 1.0]
     stock = StockMap.around(tree, mesh.bounds, 1.0, 0.12) if near_net else StockMap.box(tree, lo, hi, 0.12)
     before = StockMap(stock.lattice, stock.top.copy())
     floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0

@@ -10,6 +10,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from tests.hand_parts import RAMP, Case
 from toolpath.motion import Motion, Workingstep
+from zones.reach import Clearances, discs_of
 
 PLUNGE_SHARE = 0.1  # of the diameter: what a descent steeper than the ramp may take off
 
@@ -104,6 +105,13 @@ class SlowStock:
         near = off[rho <= seen]
         return float(near.max()) if near.size else 0.0
 
+    def highest(self, tip: F64, radius: float) -> float:
+        """Top of the stock within a radius of an axis, mm."""
+        j0, j1 = np.searchsorted(self.x, [tip[0] - radius, tip[0] + radius])
+        i0, i1 = np.searchsorted(self.y, [tip[1] - radius, tip[1] + radius])
+        rho = np.hypot(self.x[None, j0:j1] - tip[0], self.y[i0:i1, None] - tip[1])
+        return float(self.top[i0:i1, j0:j1][rho <= radius].max(initial=-np.inf))
+
 
 def worst_plunge(case: Case) -> tuple[float, str]:
     """The most one descent steeper than the ramp takes off under the middle of the tool, in its diameters; where.
@@ -136,6 +144,22 @@ def worst_plunge(case: Case) -> tuple[float, str]:
                                 where = f"{step.id} trajectory {n} {t.motion} {np.round(a, 3)} to {np.round(b, 3)}"
                     else:
                         stock.sink(tip, body, seen)
+    return worst, where
+
+
+def worst_meeting(case: Case) -> tuple[float, str]:
+    """How deep shank or holder go into the stock as it stands at each moment, mm; where."""
+    stock = SlowStock(case)
+    worst, where = 0.0, ""
+    for step in case.plan.steps:
+        body, bodies = step.tool, discs_of(step.tool, Clearances(0.0, 0.0))
+        for t in step.trajectories:
+            for tip in dense(t.points, stock.step)[1:]:
+                stock.sink(tip, body, 0.0)
+                for part in bodies:
+                    deep = stock.highest(tip, part.radius) - (tip[2] + part.height)
+                    if deep > worst:
+                        worst, where = deep, f"{step.id} {part.name} at {np.round(tip, 3)}, {t.motion}"
     return worst, where
 
 

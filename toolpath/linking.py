@@ -73,15 +73,30 @@ class Linker:
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
 
-        Where stock stands higher over the line than the flutes reach, the line is first walked above it.
+        Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
+        stands in the way of shank or holder, the line is left out.
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
             return True
-        if not (self._topped(line) and self._pass(points, line.closed)):
-            self.skipped.append(line)
-            return False
-        return True
+        before = len(self.skipped)
+        for piece in self._clear_of_bodies(Line(points, line.closed)):
+            if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
+                self.skipped.append(piece)
+        return len(self.skipped) == before
+
+    def _clear_of_bodies(self, line: Line) -> list[Line]:
+        """The pieces of a line along which shank and holder pass over the stock; the rest is skipped."""
+        if not self.field.discs:
+            return [line]
+        points = dense(line.points, LOOK_EVERY * self.field.tool.radius)
+        met = self.stock.meets_bodies(points, self.field.discs)
+        if not met.any():
+            return [line]
+        self.skipped.extend(pieces_where(Line(points, line.closed), met, 0.0, 0.0))
+        room = LOOK_EVERY * self.field.tool.radius  # a sample apart from what was met
+        return [Line(thinned(p.points, self.motions.tolerance), p.closed)
+                for p in pieces_where(Line(points, line.closed), ~met, -room, 0.0) if p.length > 2.0 * room]
 
     def _topped(self, line: Line) -> bool:
         """Take off what stands higher over a line than the flutes reach, from the top down."""
@@ -247,7 +262,9 @@ class Linker:
         n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
         tips = np.column_stack([a + t * (b - a), np.full(n, z + LEVEL_TOLERANCE)])
-        return not bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any())
+        if bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any()):
+            return False
+        return not bool(self.stock.meets_bodies(tips, self.field.discs).any())
 
     def _limit(self, tip: F64) -> float:
         return float(self.field.tips(tip[None, :2])[0])

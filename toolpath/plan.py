@@ -164,9 +164,9 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     top = stock.highest
     if top <= bottom:
         return None
-    swept = top
-    for z in layers.layer_heights(top, bottom, 0.85 * cut.step_down):
-        below = dilated(lat.mask(tips[tips[:, 2] <= z + 1e-6, :2]), max(0.5 * tool.radius / lat.step, 1.5))
+    swept, step = top, 0.85 * cut.step_down
+    heights = layers.layer_heights(top, bottom, step)
+    for z, below in zip(heights, _areas(field, tips, heights, step), strict=True):
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(_turned(line, settings), 0.1 * lat.step)
@@ -181,6 +181,34 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     ids = " ".join(z.id for z in zones)
     return _step(step_id, f"{step_id} layers {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
                  0.8 * tool.radius, linker, settings)
+
+
+def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:
+    """(ny, nx) bool a layer: where stock is to go down to it.
+
+    That is where this tool has something to finish below, and where shank and holder come once the tool is down in
+    any deeper layer: what stands there would meet them.
+
+    tips    : (n, 3) float64, mm, what is finished; heights : mm, of the layers, descending
+    """
+    lat = field.lattice
+
+    def own(z: float) -> NDArray[np.bool_]:
+        mask = lat.mask(tips[tips[:, 2] <= z + 1e-6, :2])
+        return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
+
+    out: list[NDArray[np.bool_]] = []
+    rising = list(heights[::-1])
+    for z in rising:
+        area = own(z)
+        for disc in field.discs:
+            low = z + step - disc.height
+            deeper = [k for k in range(len(out)) if rising[k] <= low]
+            reach = own(low) | out[deeper[-1]] if deeper else own(low)
+            if reach.any():
+                area = area | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
+        out.append(area)
+    return out[::-1]
 
 
 def _turned(line: Line, settings: PlanSettings) -> Line:

@@ -124,11 +124,12 @@ class TipField:
     bounds : (2, 3) float64, mm, region of interest in plan
     step   : mm, spacing of the planning lattice
     allowance : mm, material to leave on the part: the cutting part is grown by it all round
+    cusp   : mm, what passes may leave standing above that: shank and holder stay as much higher
     """
 
     def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
-                 step: float, allowance: float = 0.0) -> None:
-        self.tree, self.tool, self.allowance = tree, tool, allowance
+                 step: float, allowance: float = 0.0, cusp: float = 0.0) -> None:
+        self.tree, self.tool, self.allowance, self.cusp = tree, tool, allowance, cusp
         self.lattice = Lattice.over(bounds, margin, step)
         self.coarse = Lattice.over(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
         self.discs = discs_of(tool, clear)
@@ -157,7 +158,7 @@ class TipField:
 
     def disc_limit(self, disc: Disc, height: F64) -> F64:
         """Tip limit for a disc whose underside stands at ``height``, mm."""
-        return np.asarray(height + self.allowance - disc.height)
+        return np.asarray(height + self.allowance + self.cusp - disc.height)
 
     @property
     def grown_radius(self) -> float:

@@ -97,7 +97,25 @@ def test_a_spot_too_short_for_a_ramp_is_left_out_and_kept():
     link = linker()
     line = straight(15, 15.01, 15, 1.0)
     assert not link.add(line)
-    assert link.skipped == [line] and link.trajectories == [] and link.passes == 0
+    assert [s.points.tolist() for s in link.skipped] == [line.points.tolist()]
+    assert link.trajectories == [] and link.passes == 0
+
+
+def test_a_line_is_left_out_where_the_stock_stands_in_the_way_of_the_shank():
+    body = tool(4.0, 0.0, neck=5.0, shank=8.0)
+    link = linker(body, top=9.0)
+    link.stock.cut(np.array([[5.0, 15, 0.0], [25.0, 15, 0.0]]), tool(4.4, 0.0))
+    line = straight(5, 25, 15, 0.5)
+    assert not link.add(line)  # the slot is wide enough for the cutter, not for the shank
+    assert link.trajectories == [] and sum(s.length for s in link.skipped) == pytest.approx(line.length)
+
+    link = linker(body, top=9.0)
+    link.stock.cut(np.array([[5.0, 15, 0.0], [25.0, 15, 0.0]]), tool(4.4, 0.0))
+    link.stock.cut(np.array([[4.0, 15, 3.0], [12.0, 15, 3.0]]), tool(9.6, 0.0))
+    assert not link.add(line)  # opened at one end: the shank gets in as far as it is open
+    cut = np.vstack([t.points for t in link.trajectories if t.motion is Motion.CUT])
+    assert 5.0 <= cut[:, 0].min() < 5.5 and 11.5 < cut[:, 0].max() <= 12.7
+    assert sum(s.length for s in link.skipped) == pytest.approx(13.0, abs=1.5)
 
 
 def test_a_point_is_no_pass():

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
-from tests.plan_checks import SlowStock, brute_residual, dense
+from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.motion import Motion
 from toolpath.plan import Checks, CutData, PlanSettings, plan_job
 from toolpath.stock import StockMap
@@ -267,3 +267,12 @@ def test_stock_above_the_part_is_taken_in_layers_too():
     # Rings turn short of the sharp corner between the walls; what two layers leave there, 0.35 mm wide, goes with
     # the first rim.
     assert deepest_layer(high, 0.4) <= 1.0 + 1e-6
+
+
+def test_a_short_neck_beside_a_wide_block_never_meets_what_stands_there():
+    body = ball(3.0, neck=4.5, shank=8.0)
+    c = plan_part(corner(), [body], near_net=False, spare=6.0, density=8.0, scallop=0.05)
+    deep, where = worst_meeting(c)
+    assert deep <= 0.02, where
+    assert min(z.bottom for z in c.zones) < c.stock_before.highest - 4.5  # deeper than the neck is long
+    assert len(c.zones) == 2 and all(len(z.left) == 0 for z in c.plan.zones)

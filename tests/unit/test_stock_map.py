@@ -11,6 +11,7 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.stock import SKIN, StockMap
+from zones.reach import Disc
 
 STEP = 0.2
 PART = joined(box_mesh([0, 0, -2], [12, 12, 0]), box_mesh([3.05, 3.0, 0], [4.0, 9.0, 5.0]))
@@ -91,6 +92,25 @@ def test_stock_beside_a_wall_is_not_what_stands_over_a_pass():
     assert 5.0 < stock.standing(beside, body)[0] <= 5.5  # the millimetre round the wall is open stock
     stock.cut(np.array([[5.0, 3.0, 0.5], [5.0, 9.0, 0.5]]), body)
     assert stock.standing(beside, body)[0] <= 0.5 + 1e-9  # what is left is the blank on the plate, past the rim
+
+
+def test_what_stands_in_the_way_of_shank_and_holder_is_found_before_and_after_a_cut():
+    stock = StockMap.box(TriangleTree(PART), np.array([-2.0, -2, -2]), np.array([14.0, 14, 6]), STEP)
+    bodies = [Disc("shank", 2.6, 1.5), Disc("holder", 4.4, 3.0)]
+    rng = np.random.default_rng(3)
+    tips = np.column_stack([rng.uniform(-4, 16, (3000, 2)), rng.uniform(0.0, 6.5, 3000)])
+    lat = stock.lattice
+    nodes = np.stack(np.meshgrid(lat.x0 + lat.step * np.arange(lat.nx), lat.y0 + lat.step * np.arange(lat.ny)), -1)
+    shares = []
+    for path in (None, PATH, PATH[::-1] + [-3.0, 1.0, 1.0]):
+        if path is not None:
+            stock.cut(path, tool(6.0, 0.0))
+        met = stock.meets_bodies(tips, bodies)
+        for tip, said in zip(tips, met, strict=True):
+            rho = np.hypot(*(nodes - tip[:2]).transpose(2, 0, 1))
+            assert said == any((stock.top[rho <= b.radius] > tip[2] + b.height).any() for b in bodies)
+        shares.append(met.mean())
+    assert shares[0] > shares[1] > shares[2] > 0.05
 
 
 def test_an_eased_ramp_is_never_steeper_than_its_slope_less_the_rounding():

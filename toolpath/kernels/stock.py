@@ -103,3 +103,21 @@ def standing(cover, part, x0, y0, step, tips, radius, half, out):
                     if (x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2 <= reach * reach:
                         worst = over
         out[k] = worst
+
+
+@njit(cache=True, nogil=True)
+def meets(top, x0, y0, step, tips, height, radius, out):
+    """Whether stock stands higher than ``height`` mm over tips (n, 3) within ``radius`` mm of their axes."""
+    ny, nx = top.shape
+    n_r = int(np.ceil(radius / step))
+    for k in range(len(tips)):
+        x, y, under = tips[k, 0], tips[k, 1], tips[k, 2] + height
+        jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+        for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
+            dy = y0 + i * step - y
+            for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+                if top[i, j] > under and (x0 + j * step - x) ** 2 + dy * dy <= radius * radius:
+                    out[k] = True
+                    break
+            if out[k]:
+                break
