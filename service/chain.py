@@ -159,7 +159,8 @@ def planning_stock(ready: Prepared) -> StockMap:
 def plan_settings(ready: Prepared, stock: StockMap) -> PlanSettings:
     """Tolerances and heights of the plan."""
     q, ops = ready.setup.quality, ready.setup.operations
-    tops = [stock.highest, float(ready.part.bounds[1, 2]), *(f.box_mm[1][2] for f in ready.setup.fixtures)]
+    tops = [stock.highest, float(ready.part.bounds[1, 2]) + q.stock_allowance_mm]
+    tops.extend(f.box_mm[1][2] for f in ready.setup.fixtures)
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
@@ -191,7 +192,11 @@ def proof_setup(ready: Prepared) -> ProofSetup:
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=s.access[0].work_offset)
+        rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=s.access[0].work_offset,
+        travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
+        max_feed=s.machine.max_feed_mm_min,
+        max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
+                 if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])})
 
 
 def _preview(ready: Prepared, made: Plan, report: dict[str, Any], stays: np.ndarray, path: Path) -> None:

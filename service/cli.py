@@ -147,9 +147,10 @@ def read_program(path: Path) -> str:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
-                           code="program_unreadable") from None
+                           code="program_unreadable", remedy="name an NC program this user may read") from None
     if not text.strip():
-        raise ProgramError(f"the program {path.name} is empty", code="empty_program")
+        raise ProgramError(f"the program {path.name} is empty", code="empty_program", measured=0, limit=1,
+                           remedy="name the NC program that is to be proved")
     return text
 
 

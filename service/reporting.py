@@ -133,11 +133,10 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
 
 def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Findings that no program can have: nothing could be cut, or less than the setup demands."""
-    least = ready.setup.quality.coverage_min
     if not made.steps:
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
         return [_of_job("nothing_cut", "no tool of the setup can cut anything of what was asked for", would_need=would)]
-    return [*_beyond_travel(ready, made), *_too_little(coverage, least)]
+    return _too_little(coverage, ready.setup.quality.coverage_min)
 
 
 def _too_little(coverage: float, least: float) -> list[dict[str, Any]]:
@@ -156,17 +155,6 @@ def _of_job(kind: str, message: str, depth: float = 0.0, limit: float = 0.0, **m
     """A finding about the job as a whole: it has no place and no line."""
     return {"kind": kind, "message": message, "depth": depth, "limit": limit, "program": "", "line": 0, "zone": None,
             "face": None, "point": None, "count": 1, "area": 0.0, **more}
-
-
-def _beyond_travel(ready: Prepared, made: Plan) -> list[dict[str, Any]]:
-    """Axes whose moves span more than the machine's travel; where the travel lies is for the operator to set."""
-    travel = ready.setup.machine.travel_mm
-    if travel is None:
-        return []
-    points = np.vstack([t.points for s in made.steps for t in s.trajectories])
-    return [_of_job("limit", f"the program moves over {span:.3f} mm in {axis}, the machine travels {limit:g} mm",
-                    round(span - limit, 4), limit)
-            for axis, span, limit in zip("XYZ", np.ptp(points, axis=0).tolist(), travel, strict=True) if span > limit]
 
 
 def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict[str, Workingstep],

@@ -195,7 +195,8 @@ def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
         raise error_from_dict(final["error"])
     tail = log.read_bytes()[-2000:].decode("utf-8", "replace").strip()
     if "MemoryError" in tail or "bad_alloc" in tail:
-        raise ResourceError("the job ran out of memory", code="job_memory")
+        raise ResourceError("the job ran out of memory", code="job_memory",
+                            remedy="simplify the part, or give the machine or ZONEMILL_JOB_MEMORY_LIMIT_MB more")
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
     last = tail.splitlines()[-1] if tail else "it said nothing"
     raise ResourceError(f"the job's process died of {name} ({last})", measured=name,

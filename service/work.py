@@ -61,7 +61,8 @@ def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
         log.warning("job failed", job=job_id, attempt=attempt, error=error.as_dict())
     except Exception as error:
         log.exception("bug in the worker", job=job_id, attempt=attempt)
-        bug = InternalError(f"{type(error).__name__}: {error}", code="bug")
+        bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
+                            remedy="please report it with part and setup; the worker's log has the trace")
         state, ended = "failed", store.finish(job_id, owner, "failed", error=bug)
     log.info("job ended", job=job_id, attempt=attempt, state=state, recorded=ended)
     return state if ended else "superseded"

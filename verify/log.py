@@ -22,6 +22,7 @@ class Log:
 
     name : of the program
     line : 1-based, the one being read
+    speeds : by T number, the highest S it turned at, 1/min, and the line
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -37,6 +38,7 @@ class Log:
         self._chunks: list[F64] = []
         self._moves = 0
         self._feeds = False
+        self.speeds: dict[int, tuple[float, int]] = {}
 
     @property
     def moved(self) -> bool:
@@ -62,6 +64,11 @@ class Log:
         more = {id(r): f" (and {self._count[key] - MAX_REMARKS} more such lines)" for key, r in kept.items()}
         return tuple(sorted((Remark(r.line, r.message + more.get(id(r), "")) for r in self._remarks.values()),
                             key=lambda r: (r.line, r.message)))
+
+    def turns(self, tool: int, speed: float) -> None:
+        """Note that a tool turns at ``speed``, 1/min."""
+        if speed > self.speeds.get(tool, (0.0, 0))[0]:
+            self.speeds[tool] = speed, self.line
 
     def room(self, moves: float) -> None:
         """Refuse a block of ``moves`` moves that would be too long, before it is written out.

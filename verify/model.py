@@ -45,9 +45,10 @@ class ProofSetup:
     ramp_angle    : rad, steepest descent into stock
     plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.stock``)
     rapid_feed    : mm/min
-    travel        : (3, 2) float64 least and greatest tip coordinate, or None
+    travel        : (3,) float64 mm, what the moves of a program may span in X, Y and Z, or None
+    max_feed      : mm/min of any feed move, or None
+    max_rpm       : 1/min by T number; a tool left out is not limited
     work_offset   : the only one whose coordinates are those of the setup frame
-    seat_z        : nothing goes below it, or None
     line_spacing  : mm between the vertical lines of the stock model
     """
 
@@ -69,7 +70,8 @@ class ProofSetup:
     rapid_feed: float = 5000.0
     travel: F64 | None = None
     work_offset: str = "G54"
-    seat_z: float | None = None
+    max_feed: float | None = None
+    max_rpm: Mapping[int, float] = field(default_factory=dict)
     line_spacing: float = 0.15
 
 

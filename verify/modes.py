@@ -34,6 +34,8 @@ class Modes:
         if "T" in values:
             self._select(int(values["T"]))
         self._spindle(block.ms)
+        if s.turning:
+            self.log.turns(s.tool, s.speed)
         for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it
             self._mode(g, values)
         if 64 in block.codes:

@@ -32,6 +32,7 @@ class Program:
     tool    : (m,) int32, T number in the spindle, 0 for none
     line    : (m,) int32, 1-based line of the source
     dwell   : s of G4 and drilling dwells
+    speeds  : by T number, the highest S it turned at, 1/min, and the line
     lines   : number of lines read
     remarks : what should not be run
     """
@@ -44,6 +45,7 @@ class Program:
     tool: I32
     line: I32
     dwell: float
+    speeds: dict[int, tuple[float, int]]
     lines: int
     remarks: tuple[Remark, ...]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from verify.stock import StockPass, blank, run_bodies, run_stock, stock_on_norma
 
 RAY_ERROR = 1e-6
 LEAST_REACH = 1.0
+LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 Report = Callable[[float], None]
 
 
@@ -78,10 +79,11 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                                progress=lambda f: tell(0.85 + 0.15 * f))
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     findings = [*contact_findings(_merge(run.events, touched), moves.feed, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(read), *_limit_findings(moves, source, setup),
+                *cuts.gouges, *_program_findings(read), *_limit_findings(read, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
-    notes = (f"{run.lost + lost} contacts more than the tables hold",) if run.lost + lost else ()
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, notes)
+    notes = [f"{run.lost + lost} contacts more than the tables hold"] if run.lost + lost else []
+    notes.extend(_below(read, float(part.mesh.bounds[0, 2])))
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, tuple(notes))
 
 
 def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -161,29 +163,55 @@ def _program_findings(read: Sequence[Program]) -> list[Finding]:
             for p in read for r in p.remarks]
 
 
-def _limit_findings(moves: Moves, source: Source, setup: ProofSetup) -> list[Finding]:
-    """Tips outside the travel, one finding per program, axis and side; tips below the table."""
-    out = []
-    sides: list[tuple[str, int, float, FindingKind, bool]] = []
-    if setup.travel is not None:
-        travel = np.asarray(setup.travel, dtype=np.float64)
-        for axis in range(3):
-            sides.append((f"{'XYZ'[axis]} below its travel", axis, float(travel[axis, 0]), FindingKind.LIMIT, False))
-            sides.append((f"{'XYZ'[axis]} above its travel", axis, float(travel[axis, 1]), FindingKind.LIMIT, True))
-    if setup.seat_z is not None:
-        sides.append(("the tip goes below the table", 2, setup.seat_z, FindingKind.COLLISION, False))
-    for text, axis, limit, kind, upper in sides:
-        over = (moves.end[:, axis] - limit) if upper else (limit - moves.end[:, axis])
-        for number, name in enumerate(source.names):
-            bad = np.flatnonzero((over > 1e-6) & (source.program == number))
-            if len(bad):
-                m = int(bad[np.argmax(over[bad])])
-                first = int(source.line[bad[0]])
-                x, y, z = (round(float(v), 6) for v in moves.end[m])
-                out.append(Finding(kind, name, first, None, None, (x, y, z), float(over[m]), limit,
-                                   f"{text}: {moves.end[m, axis]:.3f} mm at line {source.line[m]}, limit {limit:g} mm",
-                                   len(bad)))
-    return out
+def _limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
+    """What the machine or a tool cannot do: travel, feed, spindle speed; one finding per program and limit."""
+    return [found for p in read for found in (*_travel_findings(p, setup), *_feed_findings(p, setup),
+                                              *_speed_findings(p, setup))]
+
+
+def _travel_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    """Where the travel lies is for the operator to set, so what the moves span is held against it."""
+    if setup.travel is None or len(p) == 0:
+        return
+    for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
+        low, high = int(np.argmin(p.end[:, axis])), int(np.argmax(p.end[:, axis]))
+        span = float(p.end[high, axis] - p.end[low, axis])
+        if span > limit + 1e-6:
+            ends = " to ".join(f"{p.end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
+            yield _limit(p, max(low, high), span - limit, limit, f"the program moves over {span:.3f} mm in "
+                         f"{'XYZ'[axis]}, from {ends}; the machine travels {limit:g} mm")
+
+
+def _feed_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    if setup.max_feed is None:
+        return
+    over = np.flatnonzero(p.feed > setup.max_feed * (1.0 + 1e-9))
+    if len(over):
+        m = int(over[np.argmax(p.feed[over])])
+        yield _limit(p, m, float(p.feed[m]) - setup.max_feed, setup.max_feed,
+                     f"F{p.feed[m]:g} is over the {setup.max_feed:g} mm/min the machine feeds at", len(over))
+
+
+def _speed_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    for tool, (speed, line) in sorted(p.speeds.items()):
+        limit = setup.max_rpm.get(tool)
+        if limit is not None and speed > limit * (1.0 + 1e-9):
+            yield Finding(FindingKind.LIMIT, p.name, line, None, None, None, speed - limit, limit,
+                          f"S{speed:g} with T{tool} is over the {limit:g} 1/min it may turn at")
+
+
+def _below(read: Sequence[Program], bottom: float) -> Iterator[str]:
+    """What a table under the part would see: the proof knows of none that is not a fixture of the setup."""
+    for p in read:
+        if len(p) and float(p.end[:, 2].min()) < bottom - LEAST_BELOW:
+            m = int(np.argmin(p.end[:, 2]))
+            yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
+                   "part; what stands there is not known unless it is a fixture of the setup")
+
+
+def _limit(p: Program, move: int, over: float, limit: float, message: str, count: int = 1) -> Finding:
+    x, y, z = (round(float(v), 6) for v in p.end[move])
+    return Finding(FindingKind.LIMIT, p.name, int(p.line[move]), None, None, (x, y, z), over, limit, message, count)
 
 
 def _idle_findings(read: Sequence[Program], run: StockPass, moves: Moves, source: Source) -> list[Finding]:

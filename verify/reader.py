@@ -44,7 +44,7 @@ class Reader(Motion):
         table = log.table()
         return Program(log.name, np.ascontiguousarray(table[:, 0:3]), np.ascontiguousarray(table[:, 3:6]),
                        table[:, 6].astype(np.int8), np.ascontiguousarray(table[:, 7]), table[:, 8].astype(np.int32),
-                       table[:, 9].astype(np.int32), self.dwell, len(lines), log.remarks())
+                       table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks())
 
     def _scan(self, lines: list[str]) -> int:
         """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""

@@ -157,8 +157,11 @@ def test_missing_pass():
 def test_inch_for_mm():
     lines = program()
     lines[1] = lines[1].replace("G21", "G20")
-    proof = run(lines, setup=replace(SETUP, travel=np.array([[-50.0, 50], [-50, 50], [-60, 100]])))
-    assert first(proof, FindingKind.LIMIT).line == line_of(lines, "X-7 Y0")
+    proof = run(lines, setup=replace(SETUP, travel=np.array([100.0, 101.0, 160.0])))
+    found = {f.limit: f for f in proof.findings if f.kind == FindingKind.LIMIT}
+    assert set(found) == {100.0, 101.0, 160.0}
+    assert "in Z" in found[160.0].message and found[160.0].depth == pytest.approx(25.4 * 25.0 - 160.0)
+    assert f"to 508.000 (line {line_of(lines, 'X-7 Y0')})" in found[160.0].message
     assert proof.counts["residual"] > 0
 
 
@@ -176,9 +179,25 @@ def test_wrong_tool_in_the_spindle_is_a_gouge():
     assert found.depth > 0.9
 
 
-def test_below_the_table():
-    found = first(run(program(), setup=replace(SETUP, seat_z=-4.9)), FindingKind.COLLISION)
-    assert found.line == line_of(program(), "G1 X7 Y0 Z-5.000 F400") and found.depth == pytest.approx(0.1)
+def test_faster_than_the_machine_feeds_or_turns():
+    lines = program()
+    proof = run(lines, setup=replace(SETUP, max_feed=400.0, max_rpm={1: 8000.0, 9: 10.0}))
+    assert not [f for f in proof.findings if f.kind == FindingKind.LIMIT]
+    at = line_of(lines, "G1 X7 Y0 Z-5.000 F400")
+    lines[at - 1] = lines[at - 1].replace("F400", "F1200")
+    spin = line_of(lines, "S8000 M3")
+    lines[spin - 1] = lines[spin - 1].replace("S8000", "S8001")
+    found = [f for f in run(lines, setup=replace(SETUP, max_feed=400.0, max_rpm={1: 8000.0})).findings
+             if f.kind == FindingKind.LIMIT]
+    assert [(f.line, f.depth, f.limit) for f in found] == [(at, 800.0, 400.0), (spin, 1.0, 8000.0)]
+
+
+def test_what_goes_below_the_part_is_told():
+    assert run(program()).notes == ()
+    lines = program()
+    at = line_of(lines, "G1 X7 Y0 Z-5.000 F400")
+    lines[at - 1] = "G1 X7 Y0 Z-15.000 F400"
+    assert f"line {at} goes to Z-15.000, 5.000 mm below the part" in run(lines).notes[0]
 
 
 def test_program_of_another_zero_meets_nothing():
