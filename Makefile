@@ -22,6 +22,7 @@ $(BIN)/python:
 $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
 	$(INSTALL) --no-deps -r requirements.lock
 	$(INSTALL) --no-deps -e .
+	$(BIN)/zonemill warm
 	@touch $@
 
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)

@@ -1,4 +1,4 @@
-"""``zonemill``: plan, zones, verify, serve, demo, openapi.
+"""``zonemill``: plan, zones, verify, serve, demo, warm, openapi.
 
 Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
 stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
@@ -100,6 +100,17 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
 
         code = run_demo(out, keep=keep)
         raise typer.Exit(code)
+
+
+@app.command()
+def warm(as_json: AsJson = False) -> None:
+    """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
+    with _errors(as_json):
+        from service.console import say
+        from service.demo import run_warm
+
+        say("compiling kernels, about a minute the first time")
+        run_warm()
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""``zonemill demo``: what a first user does by hand, done once from end to end over HTTP."""
+"""``zonemill demo``: what a first user does by hand, done once from end to end over HTTP; and ``zonemill warm``."""
 
 from __future__ import annotations
 
@@ -46,6 +46,28 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.chain") -> int:
                 say(f"serving on {url} until Ctrl-C")
                 wait_for_interrupt()
     return exit_code(job)
+
+
+def run_warm() -> None:
+    """Compile every kernel by planning and proving a small part, so that no job waits for it.
+
+    Raises
+    ------
+    InternalError
+        The small part was not proved: this machine must not plan others.
+    """
+    from examples.demo import write_small
+    from service.chain import plan
+    from service.convert import read_setup
+
+    with tempfile.TemporaryDirectory(prefix="zonemill-warm-") as folder:
+        step, setup = write_small(folder)
+        report = plan(step, read_setup(setup), Path(folder, "out"), lambda _stage, _share: None)
+    if report["state"] != "proved":
+        raise InternalError("the small part that is known to be proved was not", code="not_as_installed",
+                            subjects=tuple(f["message"] for f in report["findings"][:5]),
+                            measured=report["state"], limit="proved",
+                            remedy="install again; please report it if it stays")
 
 
 def exit_code(job: dict[str, Any]) -> int:

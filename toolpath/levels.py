@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import (
+    MOST_PER_CHORD,
     SEGMENTS,
     chords_free,
     linear_crossings,
@@ -67,10 +68,13 @@ def dense(points: F64, spacing: float) -> F64:
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
     """A (ny, nx) mask grown by ``cells`` lattice steps in each direction, a square round every node."""
     size = 2 * int(np.ceil(cells)) + 1
-    if size <= 1:
+    if size <= 1 or not mask.any():
         return mask
-    out = ndimage.maximum_filter1d(mask.view(np.uint8), size, axis=0)
-    return np.asarray(ndimage.maximum_filter1d(out, size, axis=1).view(np.bool_))
+    near = _window(mask, size // 2)
+    grown = ndimage.maximum_filter1d(mask[near].view(np.uint8), size, axis=0)
+    out = np.zeros_like(mask)
+    out[near] = ndimage.maximum_filter1d(grown, size, axis=1).view(np.bool_)
+    return out
 
 
 def _window(active: NDArray[np.bool_], grow: int) -> tuple[slice, slice]:
@@ -105,12 +109,17 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
     where = (field.tree.arrays, field.noncut, field.coarse_row)
     shape = (z + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner, field.allowance)
     place_crossings(*where, ids, blocked, x0, y0, lat.step, *shape, BISECTIONS, xy)
+    follows = np.arange(1, len(ids) + 1)
+    follows[starts[1:] - 1] = np.where(closed, starts[:-1], -1)
+    more, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
+    refine(*where, xy, follows, *shape, tolerance, lat.step, more, count)
+    points = more[np.arange(MOST_PER_CHORD) < count[:, None]]
+    begins = np.concatenate([[0], np.cumsum(count)])[starts]
     out = []
     for k in range(len(starts) - 1):
-        chain = xy[starts[k]:starts[k + 1]]
-        if len(chain) < 2:
+        fine = points[begins[k]:begins[k + 1]]
+        if starts[k + 1] - starts[k] < 2:
             continue
-        fine = refine(*where, np.ascontiguousarray(chain), bool(closed[k]), *shape, tolerance, lat.step)
         if closed[k]:
             fine = np.vstack([fine, fine[:1]])
         out.append(Line(np.column_stack([fine, np.full(len(fine), z)]), bool(closed[k])))
@@ -134,11 +143,11 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, sp
     if not active.any():
         return []
     lat = field.lattice
-    blocked = field.height > z + LEVEL_TOLERANCE
-    walled = bool(blocked.any())
+    blocked = field.off_blocked(z)
+    walled = blocked is not None
     rows, cols = _window(active, 1)
-    if walled:
-        far = ndimage.distance_transform_edt(~blocked)[rows, cols] * lat.step
+    if blocked is not None:
+        far = blocked[rows, cols]
     else:
         far = ndimage.distance_transform_edt(np.pad(active[rows, cols], 1))[1:-1, 1:-1] * lat.step
     inside = np.ascontiguousarray(active[rows, cols])

@@ -20,7 +20,7 @@ from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, stamp, standi
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
-POOLED = 12  # nodes a side of the cells in which the highest stock is looked up
+POOLED = 12  # nodes a side of the squares whose highest stock is kept
 AIR_TOLERANCE = 0.01  # mm
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
 
@@ -39,8 +39,7 @@ class StockMap:
         self.lattice, self.top = lattice, np.ascontiguousarray(top)
         self.cover = ndimage.maximum_filter(self.top, 3) if cover is None else np.ascontiguousarray(cover)
         self.part = np.full_like(self.top, -np.inf) if part is None else np.ascontiguousarray(part)
-        self._tops: dict[float, F64] = {}  # by radius, the highest stock that near; as it was, so never too low
-        self._stale = True
+        self._pooled = _pooled(self.top)  # never too low: lowered as it is looked at
 
     @classmethod
     def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float) -> StockMap:
@@ -66,7 +65,6 @@ class StockMap:
         lat = self.lattice
         stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
               tool.corner_radius)
-        self._stale = True
 
     def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
         """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.
@@ -108,34 +106,15 @@ class StockMap:
     def meets_bodies(self, tips: F64, bodies: Sequence[Disc]) -> NDArray[np.bool_]:
         """(n,) bool: at tips (n, 3), mm, stock would be in shank or holder, given as cylinders with their clearance."""
         out = np.zeros(len(tips), np.bool_)
+        if not len(tips):
+            return out
         lat = self.lattice
+        tips = np.ascontiguousarray(tips)
+        lowest = float(tips[:, 2].min())
         for body in bodies:
-            near = tips[:, 2] + body.height < self._highest_near(tips, body.radius)
-            if near.any() and self._stale:
-                self._tops, self._stale = {}, False
-            if near.any():
-                near &= tips[:, 2] + body.height < self._highest_near(tips, body.radius)
-            rows = np.flatnonzero(near & ~out)
-            if len(rows):
-                hit = np.zeros(len(rows), np.bool_)
-                meets(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips[rows]), body.height, body.radius,
-                      hit)
-                out[rows] = hit
+            if lowest + body.height < float(self._pooled.max()):
+                meets(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, tips, body.height, body.radius, out)
         return out
-
-    def _highest_near(self, tips: F64, radius: float) -> F64:
-        """(n,) float64, mm: no lower than the stock within ``radius`` mm of tips, from cells ``POOLED`` nodes wide."""
-        if radius not in self._tops:
-            ny, nx = (-(-n // POOLED) * POOLED for n in self.top.shape)
-            padded = np.full((ny, nx), -np.inf)
-            padded[:self.top.shape[0], :self.top.shape[1]] = self.top
-            pooled = padded.reshape(ny // POOLED, POOLED, nx // POOLED, POOLED).max(axis=(1, 3))
-            size = 2 * (int(np.ceil(radius / (POOLED * self.lattice.step))) + 1) + 1
-            self._tops[radius] = ndimage.maximum_filter(pooled, size, mode="constant", cval=-np.inf)
-        grid, width = self._tops[radius], POOLED * self.lattice.step
-        j = np.floor((tips[:, 0] - self.lattice.x0) / width + 0.5 / POOLED).astype(np.int64)
-        i = np.floor((tips[:, 1] - self.lattice.y0) / width + 0.5 / POOLED).astype(np.int64)
-        return grid[np.clip(i, 0, grid.shape[0] - 1), np.clip(j, 0, grid.shape[1] - 1)]
 
     def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:
         """(n,) bool: at tips (n, 3), mm, the tool may come down from above.
@@ -155,3 +134,11 @@ class StockMap:
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:
     """(ny, nx) float64, mm: highest of the part in the disc round each cell."""
     return drop_grid(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)
+
+
+def _pooled(top: F64) -> F64:
+    """The highest of each square of ``POOLED`` nodes a side."""
+    ny, nx = (-(-n // POOLED) * POOLED for n in top.shape)
+    padded = np.full((ny, nx), -np.inf)
+    padded[:top.shape[0], :top.shape[1]] = top
+    return np.ascontiguousarray(padded.reshape(ny // POOLED, POOLED, nx // POOLED, POOLED).max(axis=(1, 3)))

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
@@ -136,6 +137,7 @@ class TipField:
         self.noncut, self.owner = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
+        self._off: tuple[float, F64 | None] = (math.nan, None)
 
     def _grid(self, lattice: Lattice, radius: float, corner: float) -> F64:
         return drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, corner)
@@ -188,6 +190,16 @@ class TipField:
             i, _ = self.coarse.cells(np.column_stack([np.zeros_like(ys), ys]))
             self._height = np.maximum(self.cut_height, self.noncut[np.ix_(i, j)])
         return self._height
+
+    def off_blocked(self, z: float) -> F64 | None:
+        """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
+
+        None where none is. The last answer is kept, for a layer asks three times.
+        """
+        if self._off[0] != z:
+            free = self.height <= z + LEVEL_TOLERANCE
+            self._off = z, None if free.all() else distance_transform_edt(free) * self.lattice.step
+        return self._off[1]
 
     def tips(self, xy: F64) -> F64:
         """Tip limit (n,) mm of the whole assembly at xy (n, 2) mm; exact for the cutting part."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from service import chain
 from service.artifacts import RESULT_FILES
 from service.cli import app
 from tests.step_files import write_step
@@ -96,3 +97,26 @@ def test_no_program_of_an_earlier_job_stays_beside_a_later_answer(part, tmp_path
     assert kept.pop("mine.txt") == "of another job"
     assert "of another job" not in kept.values()
     assert not {"program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc"} & set(kept)
+
+
+def test_warm_plans_a_part_on_which_every_strategy_has_something_to_do(monkeypatch):
+    reports = []
+    plan = chain.plan
+
+    def listening(*args):
+        reports.append(plan(*args))
+        return reports[-1]
+
+    monkeypatch.setattr(chain, "plan", listening)
+    assert CliRunner().invoke(app, ["warm"]).exit_code == 0
+    assert {s["strategy"] for s in reports[0]["steps"]} == {"layers", "floor", "zlevel", "zigzag"}
+    assert reports[0]["state"] == "proved"
+
+
+def test_warm_fails_where_the_small_part_is_not_proved(monkeypatch):
+    finding = {"message": "T1 cuts into the part"}
+    monkeypatch.setattr(chain, "plan", lambda *_args: {"state": "unproved", "findings": [finding]})
+    got = CliRunner().invoke(app, ["warm", "--json"])
+    assert got.exit_code == 1
+    problem = json.loads(got.stdout)
+    assert problem["code"] == "not_as_installed" and problem["subjects"] == ["T1 cuts into the part"]

@@ -29,6 +29,9 @@ SEGMENTS = np.array([
     [1, 3, -1, -1], [1, 0, -1, -1], [0, 3, -1, -1], [-1, -1, -1, -1],
 ], dtype=np.int64)
 
+HALVINGS = 5  # of a chord
+MOST_PER_CHORD = 2 ** HALVINGS
+
 
 @njit(cache=True, nogil=True)
 def _side_id(side, i, j, nx):
@@ -161,48 +164,42 @@ def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance,
     return mx, my, False
 
 
-@njit(cache=True, nogil=True)
-def refine(tree, noncut, row, points, closed, z, radius, corner, allowance, tol, reach):
-    """A chain (n, 2) with points put in wherever a chord leaves the true boundary by more than tol."""
-    n = len(points)
-    last = n if closed else n - 1
-    size = 8 * n + 64
-    out = np.empty((size, 2))
-    m = 0
-    stack = np.empty((64, 4))
-    depth = np.empty(64, np.int64)
-    for k in range(last):
-        top = 0
-        stack[0, 0], stack[0, 1] = points[k, 0], points[k, 1]
-        stack[0, 2], stack[0, 3] = points[(k + 1) % n, 0], points[(k + 1) % n, 1]
+@njit(cache=True, nogil=True, parallel=True)
+def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol, reach, out, count):
+    """Points put in on every chord that leaves the true boundary by more than tol.
+
+    points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
+    out     : (n, MOST_PER_CHORD, 2), count : (n,): the point itself and those put in behind it, in order
+    """
+    for k in prange(len(points)):
+        out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]
+        count[k] = 1
+        if follows[k] < 0:
+            continue
+        ends = np.empty((HALVINGS + 1, 4))
+        depth = np.empty(HALVINGS + 1, np.int64)
+        ends[0, 0], ends[0, 1] = points[k, 0], points[k, 1]
+        ends[0, 2], ends[0, 3] = points[follows[k], 0], points[follows[k], 1]
         depth[0] = 0
+        top, m = 0, 0
         while top >= 0:
-            px, py, qx, qy = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+            px, py, qx, qy = ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3]
             level = depth[top]
-            top -= 1
-            moved = False
-            if level < 5:
+            mx, my, moved = px, py, False
+            if level < HALVINGS:
                 mx, my, moved = _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance, tol,
                                             reach)
             if moved:
-                top += 1
-                stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = mx, my, qx, qy
+                ends[top, 0], ends[top, 1] = mx, my
                 depth[top] = level + 1
                 top += 1
-                stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = px, py, mx, my
+                ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3] = px, py, mx, my
                 depth[top] = level + 1
                 continue
-            if m + 2 >= size:
-                grown = np.empty((2 * size, 2))
-                grown[:m] = out[:m]
-                out = grown
-                size *= 2
-            out[m, 0], out[m, 1] = px, py
+            top -= 1
+            out[k, m, 0], out[k, m, 1] = px, py
             m += 1
-    if not closed and n:
-        out[m, 0], out[m, 1] = points[n - 1, 0], points[n - 1, 1]
-        m += 1
-    return out[:m].copy()
+        count[k] = m
 
 
 @njit(cache=True, nogil=True)

@@ -106,18 +106,30 @@ def standing(cover, part, x0, y0, step, tips, radius, half, out):
 
 
 @njit(cache=True, nogil=True)
-def meets(top, x0, y0, step, tips, height, radius, out):
-    """Whether stock stands higher than ``height`` mm over tips (n, 3) within ``radius`` mm of their axes."""
+def meets(top, pooled, side, x0, y0, step, tips, height, radius, out):
+    """Set out[k] where stock stands higher than ``height`` mm over tip k within ``radius`` mm of its axis.
+
+    pooled : no lower than the highest of each square of ``side`` nodes a side; lowered to it where it is looked at
+    """
     ny, nx = top.shape
-    n_r = int(np.ceil(radius / step))
+    rows, cols = pooled.shape
     for k in range(len(tips)):
+        if out[k]:
+            continue
         x, y, under = tips[k, 0], tips[k, 1], tips[k, 2] + height
-        jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
-        for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
-            dy = y0 + i * step - y
-            for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
-                if top[i, j] > under and (x0 + j * step - x) ** 2 + dy * dy <= radius * radius:
-                    out[k] = True
-                    break
-            if out[k]:
-                break
+        i0 = max(int(np.floor((y - radius - y0) / step)) // side, 0)
+        i1 = min(int(np.ceil((y + radius - y0) / step)) // side, rows - 1)
+        j0 = max(int(np.floor((x - radius - x0) / step)) // side, 0)
+        j1 = min(int(np.ceil((x + radius - x0) / step)) // side, cols - 1)
+        for row in range(i0, i1 + 1):
+            for col in range(j0, j1 + 1):
+                if pooled[row, col] <= under or out[k]:
+                    continue
+                highest = -np.inf
+                for i in range(row * side, min((row + 1) * side, ny)):
+                    dy = y0 + i * step - y
+                    for j in range(col * side, min((col + 1) * side, nx)):
+                        highest = max(highest, top[i, j])
+                        if top[i, j] > under and (x0 + j * step - x) ** 2 + dy * dy <= radius * radius:
+                            out[k] = True
+                pooled[row, col] = highest

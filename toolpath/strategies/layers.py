@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from toolpath.levels import Line, contours, dilated, pieces_where, rings
 from toolpath.stock import SURE_RIM, StockMap
@@ -82,6 +81,6 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
 def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
     """(ny, nx) bool: free places in strips too narrow for a ring; their walls are all there is to follow."""
     free = field.height <= z + LEVEL_TOLERANCE
-    cells = allowance / field.lattice.step
-    wide = ndimage.distance_transform_edt(free) >= cells if not free.all() else free
-    return np.asarray(free & ~dilated(np.asarray(wide), cells + 1.0))
+    far = field.off_blocked(z)
+    wide = free if far is None else far >= allowance
+    return np.asarray(free & ~dilated(np.asarray(wide), allowance / field.lattice.step + 1.0))
