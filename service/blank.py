@@ -12,18 +12,21 @@ from geometry.boxes import point_of_mesh_in_box
 from geometry.errors import SetupError
 from geometry.part import Part
 from schemas.setup import Setup
+from service.convert import face_numbers
+from zones.zoning import SEEN, SEEN_SHARE
 
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
+AWAY = 1e-6  # of a unit normal: what looks along a side does not look at it
 FULL = 1e-6  # share of a box that must be free of the part to be called stock
 
 
 def check_against_part(setup: Setup, part: Part) -> None:
-    """Refuse a blank that does not hold the part and a fixture that stands inside it.
+    """Refuse a blank that does not hold the part and what is to stay on it, and a fixture that stands inside it.
 
     Raises
     ------
     SetupError
-        Code 'stock_misses_part', 'no_stock' or 'fixture_in_part'.
+        Code 'stock_misses_part', 'allowance_beyond_stock', 'no_stock' or 'fixture_in_part'.
     """
     _check_box(setup, part)
     _check_fixtures(setup, part)
@@ -41,6 +44,7 @@ def _check_box(setup: Setup, part: Part) -> None:
         box = np.array(stock.box_mm, dtype=np.float64)
         _check_contains(box, part)
         box = box + np.array([-1.0, 1.0])[:, None] * stock.uncertainty_mm
+        _check_holds_allowance(box, setup, part)
     room = float(np.prod(box[1] - box[0]))
     if room - part.volume <= FULL * room:
         raise SetupError("nothing stands on the part that could be cut: the part fills its box blank", code="no_stock",
@@ -61,6 +65,47 @@ def _check_contains(box: np.ndarray, part: Part) -> None:
                      subjects=("stock.box_mm", *(side for _, side in worst)), measured=round(worst[0][0], 6), limit=0.0,
                      remedy=f"in the setup frame the part reaches over {ranges} mm; the box must hold that, or "
                             "placement.origin_mm be another")
+
+
+def _check_holds_allowance(box: np.ndarray, setup: Setup, part: Part) -> None:
+    """Refuse a box that ends nearer to what is to be machined than the allowance: no cut leaves what is not there.
+
+    The underside does not count, for the part sits on it and nothing is cut there.
+    """
+    allowance = setup.quality.stock_allowance_mm
+    if allowance <= 0:
+        return
+    mesh = part.mesh
+    to_cut = np.isin(mesh.face_ids, _faces_to_cut(setup, part)) & (mesh.normals[:, 2] > SEEN)
+    points, normals = mesh.triangles[to_cut], mesh.normals[to_cut]
+    held: dict[str, float] = {}
+    for corner, axis in ((0, 0), (0, 1), (1, 0), (1, 1), (1, 2)):
+        out = 2 * corner - 1
+        faces_it = out * normals[:, axis] > AWAY
+        room = (out * (box[corner, axis] - points[faces_it, :, axis])).min(axis=1)
+        along = room / (out * normals[faces_it, axis])  # the normal, on which an allowance is measured
+        held[f"{'-+'[corner]}{'XYZ'[axis]}"] = max(float(along.min(initial=np.inf)), 0.0)
+    least = allowance - min(OVERHANG, setup.quality.gouge_tolerance_mm)
+    short = sorted((side for side, room in held.items() if room < least), key=lambda side: held[side])
+    if not short:
+        return
+    sides = ", ".join(f"{held[side]:.3f} mm on the {side} side" for side in short)
+    raise SetupError(f"quality.stock_allowance_mm {allowance:g} is to stay on the part, but stock.box_mm with its "
+                     f"uncertainty_mm {setup.stock.uncertainty_mm:g} holds only {sides}", code="allowance_beyond_stock",
+                     subjects=("quality.stock_allowance_mm", "stock.box_mm", *short),
+                     measured={side: round(held[side], 6) for side in short}, limit=allowance,
+                     remedy="leave less on the part, give the box as it really is, or leave the faces on those sides "
+                            "alone with operations.exclude_faces")
+
+
+def _faces_to_cut(setup: Setup, part: Part) -> np.ndarray:
+    """Numbers of the faces asked for, else of those the access sees; which of them are in reach is not known yet."""
+    ids, areas = part.mesh.face_ids, part.mesh.areas
+    total = np.bincount(ids, weights=areas)
+    seen = np.bincount(ids, weights=areas * (part.mesh.normals[:, 2] > SEEN), minlength=len(total))
+    wanted = (np.flatnonzero((seen > 0) & (seen >= SEEN_SHARE * total)) if setup.operations.faces is None
+              else np.array(face_numbers(setup.operations.faces), np.int64))
+    return np.setdiff1d(wanted, face_numbers(setup.operations.exclude_faces))
 
 
 def _check_fixtures(setup: Setup, part: Part) -> None:

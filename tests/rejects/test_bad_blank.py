@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import CamError, SetupError
+from geometry.mesh import TriangleMesh
 from service.blank import check_against_part
 from service.convert import parse_setup
 from service.errors import problem_document
@@ -77,6 +78,72 @@ def test_an_allowance_beyond_the_stock(allowance):
     accepted(quality={"stock_allowance_mm": 1.5}, stock={"kind": "box"})
     refused("allowance_beyond_stock", quality={"stock_allowance_mm": 1.6}, stock={"kind": "box"})
     accepted(quality={"stock_allowance_mm": allowance}, stock={"margin_mm": 5})
+
+
+SIDES = {"-X": (0, 0), "-Y": (0, 1), "+X": (1, 0), "+Y": (1, 1), "+Z": (1, 2)}
+
+
+def holding(side, room):
+    """A box that stands 3 mm off the part, flush under it, and ``room`` mm off it on one side; it is as it says."""
+    corner, axis = SIDES[side]
+    box = [[-13.0, -8.0, 0.0], [13.0, 8.0, 11.0]]
+    box[corner][axis] = float(PART.bounds[corner][axis]) + (room if corner else -room)
+    return {"kind": "box", "box_mm": box, "uncertainty_mm": 0}
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("room", [0.0, 0.9])
+def test_a_box_that_does_not_hold_the_allowance(side, room):
+    found = refused("allowance_beyond_stock", stock=holding(side, room), quality={"stock_allowance_mm": 1.0})
+    assert found.subjects == ("quality.stock_allowance_mm", "stock.box_mm", side) and side in found.message
+    assert found.measured == {side: pytest.approx(room)} and found.limit == 1.0
+    accepted(stock=holding(side, room))
+    accepted(stock=holding(side, 1.0), quality={"stock_allowance_mm": 1.0})
+    accepted(stock=holding(side, room) | {"uncertainty_mm": 1.0}, quality={"stock_allowance_mm": 1.0})
+
+
+def test_every_side_that_holds_too_little_is_named_the_worst_first_and_the_underside_never():
+    box = {"kind": "box", "box_mm": [[-10.5, -5.0, 0.0], [11.0, 6.0, 8.25]], "uncertainty_mm": 0}
+    found = refused("allowance_beyond_stock", stock=box, quality={"stock_allowance_mm": 1.0})
+    assert found.measured == {"-Y": 0.0, "+Z": 0.25, "-X": 0.5} and list(found.measured) == ["-Y", "+Z", "-X"]
+    accepted(stock=holding("+Z", 2.0), quality={"stock_allowance_mm": 2.0})  # flush at the seat
+
+
+def test_only_what_is_to_be_machined_leaves_an_allowance():
+    ids = np.repeat(np.arange(1, 7), 2).astype(np.int32)  # bottom, top, -Y, +Y, -X, +X as in block()
+    part = SimpleNamespace(mesh=TriangleMesh(PART.mesh.vertices, PART.mesh.faces, ids), bounds=PART.bounds,
+                           volume=PART.volume)
+
+    def check(side, **operations):
+        check_against_part(parse_setup({"tools": TOOLS, "stock": holding(side, 0.0), "operations": operations,
+                                        "quality": {"stock_allowance_mm": 1.0}}), part)
+
+    check("+Z", faces=["F3", "F4"])
+    check("+Z", exclude_faces=["F2"])
+    check("-X", faces=["F2"])
+    for side, operations in (("+Z", {}), ("+Z", {"faces": ["F2"]}), ("+Z", {"exclude_faces": ["F3"]}),
+                             ("-X", {"faces": ["F5"]})):
+        with pytest.raises(SetupError, match="on the"):
+            check(side, **operations)
+
+
+def test_an_allowance_is_measured_along_the_normal():
+    # a block turned by 30 degrees: its edges come to 0.9 mm of the box, but there no normal points at it
+    turn = np.radians(30.0)
+    spin = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1.0]])
+    mesh = TriangleMesh(PART.mesh.vertices @ spin.T, PART.mesh.faces, PART.mesh.face_ids)
+    part = SimpleNamespace(mesh=mesh, bounds=mesh.bounds, volume=PART.volume)
+
+    def check(room):
+        box = mesh.bounds + np.array([[-room, -room, 0], [room, room, 3.0]])
+        check_against_part(parse_setup({"tools": TOOLS, "quality": {"stock_allowance_mm": 1.0}, "stock": {
+            "kind": "box", "box_mm": box.tolist(), "uncertainty_mm": 0}}), part)
+
+    check(0.9)  # 0.9 / cos 30 = 1.04
+    with pytest.raises(SetupError) as caught:
+        check(0.8)
+    assert caught.value.measured == {side: pytest.approx(0.8 / np.cos(turn), abs=1e-6) for side in SIDES
+                                     if side != "+Z"}
 
 
 def test_a_fixture_in_the_part():
