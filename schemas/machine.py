@@ -25,21 +25,27 @@ class Machine(WireModel):
                                            "machine.")] = True
     dialects: Annotated[list[str], Field(min_length=1, max_length=8,
                                          description="Controls to write for; built so far: linuxcnc.")] = ["linuxcnc"]
-    travel_mm: Annotated[Triple | None, Field(description="Travel in X, Y and Z, mm; null: not limited.")] = None
+    travel_mm: Annotated[Triple | None, Field(
+        description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
+                    "counted; where on the machine is for the work offset. null: not limited.")] = None
     rotary_deg: Annotated[list[list[Number]] | None, Field(description="Limits of the rotary axes, deg; null on a "
                                                                        "3-axis machine.")] = None
     pivots_mm: Annotated[list[Vector] | None, Field(description="Pivot points of the rotary axes, mm; null on a "
                                                                 "3-axis machine.")] = None
-    max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: "
-                                                                       "18000.")] = None
-    max_feed_mm_min: Annotated[Number | None, Field(ge=0.1, le=1e6, description="Highest feed, mm/min; null: "
-                                                                                 "5000.")] = None
+    max_rpm: Annotated[Number | None, Field(
+        ge=1, le=1e6, description="Highest spindle speed, 1/min; null: plans stay at or below 18000, and programs are "
+                                  "held to no limit but those of the tools.")] = None
+    max_feed_mm_min: Annotated[Number | None, Field(
+        ge=0.1, le=1e6, description="Highest feed, mm/min; null: plans stay at or below 5000, and programs are held to "
+                                    "no limit.")] = None
     rapid_mm_min: Annotated[Number | None, Field(ge=1, le=1e6, description="Rapid rate for times, mm/min; null: "
                                                                             "10000.")] = None
     acceleration_mm_s2: Annotated[Number | None, Field(ge=1, le=1e7, description="Acceleration, mm/s2, for times; "
                                                                                   "null: 1000.")] = None
     rapid_motion: Annotated[Literal["linear", "dogleg"], Field(
-        description="How the control runs a rapid in several axes.")] = "linear"
+        description="How the control runs a rapid in several axes. linear: straight. dogleg: each axis at its own "
+                    "speed, so a rapid that moves more than one axis lower than clearance_mm.rapid over the top of "
+                    "part, stock and fixtures is a finding.")] = "linear"
 
     @model_validator(mode="after")
     def _check(self) -> Machine:

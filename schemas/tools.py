@@ -66,8 +66,8 @@ class Tool(WireModel):
         description="Tip to holder nose, mm. Must be given with a holder; without one the default is the greater of "
                     "neck_length_mm and 10 x diameter_mm.")] = None
     gauge_length_mm: Annotated[Length | None, Field(
-        description="Tip to spindle face, mm, for the length offset and kinematics only; default: stickout_mm + the "
-                    "holder's lengths.")] = None
+        description="Tip to spindle face, mm, for the length offset, the travel in Z and kinematics only; default: "
+                    "stickout_mm + the holder's lengths.")] = None
     max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: no limit of "
                                                                        "the tool's own.")] = None
     life_min: Annotated[Number | None, Field(gt=0, le=1e6, description="Life in cut, min; null: not given.")] = None
