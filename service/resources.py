@@ -83,13 +83,17 @@ def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
     ------
     NotReadyError
         The job has not ended, or ended without a result.
+    NotFoundError
+        The data folder has lost it.
     """
     if row["state"] not in FINAL_STATES:
         raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
-                            remedy="follow its events until it ends")
+                            remedy=f"wait until it ends; GET {path_of(row)}/events follows it")
     if not row["artifact"]:
+        remedy = ("it was cancelled: post it again, under another Idempotency-Key if it had one" if row["state"] == "cancelled"
+                  else f"GET {path_of(row)} tells under error what went wrong")
         raise NotReadyError(f"job {row['id']} ended as {row['state']} and left no result", code="no_result",
-                            subjects=(row["id"],), remedy="see the error of the job")
+                            subjects=(row["id"],), remedy=remedy)
     folder = artifacts.result(row["artifact"])
     if not folder.is_dir():
         raise NotFoundError(f"the files of job {row['id']} are gone from the data folder", code="result_gone",

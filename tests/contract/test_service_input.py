@@ -124,11 +124,21 @@ def test_files_cannot_be_fetched_from_elsewhere(client, post, finish):
         assert answer.status_code == 404, name
 
 
-def test_results_of_a_running_job_are_not_ready(client, post):
+@pytest.mark.parametrize("document", ["files", "report", "zones"])
+def test_a_job_without_result_says_what_to_do_in_the_state_it_is_in(client, post, finish, document):
     job = post(client, "sleep").json()
-    _is_problem(client.get(job["links"]["files"]), 409, "not_ready")
-    client.delete(job["links"]["self"])
-    _is_problem(client.get(job["links"]["files"]), 409, "no_result")
+    links = job["links"]
+    waiting = client.get(links[document])
+    _is_problem(waiting, 409, "not_ready")
+    assert "wait" in waiting.json()["remedy"] and links["events"] in waiting.json()["remedy"]
+    assert client.delete(links["self"]).json()["error"] is None
+    cancelled = client.get(links[document])
+    _is_problem(cancelled, 409, "no_result")
+    assert "post it again" in cancelled.json()["remedy"] and "error" not in cancelled.json()["remedy"]
+    failed = finish(client, post(client, "open").json())
+    answer = client.get(failed["links"][document])
+    _is_problem(answer, 409, "no_result")
+    assert failed["error"] and f"GET {failed['links']['self']} tells under error" in answer.json()["remedy"]
 
 
 def test_a_bug_in_a_route_is_a_problem_document_too(make_client, monkeypatch):
