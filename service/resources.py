@@ -90,8 +90,9 @@ def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
         raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
                             remedy=f"wait until it ends; GET {path_of(row)}/events follows it")
     if not row["artifact"]:
-        remedy = ("it was cancelled: post it again, under another Idempotency-Key if it had one" if row["state"] == "cancelled"
-                  else f"GET {path_of(row)} tells under error what went wrong")
+        cancelled = row["state"] == "cancelled"
+        remedy = ("it was cancelled: post it again, under another Idempotency-Key if it had one" if cancelled else
+                  f"GET {path_of(row)} tells under error what went wrong")
         raise NotReadyError(f"job {row['id']} ended as {row['state']} and left no result", code="no_result",
                             subjects=(row["id"],), remedy=remedy)
     folder = artifacts.result(row["artifact"])
