@@ -194,7 +194,8 @@ def proof_setup(ready: Prepared) -> ProofSetup:
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
         rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=s.access[0].work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
-        max_feed=s.machine.max_feed_mm_min,
+        gauge_length={body.number: t.gauge_length_mm or 0.0 for t, body in zip(s.tools, tool_bodies(s), strict=True)},
+        dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])})
 

@@ -29,6 +29,7 @@ from zones.reach import LEVEL_TOLERANCE, TipField
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of the same, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
+LEAST_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
@@ -151,7 +152,7 @@ class Linker:
         n = max(2, int(run / 0.2) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
         level = np.column_stack([here[:2] + t * (start[:2] - here[:2]), np.full(n, z)])
-        if float(self.stock.overlap(level, self.field.tool).max()) > self.motions.step_down:
+        if not self._lane(level, self.motions.step_down):
             return None
         over = z - start[2]
         if here[2] < z and not bool(self.stock.in_air(np.vstack([here, [*here[:2], z]]), self.field.tool).all()):
@@ -181,9 +182,15 @@ class Linker:
                         n = max(2, int(far / 0.2) + 1)
                         t = np.linspace(0.0, 1.0, n)[:, None]
                         lane = q + t * (start - q)
-                        if float(self.stock.overlap(lane, tool).max()) <= 1.5 * self.motions.step_down:
+                        if self._lane(lane, 1.5 * self.motions.step_down):
                             return np.vstack([q, start]), points, False
         return None
+
+    def _lane(self, tips: F64, most: float) -> bool:
+        """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), and none above the flutes."""
+        tool = self.field.tool
+        return (float(self.stock.overlap(tips, tool).max()) <= most
+                and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length)
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
         tool = self.field.tool
@@ -220,8 +227,8 @@ class Linker:
         need = over / slope
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
         total = float(s[-1])
-        if total < 1e-3:
-            return None
+        if total < LEAST_RUN * self.field.tool.radius * (2.0 if closed else 1.0):
+            return None  # to and fro on the spot is drilling
         if closed:
             laps = math.ceil(need / total)
             if laps > MOST_LEGS:

@@ -104,7 +104,10 @@ class StockMap:
         return out
 
     def meets_bodies(self, tips: F64, bodies: Sequence[Disc]) -> NDArray[np.bool_]:
-        """(n,) bool: at tips (n, 3), mm, stock would be in shank or holder, given as cylinders with their clearance."""
+        """(n,) bool: at tips (n, 3), mm, stock would be in shank or holder, given as cylinders with their clearance.
+
+        Whatever cell it stands in: the radius is half a cell diagonal greater.
+        """
         out = np.zeros(len(tips), np.bool_)
         if not len(tips):
             return out
@@ -113,7 +116,8 @@ class StockMap:
         lowest = float(tips[:, 2].min())
         for body in bodies:
             if lowest + body.height < float(self._pooled.max()):
-                meets(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, tips, body.height, body.radius, out)
+                meets(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, tips, body.height,
+                      body.radius + HALF_DIAGONAL * lat.step, out)
         return out
 
     def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:

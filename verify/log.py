@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.cycles import FEED
-from verify.program import Remark
+from verify.program import Remark, Stop
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
@@ -22,7 +24,7 @@ class Log:
 
     name : of the program
     line : 1-based, the one being read
-    speeds : by T number, the highest S it turned at, 1/min, and the line
+    speeds, unknown, stops, blend : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -39,6 +41,9 @@ class Log:
         self._moves = 0
         self._feeds = False
         self.speeds: dict[int, tuple[float, int]] = {}
+        self.unknown: list[tuple[int, int]] = []
+        self.stops: list[Stop] = []
+        self.blend = 0.0
 
     @property
     def moved(self) -> bool:
@@ -64,6 +69,14 @@ class Log:
         more = {id(r): f" (and {self._count[key] - MAX_REMARKS} more such lines)" for key, r in kept.items()}
         return tuple(sorted((Remark(r.line, r.message + more.get(id(r), "")) for r in self._remarks.values()),
                             key=lambda r: (r.line, r.message)))
+
+    def move(self, start: Sequence[float], end: Sequence[float], kind: int, feed: float, tool: int, axes: int) -> None:
+        """Write a move between places (3,), mm; ``axes`` as in ``Program.unknown``, 0 where the start is known."""
+        if len(self.rows) >= self.full:
+            self.flush()
+        if axes:
+            self.unknown.append((self._moves + len(self.rows), axes))
+        self.rows.append((*start, *end, kind, feed, tool, self.line))  # type: ignore[arg-type]
 
     def turns(self, tool: int, speed: float) -> None:
         """Note that a tool turns at ``speed``, 1/min."""

@@ -46,6 +46,8 @@ class ProofSetup:
     plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.stock``)
     rapid_feed    : mm/min
     travel        : (3,) float64 mm, what the moves of a program may span in X, Y and Z, or None
+    gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
+    dogleg        : whether a rapid moves each axis at its own speed, so that its way is not a straight line
     max_feed      : mm/min of any feed move, or None
     max_rpm       : 1/min by T number; a tool left out is not limited
     work_offset   : the only one whose coordinates are those of the setup frame
@@ -69,6 +71,8 @@ class ProofSetup:
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
     travel: F64 | None = None
+    gauge_length: Mapping[int, float] = field(default_factory=dict)
+    dogleg: bool = False
     work_offset: str = "G54"
     max_feed: float | None = None
     max_rpm: Mapping[int, float] = field(default_factory=dict)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 
 from verify.log import Log
-from verify.program import NAN, State
+from verify.program import NAN, State, Stop
 from verify.words import CYCLES, MOTION_CODES, WORK_OFFSETS, Block
 
 INCH = 25.4
@@ -24,6 +25,8 @@ class Modes:
         self.s = State()
         self.incremental_line = 0
         self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
+        self.stated: set[float] = set()
+        self.assumed: tuple[str, ...] = ()
 
     def _set_modes(self, block: Block) -> None:
         s, values = self.s, block.values
@@ -51,6 +54,7 @@ class Modes:
     def _spindle(self, ms: list[int]) -> None:
         s = self.s
         if 6 in ms:
+            self.stop("tool change")
             if s.selected != s.tool:
                 s.position[2] = NAN
             s.tool, s.spindle = s.selected, False
@@ -64,6 +68,7 @@ class Modes:
     def _mode(self, g: float, values: dict[str, float]) -> None:
         """Apply one G word that sets a state."""
         s = self.s
+        self.stated.add(g)
         if g in MOTION_CODES:
             self._motion(g)
         elif g in (17, 18, 19):
@@ -88,6 +93,18 @@ class Modes:
             if s.work_offset != self.work_offset:
                 self.log.remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
                                 f"({self.work_offset})", s.work_offset)
+
+    def _assume(self) -> None:
+        """Note what the first move takes for granted: a control keeps what the program before it left."""
+        groups: dict[str, Collection[float]] = {"G21": (20, 21), "G90": (90, 91), "G17": (17, 18, 19),
+                                                "G94": (93, 94, 95), self.work_offset: WORK_OFFSETS}
+        self.assumed = tuple(word for word, group in groups.items() if self.stated.isdisjoint(group))
+
+    def stop(self, what: str) -> None:
+        """Note the height at which the program stops, if it is known."""
+        s = self.s
+        if not math.isnan(s.position[2]) and s.tool > 0:
+            self.log.stops.append(Stop(self.log.line, what, s.tool, s.position[2]))
 
     def _motion(self, g: float) -> None:
         """A cycle begun anew keeps nothing of the one before."""
@@ -132,6 +149,7 @@ class Modes:
         """G64: the control may leave the path by P (0 and none: without bound) and by Q of its own line fitting."""
         limit = self.blend_limit
         p, q = values.get("P", 0.0) * self.s.scale, values.get("Q", 0.0) * self.s.scale
+        self.log.blend = max(self.log.blend, p, q)
         if p == 0:
             self.log.remark("blending", f"G64 without a P above 0 lets the control leave the path by any amount (limit "
                             f"P{limit:g} mm)", self.log.line)

@@ -144,9 +144,10 @@ class Motion(Modes):
                             "first", self.log.line)
         s.parked &= math.isnan(target[0]) or math.isnan(target[1])
         if known:
-            if len(self.log.rows) >= Log.full:
-                self.log.flush()
-            self.log.rows.append((*start, *target, kind, feed, s.tool, self.log.line))  # type: ignore[arg-type]
+            if not self.log.moved:
+                self._assume()
+            axes = sum(1 << k for k, p in enumerate(was) if math.isnan(p))
+            self.log.move(start, target, kind, feed, s.tool, axes)
 
     def _arc(self, target: list[float], values: dict[str, float], feed: float) -> None:
         s, error = self.s, self.log.error

@@ -21,18 +21,32 @@ class Remark:
     message: str
 
 
+@dataclass(frozen=True)
+class Stop:
+    """Where the program stops to change the tool, or ends: line, what it is, tool in the spindle and its height, mm."""
+
+    line: int
+    what: str
+    tool: int
+    z: float
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """A program as straight moves of the tool tip in the setup frame.
 
     name    : of the program
     start, end : (m, 3) float64, mm; an axis whose start is unknown starts where it ends
+    unknown : (k, 2) int64, moves with such axes, and which as a sum of 1 for X, 2 for Y, 4 for Z
     kind    : (m,) int8, RAPID or FEED (arcs are FEED polylines within 1e-3 mm)
     feed    : (m,) float64, mm/min; nan for rapids
     tool    : (m,) int32, T number in the spindle, 0 for none
     line    : (m,) int32, 1-based line of the source
     dwell   : s of G4 and drilling dwells
     speeds  : by T number, the highest S it turned at, 1/min, and the line
+    stops   : where a tool change or the end came at a known height
+    assumed : words in force without having been stated before the first move
+    blend   : mm, the most G64 lets the control leave the path by, as far as a P bounds it
     lines   : number of lines read
     remarks : what should not be run
     """
@@ -48,6 +62,10 @@ class Program:
     speeds: dict[int, tuple[float, int]]
     lines: int
     remarks: tuple[Remark, ...]
+    unknown: NDArray[np.int64]
+    stops: tuple[Stop, ...]
+    assumed: tuple[str, ...]
+    blend: float
 
     def __len__(self) -> int:
         return len(self.start)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
+from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
 from verify.model import Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.reader import FEED, Program, read_program
@@ -29,7 +30,8 @@ from verify.stock import StockPass, blank, run_bodies, run_stock, stock_on_norma
 
 RAY_ERROR = 1e-6
 LEAST_REACH = 1.0
-LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
+BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
+BLEND_SHARE = 0.1
 Report = Callable[[float], None]
 
 
@@ -66,8 +68,10 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     threads = threads or min(2, os.cpu_count() or 1)
     tell = progress or (lambda _share: None)
     read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
-                         blend_limit=setup.gouge_tolerance)
+                         blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance))
             for name, text in programs]
+    top = top_of_all(part.mesh.bounds, setup)
+    read = [from_above(p, top + setup.clearance_rapid) for p in read]
     moves, source = _moves(read, tools)
     tell(0.1)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
@@ -79,10 +83,10 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                                progress=lambda f: tell(0.85 + 0.15 * f))
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     findings = [*contact_findings(_merge(run.events, touched), moves.feed, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(read), *_limit_findings(read, setup),
+                *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost + lost} contacts more than the tables hold"] if run.lost + lost else []
-    notes.extend(_below(read, float(part.mesh.bounds[0, 2])))
+    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2])))
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, tuple(notes))
 
 
@@ -163,57 +167,6 @@ def _program_findings(read: Sequence[Program]) -> list[Finding]:
             for p in read for r in p.remarks]
 
 
-def _limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
-    """What the machine or a tool cannot do: travel, feed, spindle speed; one finding per program and limit."""
-    return [found for p in read for found in (*_travel_findings(p, setup), *_feed_findings(p, setup),
-                                              *_speed_findings(p, setup))]
-
-
-def _travel_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    """Where the travel lies is for the operator to set, so what the moves span is held against it."""
-    if setup.travel is None or len(p) == 0:
-        return
-    for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
-        low, high = int(np.argmin(p.end[:, axis])), int(np.argmax(p.end[:, axis]))
-        span = float(p.end[high, axis] - p.end[low, axis])
-        if span > limit + 1e-6:
-            ends = " to ".join(f"{p.end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
-            yield _limit(p, max(low, high), span - limit, limit, f"the program moves over {span:.3f} mm in "
-                         f"{'XYZ'[axis]}, from {ends}; the machine travels {limit:g} mm")
-
-
-def _feed_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    if setup.max_feed is None:
-        return
-    over = np.flatnonzero(p.feed > setup.max_feed * (1.0 + 1e-9))
-    if len(over):
-        m = int(over[np.argmax(p.feed[over])])
-        yield _limit(p, m, float(p.feed[m]) - setup.max_feed, setup.max_feed,
-                     f"F{p.feed[m]:g} is over the {setup.max_feed:g} mm/min the machine feeds at", len(over))
-
-
-def _speed_findings(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    for tool, (speed, line) in sorted(p.speeds.items()):
-        limit = setup.max_rpm.get(tool)
-        if limit is not None and speed > limit * (1.0 + 1e-9):
-            yield Finding(FindingKind.LIMIT, p.name, line, None, None, None, speed - limit, limit,
-                          f"S{speed:g} with T{tool} is over the {limit:g} 1/min it may turn at")
-
-
-def _below(read: Sequence[Program], bottom: float) -> Iterator[str]:
-    """What a table under the part would see: the proof knows of none that is not a fixture of the setup."""
-    for p in read:
-        if len(p) and float(p.end[:, 2].min()) < bottom - LEAST_BELOW:
-            m = int(np.argmin(p.end[:, 2]))
-            yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
-                   "part; what stands there is not known unless it is a fixture of the setup")
-
-
-def _limit(p: Program, move: int, over: float, limit: float, message: str, count: int = 1) -> Finding:
-    x, y, z = (round(float(v), 6) for v in p.end[move])
-    return Finding(FindingKind.LIMIT, p.name, int(p.line[move]), None, None, (x, y, z), over, limit, message, count)
-
-
 def _idle_findings(read: Sequence[Program], run: StockPass, moves: Moves, source: Source) -> list[Finding]:
     """A program whose feed moves never meet the stock: another zero, or inch for mm."""
     out = []
@@ -275,7 +228,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
     return Proof(top, counts, cuts.residual, line, program, proved,
                  _zones(scored, cuts.residual, proved, setup, zone_ids), cuts.gouge_max, seconds,
                  float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
-                 RAY_ERROR + CHORD, cuts.reach, spacing, notes)
+                 RAY_ERROR + CHORD + max((p.blend for p in read), default=0.0), cuts.reach, spacing, notes)
 
 
 __all__ = ["Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

@@ -7,8 +7,8 @@ What it understands but a machinist should not run (length offset off, another w
 standing, path blending beyond the tolerance, a word no code takes) becomes a ``Remark`` and the reading goes on.
 
 Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; the axes
-left unknown are known again once programmed. A rapid is one straight line. Until the program says otherwise, the unit
-is mm and the control keeps to the path.
+left unknown are known again once programmed. Until the program says otherwise, the unit is mm and the control keeps to
+the path; what it takes for granted so is told (``Program.assumed``).
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ class Reader(Motion):
         """Moves and remarks of ``text``; raises as ``read_program`` says."""
         log, lines = self.log, text.split("\n")
         percents = self._scan(lines)
+        self.stop("end of the program")
         if not self.s.ended and percents < 2:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
         log.raise_errors()
@@ -44,7 +45,8 @@ class Reader(Motion):
         table = log.table()
         return Program(log.name, np.ascontiguousarray(table[:, 0:3]), np.ascontiguousarray(table[:, 3:6]),
                        table[:, 6].astype(np.int8), np.ascontiguousarray(table[:, 7]), table[:, 8].astype(np.int32),
-                       table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks())
+                       table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
+                       np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend)
 
     def _scan(self, lines: list[str]) -> int:
         """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""

@@ -12,8 +12,9 @@ itself, so the spacing only matters for stock that is not part.
   beyond the cutting radius, and it may overlap by the gouge tolerance.
 - In a rapid the whole assembly is grown radially by the rapid clearance, heights are not; a straight lift
   leaves the place it stands in with no clearance asked.
-- Plunge: consecutive feed moves that descend steeper than the ramp angle form one descent. It is a plunge
-  where the end-cutting region takes more than ``plunge_skin`` tool diameters off a line. The region is the
+- Plunge: what feed moves steeper than the ramp angle take off a line with the end-cutting region of the tool adds
+  up, and is worked off by going sideways, at the slope of the ramp. It is a plunge where more than ``plunge_skin``
+  tool diameters are open; so one descent broken by steps aside, lifts or pecks is still one. The region is the
   whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball (to
   30 degrees of its sphere); so a ball that finishes downhill through a thin skin does not plunge.
 """
@@ -27,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import F64, I32, TriangleMesh
+from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
@@ -39,6 +40,7 @@ MAX_LINES = 6_000_000
 BLOCK = 32
 EVENTS = 4096
 NEVER = -1e30
+ANOTHER_TOOL = 1e6  # mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,13 +177,21 @@ def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: flo
     run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads)
 
 
-def descents(moves: Moves, ramp_angle: float) -> I32:
-    """(m,) int32: number (1, 2, ...) of the descent each feed move steeper than ``ramp_angle`` (rad) is part of,
-    0 for every other move. Consecutive steep moves are one descent."""
+def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
+    """Feed moves that descend steeper than ``ramp_angle`` (rad), and what ramps could have taken since the beginning.
+
+    Returns
+    -------
+    steep : (m,) bool
+    earned : (m,) float64, mm: sideways way of all moves before that are not steep, times the tangent of the angle;
+             without end at a change of the tool
+    """
     d = moves.end - moves.start
-    steep = moves.feed & (-d[:, 2] > np.hypot(d[:, 0], d[:, 1]) * math.tan(ramp_angle) + 1e-9)
-    begins = steep & ~np.concatenate([[False], steep[:-1]])
-    return np.where(steep, np.cumsum(begins), 0).astype(np.int32)
+    aside, slope = np.hypot(d[:, 0], d[:, 1]), math.tan(ramp_angle)
+    steep = np.asarray(moves.feed & (-d[:, 2] > aside * slope + 1e-9))
+    earned = np.cumsum(np.where(steep, 0.0, aside * slope))
+    changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
+    return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +221,7 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
-    runs, cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
+    (steep, earned), cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
     skins = setup.plunge_skin * 2.0 * cutters[:, 0]
     nx, ny = field.height.shape
 
@@ -219,7 +229,7 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
         def work() -> object:
             events = np.empty((EVENTS, 7))
             n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
-                           field.fixed, moves.start, moves.end, moves.feed, runs, moves.tool, cutters,
+                           field.fixed, moves.start, moves.end, moves.feed, steep, earned, moves.tool, cutters,
                            end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
                            setup.gouge_tolerance, cut, events)
             return events[:min(n, EVENTS)].copy(), n

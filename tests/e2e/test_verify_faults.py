@@ -192,6 +192,96 @@ def test_faster_than_the_machine_feeds_or_turns():
     assert [(f.line, f.depth, f.limit) for f in found] == [(at, 800.0, 400.0), (spin, 1.0, 8000.0)]
 
 
+DRILLS = {
+    "at once": ["Z-1.0"],
+    "by steps aside": [w for k in range(1, 6) for w in (f"Z{-0.2 * k:.1f}", f"X{-7 + 0.001 * (k % 2)}")],
+    "by pecks": [w for k in range(1, 6) for w in (f"Z{-0.2 * k:.1f}", "G0 Z1.5", f"Z{-0.2 * k + 0.1:.1f}", "G1")],
+    "up a little between": [w for k in range(1, 6) for w in (f"Z{-0.2 * k:.1f}", f"Z{-0.2 * k + 0.001:.3f}")],
+}
+
+
+@pytest.mark.parametrize("way", DRILLS)
+def test_a_plunge_is_one_however_it_is_broken_up(way):
+    lines = program()
+    at = line_of(lines, "G1 Z0.5 F300")
+    found = first(run([*lines[:at], *DRILLS[way], "Z0.5", *lines[at:]]), FindingKind.PLUNGE)
+    assert found.depth == pytest.approx(1.5, abs=0.12) and at < found.line <= at + len(DRILLS[way])
+
+
+def test_slots_between_small_steps_down_are_no_plunge():
+    lines = program()
+    at = line_of(lines, "G1 Z0.5 F300")
+    slots = [w for k in range(1, 8) for w in (f"Z{0.5 - 0.2 * k:.1f}", f"X{7 if k % 2 else -7}")]
+    assert "plunge" not in run([*lines[:at], *slots, "Z0.5", "X-7", *lines[at:]]).counts
+
+
+def test_a_plunge_from_home_or_the_start_is_seen():
+    lines = program()
+    for way in (["G43 H1", "G0 X-7 Y0", "G1 Z-1.0 F60"], ["G43 H1", "G53 G0 Z0", "G0 X-7 Y0", "G1 Z-1.0 F60"]):
+        found = first(run([*lines[:4], *way, "G0 Z1.5", *lines[7:]]), FindingKind.PLUNGE)
+        assert found.line == 4 + len(way) and found.depth == pytest.approx(1.5, abs=0.01)
+    rapid = ["G43 H1", "G0 X-7 Y0", "Z-1.0"]
+    assert first(run([*lines[:4], *rapid, *lines[7:]]), FindingKind.RAPID).line == 7
+
+
+@pytest.mark.parametrize("way", [
+    ["G43 H1", "G0 X-7 Y0 Z0.4"], ["G43 H1", "G53 G0 Z0", "G53 G0 X0 Y0", "G0 X-7 Y0 Z0.4"],
+    ["G43 H1", "G0 Z0.4", "X-7 Y0"], ["G43 H1", "G1 X-7 Y0 Z0.5 F300"]])
+def test_a_way_from_an_unstated_place_into_the_work_is_named(way):
+    lines = program()
+    found = first(run([*lines[:4], *way, "G0 Z1.5", *lines[7:]]), FindingKind.PROGRAM)
+    assert found.line == 4 + len(way) and "cannot be simulated" in found.message
+    above = [w.replace("Z0.4", "Z1.5").replace("Z0.5", "Z1.5") for w in way]
+    assert run([*lines[:4], *above, *lines[7:]]).clean
+
+
+def test_a_dogleg_is_no_straight_line():
+    lines = program()
+    way = ["G0 X7", "X-7 Z1", "Z1.5"]
+    lines = [*lines[:6], *way, *lines[7:]]
+    assert run(lines).clean
+    found = first(run(lines, setup=replace(SETUP, dogleg=True)), FindingKind.RAPID)
+    assert found.line == 8 and "dogleg" in found.message
+    assert run(program(), setup=replace(SETUP, dogleg=True)).clean
+
+
+def test_a_stop_in_the_stock_is_named():
+    lines = program()
+    lift = line_of(lines, "G0 Z20")
+    low = [line for k, line in enumerate(lines, 1) if k != lift]
+    found = first(run(low), FindingKind.PROGRAM)
+    assert found.line == line_of(low, "M30") and "end of the program" in found.message
+    found = first(run([*lines[:lift - 1], "T2 M6", "G43 H2 S8000 M3", "G0 X0 Y0", *lines[lift - 1:]],
+                      tools=(TOOL, OTHER)), FindingKind.PROGRAM)
+    assert found.line == lift and "tool change" in found.message
+
+
+def test_tool_lengths_count_in_the_travel_of_z():
+    lines = program()
+    end = line_of(lines, "M5")
+    two = [*lines[:end - 1], "T2 M6", "S8000 M3", "G0 G43 H2 Z20", *lines[end - 1:]]
+    setup = replace(SETUP, travel=np.array([500.0, 500.0, 100.0]), gauge_length={1: 60.0, 2: 100.0})
+    assert run(two, tools=(TOOL, OTHER), setup=setup).clean
+    found = first(run(two, tools=(TOOL, OTHER), setup=replace(setup, gauge_length={1: 60.0, 2: 160.0})),
+                  FindingKind.LIMIT)
+    assert found.depth == pytest.approx(25.0) and "tool lengths from 60 to 160" in found.message
+
+
+def test_what_is_taken_for_granted_is_told():
+    lines = program()
+    lines[1] = "G90"
+    proof = run(lines)
+    assert proof.clean and proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; it was "
+                                           "read as if it did",)
+
+
+def test_blending_is_in_the_error_bound():
+    lines = program()
+    assert run(lines).error_bound == pytest.approx(0.001001)
+    lines[1] += " G64 P0.001"
+    assert run(lines).error_bound == pytest.approx(0.002001) and run(lines).clean
+
+
 def test_what_goes_below_the_part_is_told():
     assert run(program()).notes == ()
     lines = program()

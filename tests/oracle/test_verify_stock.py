@@ -121,8 +121,11 @@ def test_descents_and_end_regions():
     z = np.array([0.0, -1.0, -2.0, -2.0, -2.01, -3.0])
     x = np.array([0.0, 0.0, 1.0, 2.0, 3.0, 3.0])
     p = np.column_stack([x, np.zeros(6), z])
-    moves = Moves(p[:-1], p[1:], np.ones(5, bool), np.zeros(5, np.int32))
-    assert descents(moves, np.radians(3)).tolist() == [1, 1, 0, 0, 2]
+    moves = Moves(p[:-1], p[1:], np.ones(5, bool), np.array([0, 0, 0, 0, 1], np.int32))
+    steep, earned = descents(moves, np.radians(3))
+    assert steep.tolist() == [True, True, False, False, True]
+    np.testing.assert_allclose(earned[:4], np.tan(np.radians(3)) * np.array([0, 0, 1, 2]), atol=1e-12)
+    assert earned[4] > 1e5  # another tool begins anew
     assert end_radii([TOOL]).tolist() == [2.0]
 
 

@@ -108,14 +108,14 @@ def test_the_scallop_left_is_within_the_request(name):
     c = case(name)
     for z, p in zip(c.zones, c.plan.zones, strict=True):
         assert p.step is not None and len(p.left) <= 0.002 * len(z.samples) + 1
-    fresh = sample_surface(c.part.mesh, 7.0, seed=99)
+    fresh = sample_surface(c.part.mesh, 40.0, seed=99)
     fresh = fresh.subset(fresh.normals[:, 2] > -0.02)
     lift, body = 0.002, c.zones[0].tool
     fresh = fresh.subset(touchable(c.fields[body.id], fresh.points, fresh.normals, lift)[1])
     left = brute_residual(fresh.points, c.moves(Motion.CUT))
-    assert left.min() >= -c.settings.chordal_tolerance
+    assert len(left) > 500 and left.min() >= -c.settings.chordal_tolerance
     assert (left <= c.settings.scallop_height + 1e-4).mean() > 0.998
-    assert left.max() <= 1.5 * c.settings.scallop_height
+    assert left.max() <= 2.0 * c.settings.scallop_height  # between samples 0.2 mm apart
 
 
 def test_an_allowance_stays_on_the_part():

@@ -178,7 +178,7 @@ def test_blending_limit_is_the_tolerance_of_the_setup():
     assert read("G64 P0.02\n", blend_limit=0.03).remarks == ()
     assert "0.001 mm" in read("G64 P0.002\n", blend_limit=0.001).remarks[0].message
     lines = program()
-    lines.insert(2, "G64 P0.02")
+    lines.insert(2, "G64 P0.002")
     found = {tolerance: prove([("a", joined(lines))], block(), (TOOL,), replace(SETUP, gouge_tolerance=tolerance),
                               SAMPLES, ZONES).findings for tolerance in (0.01, 0.03)}
     assert [(f.kind, f.line) for f in found[0.01]] == [(FindingKind.PROGRAM, 3)] and found[0.03] == ()

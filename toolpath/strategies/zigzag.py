@@ -112,6 +112,8 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float) -> list[Li
         return [line]
     points = dense(line.points, 0.3 * tool.radius)
     over = stock.overlap(points, tool, -0.3)
+    if tool.corner_radius == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim
+        over = np.maximum(over, stock.standing(points, tool))
     over[~np.isfinite(over)] = 0.0
     steep = _descends(points)
     if not steep.any() or float(over[steep].max()) <= skin:

@@ -46,7 +46,7 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, run, stamp, dug, best):
+def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
     """Lower the lines under one feed move; returns whether any stock went."""
     i0, i1, j0, j1 = box
     radius, corner, length = cutter
@@ -68,12 +68,12 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, run
                 continue
             height[i, j] = low
             cut = cut or gone > 1e-6
-            if run == 0:
+            if not steep:
                 continue
             if lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, 0.0, 0.0)[0] < INF:
-                if stamp[i - i0, j - j0] != run:
-                    stamp[i - i0, j - j0], dug[i - i0, j - j0] = run, 0.0
-                dug[i - i0, j - j0] += gone
+                paid = earned - since[i - i0, j - j0]
+                since[i - i0, j - j0] = earned
+                dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
                 if dug[i - i0, j - j0] > skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
     return cut
@@ -128,18 +128,18 @@ def _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best):
 
 
 @njit(cache=True, nogil=True)
-def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds, runs, tool, cutters, ends_radius,
-               skins, bodies, body_first, rapid_grow, slack, cut, events):
+def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds, steep, earned, tool, cutters,
+               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
 
-    runs : (m,) int32, number of the steep descent a feed move belongs to, 0 for none
+    steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
     rapid_grow : mm around everything in a rapid, none in a straight lift
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
 
     Returns the number of events found, which may exceed the table.
     """
     box = (i0, i1, j0, j1)
-    stamp = np.zeros((i1 - i0, j1 - j0), np.int32)
+    since = np.zeros((i1 - i0, j1 - j0))
     dug = np.zeros((i1 - i0, j1 - j0))
     best = np.zeros((16, 5))
     top = _top(height, fixed, i0, i1, j0, j1)
@@ -163,8 +163,8 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds,
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            if _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], runs[m], stamp, dug,
-                      best):
+            if _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m], earned[m],
+                      since, dug, best):
                 cut[m] = 1
                 lowered += 1
                 if lowered % REFRESH == 0:
