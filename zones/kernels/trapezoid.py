@@ -1,0 +1,279 @@
+"""Trapezoidal map of pieces that meet only at their ends, with its search DAG.
+
+Randomised incremental construction of de Berg, Cheong, van Kreveld and Overmars, Computational Geometry (3rd ed.),
+chapter 6: pieces are put in one after the other; each cuts the trapezoids it runs through, and their leaves in the
+search DAG become inner nodes.
+
+Notation: a *point* is an id. Points come sorted by x, then by y, which is the order along x after a shear by an
+infinite small amount; so comparing ids compares points exactly, and a vertical piece is one that leans a little.
+A *piece* runs from its lesser to its greater point. The last two pieces are the bottom and the top of the box, whose
+corners are the first two and the last two points. ``ends`` (pieces, 4) holds px, py, qx, qy. Coordinates are int64
+on the grid with \\|c\\| <= LIMIT = 2^25; a place that is looked up is on a grid SUB = 2^8 times finer. An orientation
+is then at most 2 * 2^26 * 2^34 = 2^61 in size: int64 holds it exactly.
+
+trap (n, 9) int32: TOP, BOTTOM pieces; LEFT, RIGHT points; UL, LL, UR, LR neighbours, -1 where none; its LEAF.
+    An upper neighbour shares the top piece, a lower one the bottom piece.
+node (n, 4) int32: KIND, item, first, second child. A leaf names its trapezoid. An x-node names a point: first is left
+    of it. A y-node names a piece: first is above it. Node 0 is the root.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+LIMIT = 1 << 25
+SUB = 256
+TOP, BOTTOM, LEFT, RIGHT, UL, LL, UR, LR, LEAF = range(9)
+IS_LEAF, IS_POINT, IS_PIECE = range(3)
+DONE, MEET, LOST = range(3)  # of build_map: built; two pieces cross, touch or lie on each other; a broken link
+OUTSIDE = -1
+
+
+@njit(cache=True, nogil=True)
+def orientation(ends, t, x, y):
+    """> 0 where (x, y) is left of piece t (above it), < 0 where right of it, 0 on its line."""
+    px, py = np.int64(ends[t, 0]), np.int64(ends[t, 1])
+    return (ends[t, 2] - px) * (y - py) - (ends[t, 3] - py) * (x - px)
+
+
+@njit(cache=True, nogil=True)
+def _runs_below(ends, pieces, s, t):
+    """Whether s lies below t at both ends of their common stretch, but for a shared point; else they meet."""
+    left, right = 1, 1
+    if pieces[s, 0] > pieces[t, 0]:
+        left = -orientation(ends, t, ends[s, 0], ends[s, 1])
+    elif pieces[s, 0] < pieces[t, 0]:
+        left = orientation(ends, s, ends[t, 0], ends[t, 1])
+    if pieces[s, 1] < pieces[t, 1]:
+        right = -orientation(ends, t, ends[s, 2], ends[s, 3])
+    elif pieces[s, 1] > pieces[t, 1]:
+        right = orientation(ends, s, ends[t, 2], ends[t, 3])
+    elif pieces[s, 0] == pieces[t, 0]:
+        return False
+    return left > 0 and right > 0
+
+
+@njit(cache=True, nogil=True)
+def _start(node, ends, pieces, s):
+    """(trapezoid in which piece s starts, piece it meets or -1)."""
+    p = pieces[s, 0]
+    x, y = ends[s, 0], ends[s, 1]
+    i = 0
+    while node[i, 0] != IS_LEAF:
+        item = node[i, 1]
+        if node[i, 0] == IS_POINT:  # a piece that starts at the point itself runs to its right
+            i = node[i, 3] if p >= item else node[i, 2]
+            continue
+        side = orientation(ends, item, x, y)
+        if side == 0:
+            if pieces[item, 0] == p:  # both start here: the steeper one is above
+                side = orientation(ends, item, ends[s, 2], ends[s, 3])
+            if side == 0:
+                return -1, item
+        i = node[i, 2] if side > 0 else node[i, 3]
+    return node[i, 1], -1
+
+
+@njit(cache=True, nogil=True)
+def _crossed(trap, node, ends, pieces, points, s, path):
+    """Trapezoids that piece s runs through, into path: (how many, state, piece it meets or -1)."""
+    at, met = _start(node, ends, pieces, s)
+    if met >= 0:
+        return 0, MEET, met
+    count = 0
+    while True:
+        if at < 0:
+            return count, LOST, -1
+        if not _runs_below(ends, pieces, s, trap[at, TOP]):
+            return count, MEET, trap[at, TOP]
+        if not _runs_below(ends, pieces, trap[at, BOTTOM], s):
+            return count, MEET, trap[at, BOTTOM]
+        path[count] = at
+        count += 1
+        r = trap[at, RIGHT]
+        if pieces[s, 1] <= r:
+            return count, DONE, -1
+        side = orientation(ends, s, points[r, 0], points[r, 1])
+        if side == 0:  # a point on the piece: told with a piece that ends or starts there
+            return count, MEET, _piece_at(pieces, r)
+        at = trap[at, LR] if side > 0 else trap[at, UR]
+
+
+@njit(cache=True, nogil=True)
+def _piece_at(pieces, point):
+    """The first piece with this end."""
+    for t in range(len(pieces)):
+        if pieces[t, 0] == point or pieces[t, 1] == point:
+            return t
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def _new(trap, node, free, count, top, bottom, left, right):
+    """A trapezoid without neighbours, with its leaf; count: (trapezoid slots used, nodes, free slots)."""
+    if count[2] > 0:
+        count[2] -= 1
+        at = free[count[2]]
+    else:
+        at = count[0]
+        count[0] += 1
+    trap[at, TOP], trap[at, BOTTOM], trap[at, LEFT], trap[at, RIGHT] = top, bottom, left, right
+    trap[at, UL:LEAF] = -1
+    trap[at, LEAF] = count[1]
+    node[count[1], 0], node[count[1], 1] = IS_LEAF, at
+    count[1] += 1
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _join_top(trap, left, right):
+    """Make two trapezoids neighbours across a wall under their common top; -1 is nobody."""
+    if left >= 0:
+        trap[left, UR] = right
+    if right >= 0:
+        trap[right, UL] = left
+
+
+@njit(cache=True, nogil=True)
+def _join_bottom(trap, left, right):
+    """Make two trapezoids neighbours across a wall over their common bottom; -1 is nobody."""
+    if left >= 0:
+        trap[left, LR] = right
+    if right >= 0:
+        trap[right, LL] = left
+
+
+@njit(cache=True, nogil=True)
+def _branch(node, count, at, kind, item, first, second):
+    """Turn node ``at`` into an inner one; a child of -1 is made here and its number returned."""
+    made = -1
+    if first < 0 or second < 0:
+        made = count[1]
+        count[1] += 1
+    node[at, 0], node[at, 1] = kind, item
+    node[at, 2] = first if first >= 0 else made
+    node[at, 3] = second if second >= 0 else made
+    return made
+
+
+@njit(cache=True, nogil=True)
+def _cut(trap, node, free, count, path, crossed, pieces, ends, points, s):
+    """Cut the trapezoids of path by piece s; above and below s what had the same neighbour is one trapezoid."""
+    p, q = pieces[s, 0], pieces[s, 1]
+    d = path[0]
+    upper = _new(trap, node, free, count, trap[d, TOP], s, p, q)
+    lower = _new(trap, node, free, count, s, trap[d, BOTTOM], p, q)
+    before, after = -1, -1
+    if trap[d, LEFT] == p:
+        _join_top(trap, trap[d, UL], upper)
+        _join_bottom(trap, trap[d, LL], lower)
+    else:
+        before = _new(trap, node, free, count, trap[d, TOP], trap[d, BOTTOM], trap[d, LEFT], p)
+        _join_top(trap, trap[d, UL], before)
+        _join_bottom(trap, trap[d, LL], before)
+        _join_top(trap, before, upper)
+        _join_bottom(trap, before, lower)
+    for j in range(crossed):
+        d = path[j]
+        r = trap[d, RIGHT]
+        last = j == crossed - 1
+        if last and r != q:
+            after = _new(trap, node, free, count, trap[d, TOP], trap[d, BOTTOM], q, r)
+        at = trap[d, LEAF]
+        if j == 0 and before >= 0:
+            at = _branch(node, count, at, IS_POINT, p, trap[before, LEAF], -1)
+        if after >= 0:
+            at = _branch(node, count, at, IS_POINT, q, -1, trap[after, LEAF])
+        _branch(node, count, at, IS_PIECE, s, trap[upper, LEAF], trap[lower, LEAF])
+        if last:
+            break
+        following = path[j + 1]
+        if orientation(ends, s, points[r, 0], points[r, 1]) > 0:  # the wall of r now ends on s from above
+            trap[upper, RIGHT] = r
+            _join_top(trap, upper, trap[d, UR])
+            fresh = _new(trap, node, free, count, trap[following, TOP], s, r, q)
+            _join_top(trap, trap[following, UL], fresh)
+            _join_bottom(trap, upper, fresh)
+            upper = fresh
+        else:
+            trap[lower, RIGHT] = r
+            _join_bottom(trap, lower, trap[d, LR])
+            fresh = _new(trap, node, free, count, s, trap[following, BOTTOM], r, q)
+            _join_bottom(trap, trap[following, LL], fresh)
+            _join_top(trap, lower, fresh)
+            lower = fresh
+    if after >= 0:
+        _join_top(trap, after, trap[d, UR])
+        _join_bottom(trap, after, trap[d, LR])
+        _join_top(trap, upper, after)
+        _join_bottom(trap, lower, after)
+    else:
+        _join_top(trap, upper, trap[d, UR])
+        _join_bottom(trap, lower, trap[d, LR])
+    for j in range(crossed):
+        trap[path[j], TOP] = -1
+        free[count[2]] = path[j]
+        count[2] += 1
+
+
+@njit(cache=True, nogil=True)
+def build_map(points, pieces):
+    """Put the pieces in as they stand (the box not among them): the caller has shuffled them.
+
+    points (m, 2) int64 sorted, pieces (n + 2, 2) int64.
+    Returns (state, first piece, second piece, trap, node). Slots of trap with TOP = -1 are free. Where state is MEET
+    the two pieces cross, touch or overlap and the rest is of no use.
+    """
+    n = len(pieces) - 2
+    ends = np.empty((n + 2, 4), np.int32)
+    for t in range(n + 2):
+        ends[t, 0], ends[t, 1] = points[pieces[t, 0], 0], points[pieces[t, 0], 1]
+        ends[t, 2], ends[t, 3] = points[pieces[t, 1], 0], points[pieces[t, 1], 1]
+    most = 3 * n + 1  # trapezoids at any time; while a piece is put in, old and new ones stand side by side
+    trap = np.empty((2 * most + 2, 9), np.int32)
+    free = np.empty(2 * most + 2, np.int32)
+    path = np.empty(most + 1, np.int64)
+    node = np.empty((8 * n + 16, 4), np.int32)
+    count = np.zeros(3, np.int64)
+    _new(trap, node, free, count, n + 1, n, 0, len(points) - 1)
+    for s in range(n):
+        crossed, state, met = _crossed(trap, node, ends, pieces, points, s, path)
+        if state != DONE:
+            return state, s, met, trap[:0].copy(), node[:0].copy()
+        if count[1] + 2 * crossed + 8 > len(node):
+            wider = np.empty((2 * len(node) + 2 * crossed, 4), np.int32)
+            wider[: count[1]] = node[: count[1]]
+            node = wider
+        _cut(trap, node, free, count, path, crossed, pieces, ends, points, s)
+    return DONE, -1, -1, trap[: count[0]].copy(), node[: count[1]].copy()
+
+
+@njit(cache=True, nogil=True)
+def find_trapezoids(node, points, pieces, places):
+    """Trapezoid and depth (inner nodes asked) for places (k, 2) int64 on the grid SUB times finer than the points.
+
+    A place is taken as moved up, and then right by much less. So one on a piece belongs above it, one on a vertical
+    piece or under or over a point belongs right of it, and no trapezoid without width is ever the answer.
+    Places out of the box, or on its right or top side, are OUTSIDE with depth 0.
+    """
+    found = np.full(len(places), OUTSIDE, np.int64)
+    depth = np.zeros(len(places), np.int64)
+    low, high = points[0] * SUB, points[len(points) - 1] * SUB
+    for k in range(len(places)):
+        x, y = places[k, 0], places[k, 1]
+        if x < low[0] or y < low[1] or x >= high[0] or y >= high[1]:
+            continue
+        i = 0
+        while node[i, 0] != IS_LEAF:
+            item = node[i, 1]
+            if node[i, 0] == IS_POINT:
+                first = x < points[item, 0] * SUB
+            else:
+                p, q = pieces[item, 0], pieces[item, 1]
+                px, py = points[p, 0], points[p, 1]
+                first = (points[q, 0] - px) * (y - py * SUB) >= (points[q, 1] - py) * (x - px * SUB)
+            i = node[i, 2] if first else node[i, 3]
+            depth[k] += 1
+        found[k] = node[i, 1]
+    return found, depth
