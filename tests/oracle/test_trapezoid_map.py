@@ -9,9 +9,9 @@ import pytest
 import shapely
 
 from tests.oracle import arrangement_twin as twin
-from zones.kernels.trapezoid import LIMIT, SUB
+from zones.kernels.trapezoid import DONE, LIMIT, SUB, build_map
 from zones.noding import node_segments, take_noded
-from zones.trapezoids import TrapezoidMap, insertion_order
+from zones.trapezoids import TrapezoidMap, _hilbert, insertion_order
 
 EVERYDAY = [(kind, seed) for kind in sorted(twin.KINDS) for seed in range(6)]
 SWEEP = 1000
@@ -209,15 +209,25 @@ def test_a_look_up_asks_a_few_times_ln_n_nodes():
 def test_building_takes_n_ln_n():
     rng = np.random.default_rng(4)
     rate = {}
-    for n, runs in ((1_000, 30), (100_000, 3)):
-        noding = take_noded(apart(n, rng), twin.GRID)
+    for n, runs in ((1_000, 100), (100_000, 8)):
+        plan = TrapezoidMap.of_noding(take_noded(apart(n, rng), twin.GRID))
         best = np.inf
         for seed in range(runs):
+            order = insertion_order(plan.points, plan.pieces[:n], seed)
+            pieces = np.concatenate([plan.pieces[:n][order], plan.pieces[n:]])
             start = time.perf_counter()
-            TrapezoidMap.of_noding(noding, seed=seed)
+            assert build_map(plan.points, pieces)[0] == DONE
             best = min(best, time.perf_counter() - start)
         rate[n] = best / (n * np.log(n))
     assert rate[100_000] <= 2.5 * rate[1_000]
+
+
+def test_a_hilbert_curve_goes_from_cell_to_neighbour_and_through_all():
+    x, y = np.meshgrid(np.arange(16), np.arange(16))
+    cells = np.column_stack([x.ravel(), y.ravel()]) * (1 << 12)
+    walk = cells[np.argsort(_hilbert(cells))]
+    assert len(np.unique(_hilbert(cells))) == 256
+    assert (np.abs(np.diff(walk, axis=0)).sum(axis=1) == 1 << 12).all()
 
 
 def test_the_order_is_a_permutation_by_rounds():

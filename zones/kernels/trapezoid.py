@@ -7,9 +7,9 @@ search DAG become inner nodes.
 Notation: a *point* is an id. Points come sorted by x, then by y, which is the order along x after a shear by an
 infinite small amount; so comparing ids compares points exactly, and a vertical piece is one that leans a little.
 A *piece* runs from its lesser to its greater point. The last two pieces are the bottom and the top of the box, whose
-corners are the first two and the last two points. ``ends`` (pieces, 4) holds px, py, qx, qy. Coordinates are int64
-on the grid with \\|c\\| <= LIMIT = 2^25; a place that is looked up is on a grid SUB = 2^8 times finer. An orientation
-is then at most 2 * 2^26 * 2^34 = 2^61 in size: int64 holds it exactly.
+corners are the first two and the last two points. ``ends`` (pieces, 8) int32 holds px, py, qx, qy, P, Q and fills
+half a cache line. Coordinates are whole grid steps, at most LIMIT = 2^25 in size; a place that is looked up is on a
+grid SUB = 2^8 times finer. An orientation is then at most 2 * 2^26 * 2^34 = 2^61 in size: int64 holds it exactly.
 
 trap (n, 9) int32: TOP, BOTTOM pieces; LEFT, RIGHT points; UL, LL, UR, LR neighbours, -1 where none; its LEAF.
     An upper neighbour shares the top piece, a lower one the bottom piece.
@@ -25,6 +25,7 @@ from numba import njit
 LIMIT = 1 << 25
 SUB = 256
 TOP, BOTTOM, LEFT, RIGHT, UL, LL, UR, LR, LEAF = range(9)
+P, Q = 4, 5  # columns of ends
 IS_LEAF, IS_POINT, IS_PIECE = range(3)
 DONE, MEET, LOST = range(3)  # of build_map: built; two pieces cross, touch or lie on each other; a broken link
 OUTSIDE = -1
@@ -38,26 +39,26 @@ def orientation(ends, t, x, y):
 
 
 @njit(cache=True, nogil=True)
-def _runs_below(ends, pieces, s, t):
+def _runs_below(ends, s, t):
     """Whether s lies below t at both ends of their common stretch, but for a shared point; else they meet."""
     left, right = 1, 1
-    if pieces[s, 0] > pieces[t, 0]:
+    if ends[s, P] > ends[t, P]:
         left = -orientation(ends, t, ends[s, 0], ends[s, 1])
-    elif pieces[s, 0] < pieces[t, 0]:
+    elif ends[s, P] < ends[t, P]:
         left = orientation(ends, s, ends[t, 0], ends[t, 1])
-    if pieces[s, 1] < pieces[t, 1]:
+    if ends[s, Q] < ends[t, Q]:
         right = -orientation(ends, t, ends[s, 2], ends[s, 3])
-    elif pieces[s, 1] > pieces[t, 1]:
+    elif ends[s, Q] > ends[t, Q]:
         right = orientation(ends, s, ends[t, 2], ends[t, 3])
-    elif pieces[s, 0] == pieces[t, 0]:
+    elif ends[s, P] == ends[t, P]:
         return False
     return left > 0 and right > 0
 
 
 @njit(cache=True, nogil=True)
-def _start(node, ends, pieces, s):
+def _start(node, ends, s):
     """(trapezoid in which piece s starts, piece it meets or -1)."""
-    p = pieces[s, 0]
+    p = ends[s, P]
     x, y = ends[s, 0], ends[s, 1]
     i = 0
     while node[i, 0] != IS_LEAF:
@@ -67,7 +68,7 @@ def _start(node, ends, pieces, s):
             continue
         side = orientation(ends, item, x, y)
         if side == 0:
-            if pieces[item, 0] == p:  # both start here: the steeper one is above
+            if ends[item, P] == p:  # both start here: the steeper one is above
                 side = orientation(ends, item, ends[s, 2], ends[s, 3])
             if side == 0:
                 return -1, item
@@ -76,35 +77,35 @@ def _start(node, ends, pieces, s):
 
 
 @njit(cache=True, nogil=True)
-def _crossed(trap, node, ends, pieces, points, s, path):
+def _crossed(trap, node, ends, points, s, path):
     """Trapezoids that piece s runs through, into path: (how many, state, piece it meets or -1)."""
-    at, met = _start(node, ends, pieces, s)
+    at, met = _start(node, ends, s)
     if met >= 0:
         return 0, MEET, met
     count = 0
     while True:
         if at < 0:
             return count, LOST, -1
-        if not _runs_below(ends, pieces, s, trap[at, TOP]):
+        if not _runs_below(ends, s, trap[at, TOP]):
             return count, MEET, trap[at, TOP]
-        if not _runs_below(ends, pieces, trap[at, BOTTOM], s):
+        if not _runs_below(ends, trap[at, BOTTOM], s):
             return count, MEET, trap[at, BOTTOM]
         path[count] = at
         count += 1
         r = trap[at, RIGHT]
-        if pieces[s, 1] <= r:
+        if ends[s, Q] <= r:
             return count, DONE, -1
         side = orientation(ends, s, points[r, 0], points[r, 1])
         if side == 0:  # a point on the piece: told with a piece that ends or starts there
-            return count, MEET, _piece_at(pieces, r)
+            return count, MEET, _piece_at(ends, r)
         at = trap[at, LR] if side > 0 else trap[at, UR]
 
 
 @njit(cache=True, nogil=True)
-def _piece_at(pieces, point):
+def _piece_at(ends, point):
     """The first piece with this end."""
-    for t in range(len(pieces)):
-        if pieces[t, 0] == point or pieces[t, 1] == point:
+    for t in range(len(ends)):
+        if ends[t, P] == point or ends[t, Q] == point:
             return t
     return -1
 
@@ -158,9 +159,9 @@ def _branch(node, count, at, kind, item, first, second):
 
 
 @njit(cache=True, nogil=True)
-def _cut(trap, node, free, count, path, crossed, pieces, ends, points, s):
+def _cut(trap, node, free, count, path, crossed, ends, points, s):
     """Cut the trapezoids of path by piece s; above and below s what had the same neighbour is one trapezoid."""
-    p, q = pieces[s, 0], pieces[s, 1]
+    p, q = ends[s, P], ends[s, Q]
     d = path[0]
     upper = _new(trap, node, free, count, trap[d, TOP], s, p, q)
     lower = _new(trap, node, free, count, s, trap[d, BOTTOM], p, q)
@@ -218,6 +219,18 @@ def _cut(trap, node, free, count, path, crossed, pieces, ends, points, s):
 
 
 @njit(cache=True, nogil=True)
+def _rows(points, pieces):
+    """(points as int32, ``ends``): narrow, and all of a piece in one place, for the time goes into cache misses."""
+    narrow = points.astype(np.int32)
+    ends = np.empty((len(pieces), 8), np.int32)
+    for t in range(len(pieces)):
+        p, q = pieces[t, 0], pieces[t, 1]
+        ends[t, 0], ends[t, 1], ends[t, 2], ends[t, 3] = narrow[p, 0], narrow[p, 1], narrow[q, 0], narrow[q, 1]
+        ends[t, P], ends[t, Q] = p, q
+    return narrow, ends
+
+
+@njit(cache=True, nogil=True)
 def build_map(points, pieces):
     """Put the pieces in as they stand (the box not among them): the caller has shuffled them.
 
@@ -226,27 +239,24 @@ def build_map(points, pieces):
     the two pieces cross, touch or overlap and the rest is of no use.
     """
     n = len(pieces) - 2
-    ends = np.empty((n + 2, 4), np.int32)
-    for t in range(n + 2):
-        ends[t, 0], ends[t, 1] = points[pieces[t, 0], 0], points[pieces[t, 0], 1]
-        ends[t, 2], ends[t, 3] = points[pieces[t, 1], 0], points[pieces[t, 1], 1]
+    narrow, ends = _rows(points, pieces)
     most = 3 * n + 1  # trapezoids at any time; while a piece is put in, old and new ones stand side by side
     trap = np.empty((2 * most + 2, 9), np.int32)
     free = np.empty(2 * most + 2, np.int32)
     path = np.empty(most + 1, np.int64)
-    node = np.empty((8 * n + 16, 4), np.int32)
+    node = np.empty((10 * n + 16, 4), np.int32)
     count = np.zeros(3, np.int64)
-    _new(trap, node, free, count, n + 1, n, 0, len(points) - 1)
+    _new(trap, node, free, count, n + 1, n, 0, len(narrow) - 1)
     for s in range(n):
-        crossed, state, met = _crossed(trap, node, ends, pieces, points, s, path)
+        crossed, state, met = _crossed(trap, node, ends, narrow, s, path)
         if state != DONE:
-            return state, s, met, trap[:0].copy(), node[:0].copy()
+            return state, s, met, trap[:0], node[:0]
         if count[1] + 2 * crossed + 8 > len(node):
             wider = np.empty((2 * len(node) + 2 * crossed, 4), np.int32)
             wider[: count[1]] = node[: count[1]]
             node = wider
-        _cut(trap, node, free, count, path, crossed, pieces, ends, points, s)
-    return DONE, -1, -1, trap[: count[0]].copy(), node[: count[1]].copy()
+        _cut(trap, node, free, count, path, crossed, ends, narrow, s)
+    return DONE, -1, -1, trap[: count[0]], node[: count[1]]
 
 
 @njit(cache=True, nogil=True)
