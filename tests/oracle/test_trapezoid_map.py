@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 import shapely
 
 from tests.oracle import arrangement_twin as twin
-from zones.kernels.trapezoid import DONE, LIMIT, SUB, build_map
+from zones.kernels.trapezoid import LIMIT, SUB
 from zones.noding import node_segments, take_noded
 from zones.trapezoids import TrapezoidMap, _hilbert, insertion_order
 
@@ -203,23 +201,6 @@ def test_a_look_up_asks_a_few_times_ln_n_nodes():
     found, depth = plan.look_up(rng.uniform(0.0, 100.0, (10_000, 2)))
     assert (found >= 0).all()
     assert depth.mean() <= 3.5 * np.log(n) and depth.max() <= 8.0 * np.log(n)
-
-
-@pytest.mark.slow
-def test_building_takes_n_ln_n():
-    rng = np.random.default_rng(4)
-    rate = {}
-    for n, runs in ((1_000, 100), (100_000, 8)):
-        plan = TrapezoidMap.of_noding(take_noded(apart(n, rng), twin.GRID))
-        best = np.inf
-        for seed in range(runs):
-            order = insertion_order(plan.points, plan.pieces[:n], seed)
-            pieces = np.concatenate([plan.pieces[:n][order], plan.pieces[n:]])
-            start = time.perf_counter()
-            assert build_map(plan.points, pieces)[0] == DONE
-            best = min(best, time.perf_counter() - start)
-        rate[n] = best / (n * np.log(n))
-    assert rate[100_000] <= 2.5 * rate[1_000]
 
 
 def test_a_hilbert_curve_goes_from_cell_to_neighbour_and_through_all():
