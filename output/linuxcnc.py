@@ -29,6 +29,8 @@ from toolpath.motion import Motion, Trajectory, Workingstep
 LINE = 100
 """Longest line of a program, characters."""
 
+LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
+
 _OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 _ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;]", re.IGNORECASE)
 
@@ -190,12 +192,21 @@ def _header(plan: Workplan, tolerance: float) -> list[str]:
         "XYZ is the tool tip: set every tool length in the tool table, G43 H is the tool number",
         f"Stock box {box}",
         f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free",
+        _lowest(plan),
         f"Path mode G64 P{decimal(tolerance)}: the control may leave the written path by that much, in mm",
         "Tools, all lengths in mm from the tip:",
         *(tool_name(t) for t in _tools_in_use(plan)),
         *plan.comments,
     ]
     return [line for text in texts for line in _comment(text)]
+
+
+def _lowest(plan: Workplan) -> str:
+    """How deep the tip goes, for whoever sets the part on a table."""
+    lowest = min(float(t.points[:, 2].min()) for s in plan.steps for t in s.trajectories)
+    below = float(plan.stock.lower[2]) - lowest
+    more = f", {decimal(below, 3)} below the stock box: nothing may stand there" if below > LEAST_BELOW else ""
+    return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
 
 
 def _tools_in_use(plan: Workplan) -> list[ToolBody]:

@@ -2,6 +2,7 @@
 
 import re
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,15 @@ def test_header_says_what_the_machinist_checks():
                   "Work offset G54", "Program zero", "X 0 to 30, Y 0 to 20, Z 0 to 15", "Clearance plane Z 25",
                   "T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45", "flat D6"):
         assert words in head
+
+
+def test_header_says_how_deep_the_tip_goes():
+    text = write_linuxcnc(plan())
+    depths = [float(z) for z in re.findall(r"Z(-?[\d.]+)", re.sub(r"\(.*\)", "", text))]
+    assert f"(Lowest Z of the tip {min(depths):g})" in text and "nothing may stand there" not in text
+    high = replace(plan().stock, lower=np.array([0.0, 0.0, min(depths) + 2.5]))
+    assert f"(Lowest Z of the tip {min(depths):g}, 2.5 below the stock box: nothing may stand there)" in \
+        write_linuxcnc(plan(stock=high))
 
 
 def test_long_labels_are_wrapped():
