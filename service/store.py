@@ -20,8 +20,6 @@ from geometry.errors import CamError, ResourceError
 from service.db import jobs, library
 from service.errors import KeyConflictError, NotFoundError
 
-FINAL = ("proved", "unproved", "done", "failed", "cancelled")
-
 
 @dataclass(frozen=True)
 class NewJob:

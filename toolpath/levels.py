@@ -156,20 +156,30 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, sp
     corner = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
     out = []
     for distance in np.arange(min(first, 0.9 * widest), widest, spacing).tolist():
-        ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
-        xy = np.empty((len(ids), 2))
-        linear_crossings(ids, far, distance, *corner, lat.step, xy)
-        lines: list[Line] = []
-        for k in range(len(starts) - 1):
-            chain = xy[starts[k]:starts[k + 1]]
-            if len(chain) < 2:
-                continue
-            pts = np.column_stack([chain, np.full(len(chain), z)])
-            if closed[k]:
-                pts = np.vstack([pts, pts[:1]])
-            lines.extend(free_pieces(field, pts, bool(closed[k])))
-        out.append(lines)
+        out.append(lines_at(field, z, far, distance, inside, corner))
     return out[::-1] if walled else out
+
+
+def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArray[np.bool_],
+             corner: tuple[float, float]) -> list[Line]:
+    """The free pieces of the lines on which ``far`` passes ``distance``, as tips at height z, mm.
+
+    far, inside : (ny, nx) float64 mm and bool, contiguous, on the step of the lattice; lines end where inside does
+    corner      : x and y of the first node, mm
+    """
+    ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
+    xy = np.empty((len(ids), 2))
+    linear_crossings(ids, far, distance, *corner, field.lattice.step, xy)
+    lines: list[Line] = []
+    for k in range(len(starts) - 1):
+        chain = xy[starts[k]:starts[k + 1]]
+        if len(chain) < 2:
+            continue
+        pts = np.column_stack([chain, np.full(len(chain), z)])
+        if closed[k]:
+            pts = np.vstack([pts, pts[:1]])
+        lines.extend(free_pieces(field, pts, bool(closed[k])))
+    return lines
 
 
 def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geometry.mesh import F64
-from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
-from toolpath.levels import Line, contours, dilated, free_pieces, pieces_where, thinned
+from toolpath.levels import Line, contours, dilated, lines_at, pieces_where, thinned
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
@@ -60,19 +59,9 @@ def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spa
     deepest = float(far.max()) if far.size else 0.0
     out: list[Line] = []
     d = min(max(first, 0.6 * lat.step), 0.9 * deepest)
-    everywhere = np.ones(area.shape, np.bool_)
+    far, everywhere = np.ascontiguousarray(far), np.ones(area.shape, np.bool_)
     while 0 < d < deepest:
-        ids, starts, closed = trace(np.ascontiguousarray(far < d), everywhere, SEGMENTS)
-        xy = np.empty((len(ids), 2))
-        linear_crossings(ids, np.ascontiguousarray(far), d, lat.x0, lat.y0, lat.step, xy)
-        for k in range(len(starts) - 1):
-            chain = xy[starts[k]:starts[k + 1]]
-            if len(chain) < 2:
-                continue
-            pts = np.column_stack([chain, np.full(len(chain), z)])
-            if closed[k]:
-                pts = np.vstack([pts, pts[:1]])
-            out.extend(Line(thinned(p.points, 0.3 * lat.step), p.closed)
-                       for p in free_pieces(field, pts, bool(closed[k])))
+        out.extend(Line(thinned(p.points, 0.3 * lat.step), p.closed)
+                   for p in lines_at(field, z, far, d, everywhere, (lat.x0, lat.y0)))
         d += spacing
     return out
