@@ -1,0 +1,91 @@
+"""The plan view cut into cells: which named areas lie over a place.
+
+The borders of the areas, and lines that cut without enclosing anything, go into one trapezoidal map
+(``zones.trapezoids``). Its faces are the cells; a cell carries the names of the areas that cover it. A look-up
+goes down the search DAG of the map, so it costs O(log n) in the number of segments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.mesh import F64
+from zones.trapezoids import Faces, TrapezoidMap
+
+OUTSIDE = -1  # cell of a place outside the box of the map
+
+
+@dataclass(frozen=True)
+class Area:
+    """A named area in plan: what a cell may lie in.
+
+    name  : 'H1', 'W1', 'C2' ...
+    shape : shapely Polygon or MultiPolygon, mm
+    """
+
+    name: str
+    shape: shapely.Geometry
+
+
+@dataclass(frozen=True, eq=False)
+class PlanMap:
+    """Cells of the plan view; all lengths mm in the frame the areas were given in.
+
+    map   : TrapezoidMap of all borders and lines
+    faces : its faces, which are the cells
+    names : names of the areas, in the order they were given
+    over  : (cells, areas) bool, which area covers which cell
+    """
+
+    map: TrapezoidMap
+    faces: Faces
+    names: tuple[str, ...]
+    over: NDArray[np.bool_]
+
+    @staticmethod
+    def of(areas: Sequence[Area], lines: Sequence[F64] = (), grid: float = 1e-3, seed: int = 0) -> PlanMap:
+        """Map of areas, and of polylines (k, 2) that cut cells in two without naming either side.
+
+        grid : mm, step the borders are rounded to; what is thinner than it may vanish
+        seed : of the random order of insertion; changes the time, never the cells
+        """
+        borders = [np.asarray(ring.coords) for a in areas for ring in _rings(a.shape)]
+        pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in (*borders, *lines) if len(line) > 1]
+        segments = np.concatenate(pieces) if pieces else np.zeros((0, 2, 2))
+        made = TrapezoidMap.of(segments, grid, seed)
+        faces = made.faces()
+        inside = _inner_points(made, faces)
+        over = np.zeros((len(inside), len(areas)), np.bool_)
+        for k, a in enumerate(areas):
+            over[:, k] = shapely.contains_xy(a.shape, inside[:, 0], inside[:, 1])
+        return PlanMap(made, faces, tuple(a.name for a in areas), over)
+
+    def cell_at(self, xy: ArrayLike) -> NDArray[np.int64]:
+        """(n,) cell of each place xy (n, 2), ``OUTSIDE`` beyond the box."""
+        at = self.map.locate(xy)
+        return np.where(at >= 0, self.faces.of_trapezoid[at], OUTSIDE)
+
+    def over_at(self, xy: ArrayLike) -> NDArray[np.bool_]:
+        """(n, areas) bool: which areas cover each place xy (n, 2)."""
+        cell = self.cell_at(xy)
+        return np.where((cell >= 0)[:, None], self.over[cell], False)
+
+
+def _rings(shape: shapely.Geometry) -> list[shapely.LinearRing]:
+    polygons = shapely.get_parts(shape)
+    return [ring for p in polygons if p.geom_type == "Polygon" and not p.is_empty
+            for ring in (p.exterior, *p.interiors)]
+
+
+def _inner_points(made: TrapezoidMap, faces: Faces) -> F64:
+    """(faces, 2) float64, mm: the middle of the largest trapezoid of each face."""
+    c = made.corners()
+    area = 0.5 * (c[:, 1, 0] - c[:, 0, 0]) * ((c[:, 3, 1] - c[:, 0, 1]) + (c[:, 2, 1] - c[:, 1, 1]))
+    order = np.lexsort((-area, faces.of_trapezoid))
+    _, first = np.unique(faces.of_trapezoid[order], return_index=True)
+    return np.asarray(c[order[first]].mean(axis=1))
