@@ -1,0 +1,153 @@
+"""Sections of walls: two sides or two rings, the void on the left, caps left out, interruptions bridged."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.part import Part
+from tests.decomposition_shapes import SHAPES, box, pair, plate, ring, to_part
+from zones.decompose import decompose
+from zones.model import Decomposition
+from zones.sections import SideCurve, wall_sections
+from zones.slices import cut_mesh
+
+pytest.importorskip("cadquery")
+
+
+def _prism(points, at=(0.0, 5.0)):
+    """A wall of this outline in plan on a plate, with a plain wall beside it."""
+    import cadquery as cq
+
+    wall = cq.Workplane().polyline(points).close().extrude(14).translate((*at, 3))
+    return plate(80, 60).union(wall).union(box(50, 2, 14, 0, 30, 3))
+
+
+def _slot():
+    import cadquery as cq
+
+    return plate(80, 60).union(cq.Workplane().slot2D(50, 2).extrude(14).translate((25, 5, 3))).union(
+        box(50, 2, 14, 0, 30, 3))
+
+
+def _lens():
+    import cadquery as cq
+
+    wall = cq.Workplane().moveTo(0, 0).threePointArc((25, 3), (50, 0)).threePointArc((25, -1), (0, 0)).close()
+    return plate(80, 60).union(wall.extrude(14).translate((0, 5, 3))).union(box(50, 2, 14, 0, 30, 3))
+
+
+OWN = {
+    "slot": _slot,
+    "lens": _lens,
+    "pointed": lambda: _prism([(0, 0), (1, 1), (49, 1), (50, 0), (49, -1), (1, -1)]),
+    "slanted ends": lambda: _prism([(0, 0), (50, 0), (47, 2), (3, 2)]),
+    "L": lambda: _prism([(0, 0), (40, 0), (40, 15), (38, 15), (38, 2), (0, 2)]),
+    "wedge": lambda: _prism([(0, -1), (50, 0), (0, 1)]),
+    "slit ring": lambda: ring().cut(box(30, 3, 20, 0, -1.5, 4)),
+    "slab at mid height": lambda: pair().union(box(45, 9, 2, 2, -9, 9.5)),
+}
+
+
+@cache
+def made(name: str) -> tuple[Part, Decomposition]:
+    part = to_part(OWN[name]() if name in OWN else SHAPES[name][0]())
+    return part, decompose(part)
+
+
+def curves(name: str, wall: str = "W1") -> list[SideCurve]:
+    return [c for c in wall_sections(*made(name)) if c.wall == wall]
+
+
+def length(c: SideCurve) -> float:
+    p = np.vstack([c.points, c.points[:1]]) if c.closed else c.points
+    return float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
+
+
+def bridges(name: str, wall: str) -> list[int]:
+    return sorted(int((c.face == 0).sum()) for c in curves(name, wall))
+
+
+@pytest.mark.parametrize("name", [n for n in SHAPES if SHAPES[n][1][0]] + list(OWN))
+def test_every_wall_has_two_sides_with_the_void_on_the_left(name: str) -> None:
+    part, found = made(name)
+    sections = wall_sections(part, found)
+    for wall in found.walls:
+        own = [c for c in sections if c.wall == wall.id]
+        assert len(own) == 2 and own[0].closed == own[1].closed
+        for c in own:
+            assert len(c.face) == len(c.points)
+            assert set(c.face.tolist()) <= {f.number for f in part.faces} | {0}
+            cut = cut_mesh(part.mesh, c.z)
+            p, q = c.points[:-1][c.face[:-1] > 0], c.points[1:][c.face[:-1] > 0]
+            left = np.column_stack([-(q - p)[:, 1], (q - p)[:, 0]]) / np.linalg.norm(q - p, axis=1)[:, None]
+            for at, normal in zip(0.5 * (p + q), left, strict=True):
+                assert not cut.holds(at + 1e-3 * normal) and cut.holds(at - 1e-3 * normal)
+
+
+@pytest.mark.parametrize(("name", "wall", "expected"), [
+    ("two walls", "W1", (50, 50)), ("slot", "W1", (48, 48)), ("pointed", "W1", (48, 48)),
+    ("slanted ends", "W1", (50, 44)), ("L", "W1", (51, 55)), ("T", "W1", (14, 14)), ("T", "W2", (50, 50)),
+    ("cross", "W1", (50, 50)), ("cross", "W2", (50, 50)), ("wall with a window", "W2", (50, 50)),
+    ("walls flush with the plate ends", "W1", (50, 50)), ("walls flush with the plate sides", "W1", (50, 50)),
+    ("tray", "W1", (160, 144)), ("tray with a rib", "W2", (26, 26)), ("web on the floor", "W1", (8, 8)),
+    ("fillets at a bar", "W1", (50, 50)), ("bar through a wall", "W3", (50, 50)), ("wedge", "W1", (50.01, 50.01)),
+])
+def test_lengths_are_those_of_the_sides_without_their_ends(name, wall, expected) -> None:
+    assert sorted(length(c) for c in curves(name, wall)) == pytest.approx(sorted(expected), abs=0.02)
+
+
+@pytest.mark.parametrize(("name", "wall", "expected"), [
+    ("square bar", "W1", [0, 1]), ("cross", "W1", [1, 1]), ("T", "W2", [0, 1]), ("wall with a window", "W2", [1, 1]),
+    ("bar through a wall", "W3", [1, 1]), ("ring with a strut", "W1", [0, 2]), ("two walls", "W1", [0, 0]),
+])
+def test_interruptions_become_one_chord_each(name, wall, expected) -> None:
+    assert bridges(name, wall) == expected
+
+
+def test_rings_are_closed_and_a_slit_opens_them() -> None:
+    inner, outer = sorted(curves("ring with a strut"), key=length)
+    assert inner.closed and outer.closed
+    assert length(outer) == pytest.approx(2 * np.pi * 20, rel=1e-3)
+    assert length(inner) == pytest.approx(2 * np.pi * 18, rel=1e-3)
+    assert not np.allclose(outer.points[0], outer.points[-1])
+    assert not any(c.closed for c in curves("slit ring"))
+
+
+def test_wavy_sides_keep_their_length_and_strips_change_nothing() -> None:
+    x = np.linspace(0, 50, 2001)
+    true = np.linalg.norm(np.diff(np.column_stack([x, 2 * np.sin(x * 12 / 96)]), axis=0), axis=1).sum()
+    for name in ("wavy walls", "wavy walls in strips"):
+        for wall in ("W1", "W2"):
+            assert [length(c) for c in curves(name, wall)] == pytest.approx([true, true], rel=2e-3)
+
+
+def test_a_height_nearby_is_taken_where_a_slab_hides_the_middle() -> None:
+    part, found = made("slab at mid height")
+    for c in wall_sections(part, found):
+        assert not 9.5 <= c.z <= 11.5 and (c.face > 0).all()
+    asked = wall_sections(part, found, height=10.0)
+    assert {c.z for c in asked} == {10.0}
+
+
+def test_the_same_part_gives_the_same_curves() -> None:
+    part, found = made("fork")
+    for a, b in zip(wall_sections(part, found), wall_sections(part, found), strict=True):
+        assert np.array_equal(a.points, b.points) and np.array_equal(a.face, b.face)
+
+
+def test_cutting_through_vertices_links_every_segment() -> None:
+    """A cube with a vertex at its middle height: the plane runs through vertices and edges."""
+    ring4 = [(0, 0), (4, 0), (4, 4), (0, 4)]
+    v = np.array([(x, y, z) for z in (0, 1, 2) for x, y in ring4], float)
+    f = [t for k in (0, 4) for i in range(4) for t in (
+        (k + i, k + (i + 1) % 4, k + 4 + i), (k + (i + 1) % 4, k + 4 + (i + 1) % 4, k + 4 + i))]
+    f += [(0, 2, 1), (0, 3, 2), (8, 9, 10), (8, 10, 11)]
+    cut = cut_mesh(TriangleMesh(v, np.array(f)), 1.0)
+    walk = cut.loops()
+    assert len(walk) == 1 and (cut.following >= 0).all()
+    area = 0.5 * (cut.start[:, 0] * cut.end[:, 1] - cut.start[:, 1] * cut.end[:, 0]).sum()
+    assert area == pytest.approx(-16.0) and cut.holds(np.array([2.0, 2.0])) and not cut.holds(np.array([5.0, 2.0]))

@@ -1,0 +1,410 @@
+"""Sections of walls: each side of a wall as one curve in plan, walked with the void on the left.
+
+    the whole part cut at mid height -> loops -> pieces of this wall that have its other side behind them
+    -> stretches -> joined round corners and behind junctions, bridged over what interrupts them -> sides
+
+A piece is *backed* where the material across it ends on an opposed surface within ``BACKED_REACH`` thicknesses. Runs of
+backed pieces are stretches. Two stretches that follow each other on a loop and look at each other through the
+material have an end cap between them; if they do not, they are one side that goes on (round a corner of a tray,
+behind a rib). Where another wall, a connection or an opening interrupts a side, the stretches before and after are
+bridged by a straight chord when they lie in line and the chord runs through material or past an opening.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
+from geometry.part import Part
+from geometry.rays import first_hits
+from zones.model import Decomposition, Wall
+from zones.slices import Slice, cut_mesh
+
+# Lengths below are multiples of the thickness of the wall.
+BACKED_REACH = 3.0
+BACKED_DOT = -0.5
+PIECE = 0.5
+PIECES = 400
+LEAST_STRETCH = 0.2
+TAIL = 2.0
+AROUND = 6.0
+# The path round a fillet is at most this many times its chord.
+DETOUR = 1.25
+# The end of a side is rounded where it turns by this much (rad) within this length of it.
+CURL_LENGTH, CURL_WINDOW, CURL_TURN = 1.5, 0.25, 0.25
+CORNER = np.radians(45.0)
+# Behind the end of a slanting cap a side goes on unbacked, in line within this angle (rad), up to this length.
+GROW_TURN, GROW_LENGTH = 0.1, 3.0
+TAIL_SHARE = 0.25
+IN_LINE = 0.8
+# Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged.
+HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
+BRIDGED_SHARE = 0.25
+# Curves shorter than this share of the longest, or than two thicknesses, are no sides.
+SIDE_SHARE, SIDE_LENGTH = 0.25, 2.0
+
+BRIDGE = 0
+FREE, MINE, OTHER = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class SideCurve:
+    """One side of a wall, cut at one height.
+
+    wall   : id, for example 'W1'
+    z      : mm
+    points : (n, 2) float64, mm, in plan, walked with the void on the LEFT: the outward normal is the left normal
+    closed : a ring; the last point is not repeated
+    face   : (n,) int, number of the B-rep face that the segment from point i to the next one lies on; 0 on a bridge.
+             The last entry of an open curve repeats the one before
+    """
+
+    wall: str
+    z: float
+    points: F64
+    closed: bool
+    face: np.ndarray
+
+
+def wall_sections(part: Part, decomposition: Decomposition, height: float | None = None) -> tuple[SideCurve, ...]:
+    """The sides of every wall at its mid height.
+
+    part          : Part in the setup frame, mm
+    decomposition : what ``decompose`` found on it
+    height        : mm, where to cut all walls; None for the middle of each
+
+    Returns
+    -------
+    tuple of SideCurve
+        By wall, then by centroid. Open walls have two; closed ones two rings. End caps and the roundings of ends are
+        left out. Without a given height a wall is cut at 0.6, 0.4, 0.7 or 0.3 of its height instead of the middle
+        where that leaves less to bridge and over a quarter of the middle section would be bridges. Points are off
+        the exact surface by at most the deviation of the mesh, chords over interruptions aside.
+    """
+    count = max((f.number for f in part.faces), default=0) + 1
+    owner = np.full(count, -1)
+    for i, wall in enumerate(decomposition.walls):
+        owner[list(wall.faces)] = i
+    for c in decomposition.connections:
+        owner[list(c.faces)] = -2
+    out: list[SideCurve] = []
+    for i, wall in enumerate(decomposition.walls):
+        out += _best_height(part.mesh, owner, i, wall, height)
+    return tuple(out)
+
+
+def _best_height(mesh: TriangleMesh, owner: np.ndarray, index: int, wall: Wall,
+                 height: float | None) -> list[SideCurve]:
+    span = wall.z_top - wall.z_bottom
+    heights = [wall.z_bottom + s * span for s in HEIGHTS] if height is None else [height]
+    best: tuple[float, list[SideCurve]] = (np.inf, [])
+    for z in heights:
+        curves, bridged = _Section(mesh, owner, index, wall, z).sides()
+        poor = bridged if len(curves) >= 2 else 2.0 - 0.5 * len(curves)
+        if poor < best[0]:
+            best = (poor, curves)
+        if best[0] <= BRIDGED_SHARE:
+            break
+    return best[1]
+
+
+@dataclass(eq=False)
+class _Chain:
+    """A side in the making: rows of pieces in walking order, BRIDGE chords marked by -1."""
+
+    rows: list[int]
+    closed: bool = False
+
+
+class _Section:
+    """One wall cut at one height, as arrays of pieces in walking order: ends ``a``, ``b``, ``kind``, ``face``, ``loop``."""
+
+    def __init__(self, mesh: TriangleMesh, owner: np.ndarray, index: int, wall: Wall, z: float) -> None:
+        self.mesh, self.wall, self.z = mesh, wall, z
+        self.thick = max(wall.thickness, 1e-9)
+        self.cut: Slice = cut_mesh(mesh, z)
+        own = owner[self.cut.face]
+        self.seg_kind = np.where(own == index, MINE, np.where(own == -1, FREE, OTHER))
+        self.tree = None
+        self._make_pieces()
+
+    def _make_pieces(self) -> None:
+        cut = self.cut
+        length = np.linalg.norm(cut.end - cut.start, axis=1)
+        mine = self.seg_kind == MINE
+        pitch = max(PIECE * self.thick, float(length[mine].sum()) / PIECES)
+        loops = [w for w in cut.loops() if mine[w].any()]
+        walk = np.concatenate(loops) if loops else np.zeros(0, np.int64)
+        loop = np.repeat(np.arange(len(loops)), [len(w) for w in loops])
+        keep = length[walk] > 1e-9 * max(self.thick, 1.0)
+        walk, loop = walk[keep], loop[keep]
+        count = np.where(mine[walk], np.maximum(np.ceil(length[walk] / pitch), 1), 1).astype(int)
+        row = np.repeat(walk, count)
+        first = np.cumsum(count) - count
+        k = np.arange(len(row)) - np.repeat(first, count)
+        n = np.repeat(count, count)
+        step = (cut.end - cut.start)[row]
+        self.a, self.b = cut.start[row] + step * (k / n)[:, None], cut.start[row] + step * ((k + 1) / n)[:, None]
+        self.inner = k > 0
+        self.kind, self.face, self.loop = self.seg_kind[row], cut.face[row], np.repeat(loop, count)
+        self.length = np.linalg.norm(self.b - self.a, axis=1)
+        self.way = (self.b - self.a) / np.maximum(self.length, 1e-30)[:, None]
+        self.first, self.count = np.full(len(cut.face), -1), np.ones(len(cut.face), int)
+        self.first[walk], self.count[walk] = first, count
+
+    def sides(self) -> tuple[list[SideCurve], float]:
+        """Curves, and the share of their length that bridges."""
+        if not (self.kind == MINE).any():
+            return [], 0.0
+        self.hit = self._behind()
+        chains = self._joined(self._stretches())
+        used = {r for c in chains for r in c.rows}
+        chains = self._bridge([self._trimmed(self._grown(c, used)) for c in chains])
+        curves, bridged = [], []
+        for chain in chains:
+            curve = self._curve(chain)
+            if curve is not None:
+                curves.append(curve)
+                bridged.append(_lengths(curve)[curve.face[:len(_lengths(curve))] == BRIDGE].sum())
+        total = [float(_lengths(c).sum()) for c in curves]
+        least = max(SIDE_LENGTH * self.thick, SIDE_SHARE * max(total, default=0.0))
+        kept = [i for i, t in enumerate(total) if t >= least]
+        kept.sort(key=lambda i: tuple(np.round(curves[i].points.mean(axis=0) / (1e-3 * self.thick))))
+        share = sum(bridged[i] for i in kept) / max(sum(total[i] for i in kept), 1e-30)
+        return [curves[i] for i in kept], float(share)
+
+    def _behind(self) -> np.ndarray:
+        """(p,) int: the piece on the other side of the material, -2 when that is not a piece here, -1 when unbacked."""
+        out = np.full(len(self.a), -1)
+        mine = np.flatnonzero(self.kind == MINE)
+        part = TriangleMesh(self.mesh.vertices, self.mesh.faces[self.cut.triangle])
+        inward = np.column_stack([self.way[mine, 1], -self.way[mine, 0], np.zeros(len(mine))])
+        middle = np.column_stack([0.5 * (self.a + self.b)[mine], np.full(len(mine), self.z)])
+        t, seg = first_hits(TriangleTree(part), middle, inward, t_min=1e-4 * self.thick)
+        seg = seg.astype(np.int64)
+        across = self.cut.end[seg] - self.cut.start[seg]
+        size = np.maximum(np.linalg.norm(across, axis=1), 1e-30)
+        outward = np.column_stack([-across[:, 1], across[:, 0]]) / size[:, None]
+        own = np.column_stack([-self.way[mine, 1], self.way[mine, 0]])
+        dot = np.einsum("ij,ij->i", outward, own)
+        backed = (seg >= 0) & (t <= BACKED_REACH * self.thick) & (dot < BACKED_DOT)
+        at = middle[:, :2] + np.where(np.isfinite(t), t, 0.0)[:, None] * inward[:, :2]
+        share = np.einsum("ij,ij->i", at - self.cut.start[seg], across) / size**2
+        piece = self.first[seg] + np.clip((share * self.count[seg]).astype(int), 0, self.count[seg] - 1)
+        out[mine] = np.where(backed, np.where(self.first[seg] >= 0, piece, -2), -1)
+        return out
+
+    def _stretches(self) -> list[list[int]]:
+        """Maximal runs of backed pieces, cut at convex corners, in walking order; a whole loop may be one."""
+        out = []
+        backed = self.hit != -1
+        for loop in np.unique(self.loop[self.kind == MINE]):
+            rows = np.flatnonzero(self.loop == loop)
+            before = np.roll(rows, 1)
+            turn = _turn(self.way[before], self.way[rows])
+            opens = backed[rows] & (~backed[before] | (turn < -CORNER))
+            if not opens.any():
+                if backed[rows].all():
+                    out.append(rows.tolist())
+                continue
+            rows = np.roll(rows, -int(np.argmax(opens)))
+            opens = np.roll(opens, -int(np.argmax(opens)))
+            for run in np.split(rows, np.flatnonzero(opens)[1:]):
+                held = run[:int(np.argmin(backed[run]))] if not backed[run].all() else run
+                if self.length[held].sum() >= LEAST_STRETCH * self.thick:
+                    out.append(held.tolist())
+        return out
+
+    def _joined(self, stretches: list[list[int]]) -> list[_Chain]:
+        """Stretches that go on round a corner or behind a junction, joined along the loop."""
+        after: dict[int, tuple[int, list[int]]] = {}
+        for loop in {int(self.loop[s[0]]) for s in stretches}:
+            here = [i for i, s in enumerate(stretches) if self.loop[s[0]] == loop]
+            rows = np.flatnonzero(self.loop == loop)
+            for i, j in zip(here, here[1:] + here[:1], strict=True):
+                gap = self._between(rows, stretches[i][-1], stretches[j][0])
+                if self._goes_on(stretches[i], gap, stretches[j]):
+                    after[i] = (j, gap)
+        chains, used = [], set()
+        entered = {j for j, _ in after.values()}
+        for i in [k for k in range(len(stretches)) if k not in entered] + list(range(len(stretches))):
+            if i in used:
+                continue
+            chain, k = _Chain([]), i
+            while k not in used:
+                used.add(k)
+                chain.rows += stretches[k]
+                if k not in after:
+                    break
+                k, gap = after[k]
+                chain.rows += gap
+                chain.closed = k == i
+            chains.append(chain)
+        return chains
+
+    @staticmethod
+    def _between(rows: np.ndarray, last: int, first: int) -> list[int]:
+        i, n = int(last - rows[0]) + 1, len(rows)
+        return [int(rows[(i + k) % n]) for k in range((int(first - rows[0]) - i) % n)]
+
+    def _goes_on(self, one: list[int], gap: list[int], two: list[int]) -> bool:
+        if (self.kind[gap] == OTHER).any():
+            return False
+        if (self.kind[gap] == FREE).any():
+            path, chord = float(self.length[gap].sum()), float(np.linalg.norm(self.a[two[0]] - self.b[one[-1]]))
+            # Round a fillet, but straight over the stub of a bar that comes out behind the wall.
+            if path > AROUND * self.thick or path > DETOUR * chord:
+                return False
+        tail, head = self._tail(one[::-1]), self._tail(two)
+        if one is two and not gap:
+            return True
+        facing = np.isin(self.hit[tail], two).sum() + np.isin(self.hit[head], one).sum()
+        return bool(facing < TAIL_SHARE * (len(tail) + len(head)))
+
+    def _tail(self, rows: list[int]) -> np.ndarray:
+        reach = np.cumsum(self.length[rows]) - self.length[rows]
+        return np.asarray(rows)[reach <= TAIL * self.thick]
+
+    def _grown(self, chain: _Chain, used: set[int]) -> _Chain:
+        """With the straight ends that look at a slanting cap instead of the other side; ``used`` is added to."""
+        if not chain.closed:
+            chain.rows = self._more(chain.rows[0], -1, used)[::-1] + chain.rows + self._more(chain.rows[-1], 1, used)
+        return chain
+
+    def _more(self, row: int, step: int, used: set[int]) -> list[int]:
+        rows = np.flatnonzero(self.loop == self.loop[row])
+        out: list[int] = []
+        way = self.way[row]
+        while float(self.length[out].sum()) < GROW_LENGTH * self.thick:
+            row = int(rows[(row - rows[0] + step) % len(rows)])
+            straight = abs(float(_turn(way[None], self.way[row][None])[0])) < GROW_TURN
+            if row in used or self.kind[row] != MINE or self.hit[row] != -1 or not straight:
+                break
+            out.append(row)
+            used.add(row)
+        return out
+
+    def _trimmed(self, chain: _Chain) -> _Chain:
+        """Without the roundings of its ends."""
+        if chain.closed:
+            return chain
+        lead, trail = self._curl(chain.rows), self._curl(chain.rows[::-1])
+        return _Chain(chain.rows[lead:len(chain.rows) - trail])
+
+    def _curl(self, rows: list[int]) -> int:
+        """How many pieces from the end on belong to its rounding, the end first."""
+        reach = np.cumsum(self.length[rows])
+        near = int(np.searchsorted(reach, CURL_LENGTH * self.thick)) + 2
+        if near < 3 or near > len(rows):
+            return 0
+        turn = np.abs(_turn(self.way[rows[:near - 1]], self.way[rows[1:near]]))
+        at = reach[:near - 1]
+        window = CURL_WINDOW * self.thick
+        last = 0
+        for k in range(len(turn)):
+            inside = (at > at[k] - window) & (at <= at[k])
+            if turn[k] > 1e-6 and turn[inside].sum() > CURL_TURN:
+                last = k + 1
+        return last
+
+    def _bridge(self, chains: list[_Chain]) -> list[_Chain]:
+        """Stretches of one side, joined by chords over what interrupts them, nearest first."""
+        pairs = []
+        for i, one in enumerate(chains):
+            for j, two in enumerate(chains):
+                far = self._in_line(one, two)
+                if far is not None:
+                    pairs.append((far, i, j))
+        after: dict[int, int] = {}
+        taken: set[int] = set()
+        for _, i, j in sorted(pairs):
+            if i not in after and j not in taken:
+                after[i] = j
+                taken.add(j)
+        out, used = [], set()
+        for i in [k for k in range(len(chains)) if k not in taken] + list(range(len(chains))):
+            if i in used:
+                continue
+            chain, k = _Chain([], chains[i].closed), i
+            while k not in used:
+                used.add(k)
+                chain.rows += chains[k].rows
+                if k not in after:
+                    break
+                chain.rows.append(-1)
+                chain.closed, k = after[k] == i, after[k]
+            out.append(chain)
+        return out
+
+    def _in_line(self, one: _Chain, two: _Chain) -> float | None:
+        """Length of the chord from the end of one chain to the start of another, None where they are not one side."""
+        if one.closed or two.closed or not one.rows or not two.rows:
+            return None
+        p, q = self.b[one.rows[-1]], self.a[two.rows[0]]
+        far = float(np.linalg.norm(q - p))
+        if far < 1e-9 * self.thick:
+            return None
+        u = (q - p) / far
+        leave, enter = self._heading(one.rows[::-1]), self._heading(two.rows)
+        if min(float(leave @ u), float(enter @ u)) < IN_LINE:
+            return None
+        return far if self._filled(p, q) else None
+
+    def _heading(self, rows: list[int]) -> F64:
+        """Mean direction of the pieces nearest to an end, unit."""
+        reach = np.cumsum(self.length[rows]) - self.length[rows]
+        near = np.asarray(rows)[reach <= self.thick]
+        total = (self.way[near] * self.length[near][:, None]).sum(axis=0)
+        return np.asarray(total / max(float(np.linalg.norm(total)), 1e-30))
+
+    def _filled(self, p: F64, q: F64) -> bool:
+        """Whether the chord runs through material, or the wall goes on above or below it (an opening)."""
+        u = (q - p) / np.linalg.norm(q - p)
+        inward = np.array([u[1], -u[0]])
+        for share in (0.25, 0.5, 0.75):
+            at = p + share * (q - p) + 0.3 * self.thick * inward
+            if not self.cut.holds(at) and not self._covered(at):
+                return False
+        return True
+
+    def _covered(self, at: F64) -> bool:
+        """Whether faces of the wall lie over or under a point in plan."""
+        t = self.mesh.triangles[np.isin(self.mesh.face_ids, self.wall.faces)][:, :, :2]
+        near = (t.min(axis=1) <= at).all(axis=1) & (t.max(axis=1) >= at).all(axis=1)
+        d = t[near] - at
+        cross = np.stack([d[:, k, 0] * d[:, k - 2, 1] - d[:, k, 1] * d[:, k - 2, 0] for k in range(3)])
+        return bool(((cross >= 0).all(axis=0) | (cross <= 0).all(axis=0)).any())
+
+    def _curve(self, chain: _Chain) -> SideCurve | None:
+        points: list[F64] = []
+        face: list[int] = []
+        for k, row in enumerate(chain.rows):
+            if row < 0:
+                points.append(self.b[chain.rows[k - 1]])
+                face.append(BRIDGE)
+            elif not (self.inner[row] and k > 0 and chain.rows[k - 1] == row - 1):
+                points.append(self.a[row])
+                face.append(int(self.face[row]))
+        if not chain.closed and chain.rows:
+            points.append(self.b[chain.rows[-1]])
+            face.append(face[-1])
+        if len(points) < (3 if chain.closed else 2):
+            return None
+        p, f = np.array(points), np.array(face)
+        if chain.closed:
+            first = int(np.lexsort((p[:, 1], p[:, 0]))[0])
+            p, f = np.roll(p, -first, axis=0), np.roll(f, -first)
+        return SideCurve(self.wall.id, float(self.z), p, chain.closed, f)
+
+
+def _lengths(curve: SideCurve) -> F64:
+    p = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    return np.asarray(np.linalg.norm(np.diff(p, axis=0), axis=1))
+
+
+def _turn(a: F64, b: F64) -> F64:
+    """Signed angle from unit directions a to b, (n,) rad, positive to the left."""
+    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))

@@ -1,0 +1,97 @@
+"""A mesh cut by a horizontal plane: directed segments, the material on their right, linked into loops.
+
+Notation
+    up edge    the edge of a triangle that runs, counter-clockwise seen from outside, from below the plane to above it
+    down edge  the one that runs back; who walks from the up edge to the down edge has the void on the left
+A vertex in the plane counts as above it, so every triangle that is cut has one edge of each kind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64, TriangleMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """What a horizontal plane cuts of a mesh.
+
+    height    : mm
+    start,end : (n, 2) float64, mm, in plan; the void is on the left of start -> end
+    triangle  : (n,) int, rows of the mesh
+    face      : (n,) int, B-rep face numbers
+    following : (n,) int, the segment that starts where this one ends; -1 where the mesh is open
+    """
+
+    height: float
+    start: F64
+    end: F64
+    triangle: np.ndarray
+    face: np.ndarray
+    following: np.ndarray
+
+    def loops(self) -> list[np.ndarray]:
+        """Segments in walking order, one array of rows for each loop; open strings of a torn mesh come first."""
+        following = self.following.tolist()
+        has_before = np.zeros(len(following), bool)
+        has_before[self.following[self.following >= 0]] = True
+        seen = [False] * len(following)
+        out = []
+        for first in [*np.flatnonzero(~has_before).tolist(), *range(len(following))]:
+            row, walk = first, []
+            while row >= 0 and not seen[row]:
+                seen[row] = True
+                walk.append(row)
+                row = following[row]
+            if walk:
+                out.append(np.array(walk))
+        return out
+
+    def holds(self, point: F64) -> bool:
+        """Whether a point in plan lies in the material.
+
+        point : (2,) float64, mm
+        """
+        (x, y), (x0, y0), (x1, y1) = point, self.start.T, self.end.T
+        crossing = (y0 > y) != (y1 > y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            right = x0 + (y - y0) * (x1 - x0) / (y1 - y0) > x
+        return bool(np.count_nonzero(crossing & right) % 2)
+
+
+def cut_mesh(mesh: TriangleMesh, height: float) -> Slice:
+    """Cut a mesh with the plane z = height.
+
+    mesh   : TriangleMesh, mm, closed and outward
+    height : mm
+    Returns Slice, exact but for rounding; segments without length are kept, since they link their neighbours.
+    """
+    above = mesh.vertices[:, 2] >= height
+    corner = above[mesh.faces]
+    rows = np.flatnonzero(corner.any(axis=1) & ~corner.all(axis=1))
+    corner, nodes = corner[rows], mesh.faces[rows].astype(np.int64)
+    following = np.roll(corner, -1, axis=1)
+    up, down = np.argmax(~corner & following, axis=1), np.argmax(corner & ~following, axis=1)
+    up_edge, down_edge = _edge(nodes, up), _edge(nodes, down)
+    start, end = (_crossing(mesh.vertices, e, height) for e in (up_edge, down_edge))
+    up_key, down_key = (e.min(axis=1) * len(mesh.vertices) + e.max(axis=1) for e in (up_edge, down_edge))
+    order = np.argsort(up_key, kind="stable")
+    place = np.minimum(np.searchsorted(up_key[order], down_key), max(len(rows) - 1, 0))
+    linked = order[place] if len(rows) else np.zeros(0, np.int64)
+    linked = np.where(up_key[linked] == down_key, linked, -1)
+    return Slice(height, start, end, rows, mesh.face_ids[rows].astype(np.int64), linked)
+
+
+def _edge(nodes: np.ndarray, first: np.ndarray) -> np.ndarray:
+    row = np.arange(len(nodes))
+    return np.column_stack([nodes[row, first], nodes[row, (first + 1) % 3]])
+
+
+def _crossing(vertices: F64, edge: np.ndarray, height: float) -> F64:
+    # From the vertex with the lower number, so that both triangles of an edge get the same point bit for bit.
+    p, q = vertices[edge.min(axis=1)], vertices[edge.max(axis=1)]
+    t = (height - p[:, 2]) / (q[:, 2] - p[:, 2])
+    return np.asarray(p[:, :2] + t[:, None] * (q - p)[:, :2])
