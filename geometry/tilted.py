@@ -1,0 +1,93 @@
+"""Whether a body of revolution enters a mesh along any axis, without turning the mesh or building its tree again.
+
+A tool of several bodies (cutting part, shank, holder) is asked for in one walk. Every body goes on along its axis
+without end, as in ``geometry.drop``: the machine stands there. Theory: docs/theory/approach.md.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.arrays import finite_points
+from geometry.bvh import TriangleTree
+from geometry.errors import GeometryError
+from geometry.kernels import tilted as kernels
+from geometry.mesh import F64
+
+
+def axis_frames(axes: ArrayLike) -> F64:
+    """A frame for each axis, its z along the axis.
+
+    axes : (d, 3) float64, any length but zero, in the frame of the part
+
+    Returns
+    -------
+    (d, 3, 3) float64
+        Rotations from the frame of the part to that of the axis; ``frames[j] @ p`` turns a point. +Z gives the
+        identity, other axes the least turn from there; -Z turns about X.
+
+    Raises
+    ------
+    GeometryError
+        An axis is not finite or zero; the subject names it.
+    """
+    way = finite_points(axes, 3, "axes")
+    length = np.linalg.norm(way, axis=1)
+    if len(way) and not length.all():
+        row = int(np.flatnonzero(length == 0.0)[0])
+        raise GeometryError(f"axes[{row}] is zero", code="bad_array", subjects=(f"axes[{row}]",))
+    unit = way / length[:, None]
+    flip = np.where(unit[:, 2:] < 0.0, [1.0, -1.0, -1.0], 1.0)  # what points down is turned about X first
+    x, y, z = (unit * flip).T
+    f = 1.0 / (1.0 + z)
+    rows = [np.stack([1.0 - f * x * x, -f * x * y, -x], axis=-1),
+            np.stack([-f * x * y, 1.0 - f * y * y, -y], axis=-1), np.stack([x, y, z], axis=-1)]
+    return np.ascontiguousarray(np.stack(rows, axis=1) * flip[:, None, :] + 0.0)
+
+
+def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips: ArrayLike,
+                  bodies: ArrayLike) -> NDArray[np.bool_]:
+    """Whether a tool enters the mesh, each time along its own axis.
+
+    tree   : TriangleTree in the frame of the part
+    frames : (d, 3, 3) float64, rotations as of ``axis_frames``
+    which  : (n,) int, the frame each tip is given in
+    tips   : (n, 3) float64, mm, in that frame, whose z is the tool axis
+    bodies : (k, 3) float64, mm: radius, corner radius, height of the body's lower end above the tip
+
+    Returns
+    -------
+    (n,) bool
+        True where some body would have to be lifted by more than 1e-9 mm along the axis to be free: for each what
+        ``geometry.drop.blocked_many`` says of the turned mesh, to rounding.
+
+    Raises
+    ------
+    GeometryError
+        Arrays of another shape, not finite, a frame that does not exist, or radii no body has.
+    """
+    turns = np.ascontiguousarray(frames, dtype=np.float64)
+    points, rows = finite_points(tips, 3, "tips"), finite_points(bodies, 3, "bodies")
+    frame = np.ascontiguousarray(which, dtype=np.int64)
+    if turns.ndim != 3 or turns.shape[1:] != (3, 3) or not np.isfinite(turns).all():
+        raise GeometryError("frames must be finite (d, 3, 3) rotations", code="bad_array", subjects=("frames",))
+    if frame.shape != (len(points),) or (len(frame) and not (0 <= frame.min() and frame.max() < len(turns))):
+        raise GeometryError(f"which must name one of {len(turns)} frames for each of {len(points)} tips",
+                            code="bad_array", subjects=("which",))
+    if not ((rows[:, 1] >= 0.0) & (rows[:, 1] <= rows[:, 0])).all():
+        raise GeometryError("need 0 <= corner radius <= radius for every body", code="bad_cutter",
+                            subjects=("bodies",))
+    out = np.zeros(len(points), np.bool_)
+    if not len(rows) or not len(points):
+        return out
+    args: tuple[Any, ...] = (tree.arrays, turns, frame, points, rows, float(rows[:, 2].min()),
+                             float(rows[:, 0].max()))
+    if numba.get_num_threads() == 1:
+        kernels.along_range(*args, 0, len(points), out)  # type: ignore[call-arg]
+    else:
+        kernels.along_parallel(*args, out)  # type: ignore[call-arg]
+    return out
