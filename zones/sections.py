@@ -21,11 +21,11 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.rays import first_hits
 from zones.model import Decomposition, Wall
-from zones.slices import Slice, cut_mesh
+from zones.slices import Slice, Slicer
 
 # Lengths below are multiples of the thickness of the wall.
 BACKED_REACH = 3.0
-BACKED_DOT = -0.5
+BACKED_DOT = -0.8
 PIECE = 0.5
 PIECES = 400
 LEAST_STRETCH = 0.2
@@ -91,18 +91,19 @@ def wall_sections(part: Part, decomposition: Decomposition, height: float | None
     for c in decomposition.connections:
         owner[list(c.faces)] = -2
     out: list[SideCurve] = []
+    slicer = Slicer(part.mesh)
     for i, wall in enumerate(decomposition.walls):
-        out += _best_height(part.mesh, owner, i, wall, height)
+        out += _best_height(slicer, owner, i, wall, height)
     return tuple(out)
 
 
-def _best_height(mesh: TriangleMesh, owner: np.ndarray, index: int, wall: Wall,
+def _best_height(slicer: Slicer, owner: np.ndarray, index: int, wall: Wall,
                  height: float | None) -> list[SideCurve]:
     span = wall.z_top - wall.z_bottom
     heights = [wall.z_bottom + s * span for s in HEIGHTS] if height is None else [height]
     best: tuple[float, list[SideCurve]] = (np.inf, [])
     for z in heights:
-        curves, bridged = _Section(mesh, owner, index, wall, z).sides()
+        curves, bridged = _Section(slicer, owner, index, wall, z).sides()
         poor = bridged if len(curves) >= 2 else 2.0 - 0.5 * len(curves)
         if poor < best[0]:
             best = (poor, curves)
@@ -120,15 +121,14 @@ class _Chain:
 
 
 class _Section:
-    """One wall cut at one height, as arrays of pieces in walking order: ends ``a``, ``b``, ``kind``, ``face``, ``loop``."""
+    """One wall cut at one height: pieces in walking order, ends ``a``, ``b``, ``kind``, ``face``, ``loop``."""
 
-    def __init__(self, mesh: TriangleMesh, owner: np.ndarray, index: int, wall: Wall, z: float) -> None:
-        self.mesh, self.wall, self.z = mesh, wall, z
+    def __init__(self, slicer: Slicer, owner: np.ndarray, index: int, wall: Wall, z: float) -> None:
+        self.mesh, self.wall, self.z = slicer.mesh, wall, z
         self.thick = max(wall.thickness, 1e-9)
-        self.cut: Slice = cut_mesh(mesh, z)
+        self.cut: Slice = slicer.cut(z)
         own = owner[self.cut.face]
         self.seg_kind = np.where(own == index, MINE, np.where(own == -1, FREE, OTHER))
-        self.tree = None
         self._make_pieces()
 
     def _make_pieces(self) -> None:

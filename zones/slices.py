@@ -62,27 +62,37 @@ class Slice:
         return bool(np.count_nonzero(crossing & right) % 2)
 
 
-def cut_mesh(mesh: TriangleMesh, height: float) -> Slice:
-    """Cut a mesh with the plane z = height.
+class Slicer:
+    """A mesh made ready to be cut at many heights.
 
-    mesh   : TriangleMesh, mm, closed and outward
-    height : mm
-    Returns Slice, exact but for rounding; segments without length are kept, since they link their neighbours.
+    mesh : TriangleMesh, mm, closed and outward
     """
-    above = mesh.vertices[:, 2] >= height
-    corner = above[mesh.faces]
-    rows = np.flatnonzero(corner.any(axis=1) & ~corner.all(axis=1))
-    corner, nodes = corner[rows], mesh.faces[rows].astype(np.int64)
-    following = np.roll(corner, -1, axis=1)
-    up, down = np.argmax(~corner & following, axis=1), np.argmax(corner & ~following, axis=1)
-    up_edge, down_edge = _edge(nodes, up), _edge(nodes, down)
-    start, end = (_crossing(mesh.vertices, e, height) for e in (up_edge, down_edge))
-    up_key, down_key = (e.min(axis=1) * len(mesh.vertices) + e.max(axis=1) for e in (up_edge, down_edge))
-    order = np.argsort(up_key, kind="stable")
-    place = np.minimum(np.searchsorted(up_key[order], down_key), max(len(rows) - 1, 0))
-    linked = order[place] if len(rows) else np.zeros(0, np.int64)
-    linked = np.where(up_key[linked] == down_key, linked, -1)
-    return Slice(height, start, end, rows, mesh.face_ids[rows].astype(np.int64), linked)
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        z = mesh.vertices[:, 2]
+        corners = [z[mesh.faces[:, k]] for k in range(3)]
+        self.low = np.minimum(np.minimum(corners[0], corners[1]), corners[2])
+        self.high = np.maximum(np.maximum(corners[0], corners[1]), corners[2])
+
+    def cut(self, height: float) -> Slice:
+        """Cut with the plane z = height (mm).
+
+        Returns Slice, exact but for rounding; segments without length are kept, since they link their neighbours.
+        """
+        rows = np.flatnonzero((self.low < height) & (self.high >= height))
+        vertices, nodes = self.mesh.vertices, self.mesh.faces[rows].astype(np.int64)
+        corner = vertices[nodes, 2] >= height
+        following = np.roll(corner, -1, axis=1)
+        up_edge = _edge(nodes, np.argmax(~corner & following, axis=1))
+        down_edge = _edge(nodes, np.argmax(corner & ~following, axis=1))
+        start, end = (_crossing(vertices, e, height) for e in (up_edge, down_edge))
+        up_key, down_key = (e.min(axis=1) * len(vertices) + e.max(axis=1) for e in (up_edge, down_edge))
+        order = np.argsort(up_key, kind="stable")
+        place = np.minimum(np.searchsorted(up_key[order], down_key), max(len(rows) - 1, 0))
+        linked = order[place] if len(rows) else np.zeros(0, np.int64)
+        linked = np.where(up_key[linked] == down_key, linked, -1)
+        return Slice(height, start, end, rows, self.mesh.face_ids[rows].astype(np.int64), linked)
 
 
 def _edge(nodes: np.ndarray, first: np.ndarray) -> np.ndarray:

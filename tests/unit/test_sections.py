@@ -13,7 +13,7 @@ from tests.decomposition_shapes import SHAPES, box, pair, plate, ring, to_part
 from zones.decompose import decompose
 from zones.model import Decomposition
 from zones.sections import SideCurve, wall_sections
-from zones.slices import cut_mesh
+from zones.slices import Slicer
 
 pytest.importorskip("cadquery")
 
@@ -46,6 +46,7 @@ OWN = {
     "pointed": lambda: _prism([(0, 0), (1, 1), (49, 1), (50, 0), (49, -1), (1, -1)]),
     "slanted ends": lambda: _prism([(0, 0), (50, 0), (47, 2), (3, 2)]),
     "L": lambda: _prism([(0, 0), (40, 0), (40, 15), (38, 15), (38, 2), (0, 2)]),
+    "oblique ends": lambda: _prism([(0, 0), (50, 0), (51.6, 2), (1.6, 2)]),
     "wedge": lambda: _prism([(0, -1), (50, 0), (0, 1)]),
     "slit ring": lambda: ring().cut(box(30, 3, 20, 0, -1.5, 4)),
     "slab at mid height": lambda: pair().union(box(45, 9, 2, 2, -9, 9.5)),
@@ -81,7 +82,7 @@ def test_every_wall_has_two_sides_with_the_void_on_the_left(name: str) -> None:
         for c in own:
             assert len(c.face) == len(c.points)
             assert set(c.face.tolist()) <= {f.number for f in part.faces} | {0}
-            cut = cut_mesh(part.mesh, c.z)
+            cut = Slicer(part.mesh).cut(c.z)
             p, q = c.points[:-1][c.face[:-1] > 0], c.points[1:][c.face[:-1] > 0]
             left = np.column_stack([-(q - p)[:, 1], (q - p)[:, 0]]) / np.linalg.norm(q - p, axis=1)[:, None]
             for at, normal in zip(0.5 * (p + q), left, strict=True):
@@ -90,7 +91,8 @@ def test_every_wall_has_two_sides_with_the_void_on_the_left(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "wall", "expected"), [
     ("two walls", "W1", (50, 50)), ("slot", "W1", (48, 48)), ("pointed", "W1", (48, 48)),
-    ("slanted ends", "W1", (50, 44)), ("L", "W1", (51, 55)), ("T", "W1", (14, 14)), ("T", "W2", (50, 50)),
+    ("slanted ends", "W1", (50, 44)), ("L", "W1", (51, 55)),
+    ("oblique ends", "W1", (50, 50)), ("T", "W1", (14, 14)), ("T", "W2", (50, 50)),
     ("cross", "W1", (50, 50)), ("cross", "W2", (50, 50)), ("wall with a window", "W2", (50, 50)),
     ("walls flush with the plate ends", "W1", (50, 50)), ("walls flush with the plate sides", "W1", (50, 50)),
     ("tray", "W1", (160, 144)), ("tray with a rib", "W2", (26, 26)), ("web on the floor", "W1", (8, 8)),
@@ -146,7 +148,7 @@ def test_cutting_through_vertices_links_every_segment() -> None:
     f = [t for k in (0, 4) for i in range(4) for t in (
         (k + i, k + (i + 1) % 4, k + 4 + i), (k + (i + 1) % 4, k + 4 + (i + 1) % 4, k + 4 + i))]
     f += [(0, 2, 1), (0, 3, 2), (8, 9, 10), (8, 10, 11)]
-    cut = cut_mesh(TriangleMesh(v, np.array(f)), 1.0)
+    cut = Slicer(TriangleMesh(v, np.array(f))).cut(1.0)
     walk = cut.loops()
     assert len(walk) == 1 and (cut.following >= 0).all()
     area = 0.5 * (cut.start[:, 0] * cut.end[:, 1] - cut.start[:, 1] * cut.end[:, 0]).sum()
