@@ -85,6 +85,9 @@ class Part:
     deviation : mm, largest distance from triangle centres to the exact surface that was measured
     warnings  : sentences for the report (slivers, healed edges, doubtful units, fused solids)
     sha256    : of the bytes of the STEP file
+    uv        : (m, 3, 2) float64, surface parameters (u, v) of the corners of every triangle on its own face, never
+                NaN; those of the solid as read: converted to mm, swept surfaces turned into splines. Both sides of a
+                seam have their own values, so no triangle jumps by a period. None for a part without B-rep
     """
 
     mesh: TriangleMesh
@@ -98,6 +101,7 @@ class Part:
     deviation: float
     warnings: tuple[str, ...]
     sha256: str
+    uv: F64 | None = None
 
     def to_bytes(self) -> bytes:
         """Serialise without pickle (an .npz in memory)."""
@@ -110,10 +114,11 @@ class Part:
         }
         sizes = np.array([len(e.points) for e in self.edges], dtype=np.int64)
         points: NDArray[np.float64] = np.concatenate([e.points for e in self.edges]) if self.edges else np.zeros((0, 3))
+        uv = {} if self.uv is None else {"uv": self.uv}
         out = io.BytesIO()
         np.savez(out, vertices=self.mesh.vertices, triangles=self.mesh.faces, face_ids=self.mesh.face_ids,
                  bounds=self.bounds, edge_sizes=sizes, edge_points=points,
-                 meta=np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8))
+                 meta=np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8), **uv)
         return out.getvalue()
 
     @classmethod
@@ -129,8 +134,9 @@ class Part:
             )
             mesh = TriangleMesh(z["vertices"], z["triangles"], z["face_ids"])
             bounds = z["bounds"]
+            uv = z["uv"] if "uv" in z else None
         return cls(mesh, tuple(FaceInfo(**f) for f in meta["faces"]), edges, meta["volume"], bounds, meta["unit"],
-                   meta["chord"], meta["angle"], meta["deviation"], tuple(meta["warnings"]), meta["sha256"])
+                   meta["chord"], meta["angle"], meta["deviation"], tuple(meta["warnings"]), meta["sha256"], uv)
 
 
 __all__ = ["F64", "I32", "EdgeInfo", "EdgeKind", "FaceInfo", "Part"]

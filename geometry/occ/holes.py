@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh import F64, TriangleMesh
 
 MAX_SIDES = 6
 # A hole wider than this many chords is a missing face, not a sliver, and stays open (with a warning).
@@ -43,6 +45,27 @@ def fill_slivers(mesh: TriangleMesh, chord: float) -> tuple[TriangleMesh, int]:
         return mesh, 0
     faces = np.concatenate([mesh.faces, np.array(extra, np.int32)])
     return TriangleMesh(mesh.vertices, faces, np.concatenate([mesh.face_ids, np.array(ids, np.int32)])), closed
+
+
+def extend_parameters(mesh: TriangleMesh, uv: F64, project: Callable[[int, F64, F64], F64]) -> F64:
+    """Surface parameters for the triangles that ``fill_slivers`` appended.
+
+    mesh    : TriangleMesh with m triangles
+    uv      : (k, 3, 2) float64, parameters of the corners of the first k triangles, k <= m
+    project : face number, point (3,) mm and a start (2,) -> parameters (2,) near the start
+
+    Returns (m, 3, 2) float64 parameters. A corner that lies on the face already copies its value there (of several,
+    at a seam, the one nearest to the first corner's); any other is projected on the face.
+    """
+    extra: list[F64] = []
+    for corners, face in zip(mesh.faces[len(uv):], mesh.face_ids[len(uv):], strict=True):
+        rows = np.flatnonzero(mesh.face_ids[:len(uv)] == face)
+        known = [uv[rows][mesh.faces[rows] == c] for c in corners]
+        start = next(k[0] for k in known if len(k))
+        extra.append(np.array([k[np.linalg.norm(k - start, axis=1).argmin()] if len(k)
+                               else project(int(face), mesh.vertices[c], start)
+                               for c, k in zip(corners, known, strict=True)]))
+    return np.concatenate([uv, np.array(extra).reshape(-1, 3, 2)])
 
 
 def _open_sides(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

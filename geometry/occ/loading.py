@@ -73,7 +73,7 @@ def load_part(path: str | Path, *, placement: Placement | None = None, solid: in
     moved = mesh.mesh.transformed(matrix)
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
                 bounds=moved.bounds, unit=step.unit, chord=chord, angle=angle, deviation=mesh.deviation,
-                warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256)
+                warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256, uv=mesh.uv)
 
 
 def _check_size(shape: Shape, step: StepShape) -> None:

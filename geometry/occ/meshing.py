@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IMeshTools import IMeshTools_Parameters
+from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED, TopAbs_VERTEX
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
@@ -20,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.errors import GeometryError
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.occ.deviation import largest_deviation
-from geometry.occ.holes import fill_slivers
+from geometry.occ.holes import extend_parameters, fill_slivers
 from geometry.occ.topology import Shape, faces_of
 
 MAX_REMESH = 2
@@ -50,6 +53,7 @@ class SolidMesh:
     """Mesh of a solid with the links back to the B-rep.
 
     mesh      : TriangleMesh, STEP coordinates (mm), faces numbered from 1
+    uv        : (m, 3, 2) float64, surface parameters of the corners of its triangles, see ``Part.uv``
     faces     : FaceMesh per B-rep face
     edge_nodes: per edge in kernel order, (k,) indices into ``mesh.vertices`` along the edge; empty when degenerate
     deviation : float, mm, largest measured distance of triangle centres to the exact surface
@@ -58,6 +62,7 @@ class SolidMesh:
     """
 
     mesh: TriangleMesh
+    uv: F64
     faces: list[FaceMesh]
     edge_nodes: list[np.ndarray]
     deviation: float
@@ -84,7 +89,7 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
             break
         # the deviation falls about in proportion to the chord, so aim a little below the limit at once
         chord *= float(np.clip(0.9 * DEVIATION_ROOM * asked / deviation, 0.3, 0.8))
-    mesh, edge_nodes = _join(solid, faces)
+    mesh, uv, edge_nodes = _join(solid, faces)
     warnings = []
     if deviation > DEVIATION_ROOM * asked:
         warnings.append(f"the mesh deviates up to {deviation:.4g} mm from the exact surface; "
@@ -92,12 +97,13 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
     open_edges = count_open_edges(mesh)
     if open_edges:
         mesh, holes = fill_slivers(mesh, asked)
+        uv = extend_parameters(mesh, uv, _projector(faces_of(solid)))
         open_edges = count_open_edges(mesh)
         if holes:
             warnings.append(f"{holes} sliver holes that the CAD kernel left in the mesh were closed")
     if open_edges:
         warnings.append(f"{open_edges} edges of the mesh are not shared by exactly two triangles")
-    return SolidMesh(mesh, faces, edge_nodes, deviation, chord, warnings)
+    return SolidMesh(mesh, uv, faces, edge_nodes, deviation, chord, warnings)
 
 
 def count_open_edges(mesh: TriangleMesh) -> int:
@@ -159,8 +165,25 @@ def _face_mesh(face: Shape, triangulation: Shape, location: TopLoc_Location) -> 
     return FaceMesh(nodes, uv, np.ascontiguousarray(triangles))
 
 
-def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, list[np.ndarray]]:
-    """One vertex per point: nodes on a shared B-rep edge or vertex are the same by topology, not by distance."""
+def _projector(faces: list[Shape]) -> Callable[[int, F64, F64], F64]:
+    """The parameters of a point on a numbered face, in the period of a start value."""
+    def project(number: int, point: F64, start: F64) -> F64:
+        surface = BRep_Tool.Surface_s(faces[number - 1])
+        found = ShapeAnalysis_Surface(surface).NextValueOfUV(gp_Pnt2d(*start), gp_Pnt(*point), 1e-9, -1.0)
+        uv = np.array(found.Coord())
+        for k, period in enumerate((surface.UPeriod() if surface.IsUPeriodic() else 0.0,
+                                    surface.VPeriod() if surface.IsVPeriodic() else 0.0)):
+            if period:
+                uv[k] += period * np.round((start[k] - uv[k]) / period)
+        return uv
+    return project
+
+
+def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[np.ndarray]]:
+    """One vertex per point: nodes on a shared B-rep edge or vertex are the same by topology, not by distance.
+
+    The parameters stay with the corners, so that a point keeps one pair on each face and each side of a seam.
+    """
     offsets = np.concatenate([[0], np.cumsum([len(f.nodes) for f in faces])])
     pairs, edge_nodes = _shared_nodes(solid, offsets)
     label = _components(pairs, int(offsets[-1]))
@@ -179,11 +202,12 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, list[np.nd
     whole = ((triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])
              & (triangles[:, 2] != triangles[:, 0]))
     triangles, ids = triangles[whole], ids[whole]
+    uv = np.concatenate([f.uv for f in faces])[corners[whole]]
     used, packed = np.unique(np.concatenate([triangles.ravel(), *[label[e] for e in edge_nodes]]), return_inverse=True)
     corners_packed = packed[:triangles.size].reshape(-1, 3)
     cuts = np.cumsum([triangles.size, *[len(e) for e in edge_nodes]])
     edges = [packed[cuts[i]:cuts[i + 1]] for i in range(len(edge_nodes))]
-    return TriangleMesh(nodes[first[used]], corners_packed.astype(np.int32), ids.astype(np.int32)), edges
+    return TriangleMesh(nodes[first[used]], corners_packed.astype(np.int32), ids.astype(np.int32)), uv, edges
 
 
 def _components(pairs: np.ndarray, count: int) -> np.ndarray:
