@@ -1,0 +1,174 @@
+"""The proposed tools do what is said of them, they are the fewest, and what stays stays for a reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from geometry.toolbody import HolderSegment
+from tests.hand_parts import as_part, ball, box_mesh, joined, samples_of, terraces, tool
+from zones import proposal
+from zones.proposal import LEAST_MM2, catalogue, propose
+from zones.reach import Clearances, TipField, lattice_step, touchable
+
+LIFT = 0.002
+CLEAR = Clearances()
+HOLDER = (HolderSegment(10, 16, 8), HolderSegment(16, 16, 20))
+
+
+def anything(body, normals):
+    """A strategy for every normal, but that a sharp-cornered end leaves steps on what leans."""
+    upright = (normals[:, 2] > 1 - 1e-6) | (np.abs(normals[:, 2]) < 0.05)
+    return upright | (body.corner_radius > 0)
+
+
+def field_of(mesh, body, margin=5.0):
+    return TipField(TriangleTree(mesh), body, CLEAR, mesh.bounds, body.radius + margin, lattice_step(body))
+
+
+def takes(mesh, body, samples, margin=5.0):
+    return (touchable(field_of(mesh, body, margin), samples.points, samples.normals, LIFT)[1]
+            & anything(body, samples.normals))
+
+
+def remainder(mesh, tools, density=8.0):
+    s = samples_of(mesh, density)
+    s = s.subset((s.normals[:, 2] > -0.02) & (s.area > 0) & (s.points[:, 2] > mesh.bounds[0, 2] + 0.1))
+    left = np.ones(len(s), bool)
+    for t in tools:
+        left &= ~takes(mesh, t, s)
+    return s.subset(left)
+
+
+def asked(mesh, tools, samples, **limits):
+    fields = {t.id: field_of(mesh, t) for t in tools}
+    return propose(samples, fields, TriangleTree(mesh), as_part(mesh), LIFT, CLEAR, anything, **limits)
+
+
+def grown(mesh, tools, found):
+    """The proposed tools as they would be bought, in the holders they were measured with."""
+    holders = {t.id: t.holder for t in tools}
+    return [t.body(f"N{k}", 50 + k, holders[t.holder_of]) for k, t in enumerate(found.tools)]
+
+
+def channel():
+    """Walls 9 high and 1.8 apart on a plate, closed at one end: a deep narrow channel with two corners."""
+    return terraces([0, 6, 9, 10.8, 13.8, 20], [0, 3, 5, 15, 18],
+                    [[2] * 5, [2, 11, 11, 11, 2], [2, 11, 2, 11, 2], [2] * 5])
+
+
+AT_HAND = [ball(4.0, "T1", neck=14.0, shank=6.0, stickout=30.0, holder=HOLDER),
+           tool(4.0, 0.0, "T2", neck=14.0, shank=6.0, stickout=30.0, holder=HOLDER)]
+
+
+def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
+    mesh = channel()
+    left = remainder(mesh, AT_HAND)
+    found = asked(mesh, AT_HAND, left)
+    assert found.tools and found.emptied_mm2 > 0.9 * float(left.area.sum())
+    for t, body, rows in zip(found.tools, grown(mesh, AT_HAND, found), found.rows, strict=True):
+        assert len(rows) and t.area_mm2 >= LEAST_MM2
+        for margin in (4.0, 4.13, 4.27):
+            assert takes(mesh, body, left.subset(rows), margin).all()
+        assert t.neck_length_mm <= proposal.MOST_SLENDER * t.diameter_mm + 1e-9
+        assert t.stickout_mm >= t.neck_length_mm + t.shank_diameter_mm - 1e-9
+        assert t.flute_length_mm <= t.neck_length_mm
+    assert found.emptied_mm2 == pytest.approx(sum(t.area_mm2 for t in found.tools))
+    assert found.emptied_mm2 + sum(found.stays_mm2.values()) == pytest.approx(float(left.area.sum()))
+
+
+def test_no_shorter_neck_would_do():
+    mesh = channel()
+    left = remainder(mesh, AT_HAND)
+    found = asked(mesh, AT_HAND, left)
+    for t, body, rows in zip(found.tools, grown(mesh, AT_HAND, found), found.rows, strict=True):
+        shorter = replace(body, neck_length=t.neck_length_mm - 2.0)
+        assert not takes(mesh, shorter, left.subset(rows)).all()
+
+
+def test_a_longer_neck_of_a_cutter_at_hand_is_named_as_such():
+    """In a channel 3.5 wide the ball of 3 at hand is the stoutest that fits, only too short."""
+    mesh = terraces([0, 10, 13.5, 24], [0, 40], [[16, 2, 16]])
+    short = ball(3.0, "T1", neck=6.0, shank=8.0, stickout=40.0, holder=HOLDER)
+    s = samples_of(mesh, 4.0)
+    left = s.subset((np.abs(s.points[:, 0] - 11.75) < 1.76) & (s.points[:, 2] > 4.0) & (s.points[:, 2] < 15.9)
+                    & (np.abs(s.normals[:, 0]) > 0.9) & (s.area > 0))
+    left = left.subset(~takes(mesh, short, left))
+    found = asked(mesh, [short], left)
+    (t,) = found.tools
+    assert t.instead_of == "T1" and t.diameter_mm == 3.0 and t.neck_length_mm > 6.0 and t.stickout_mm >= 40.0
+    assert found.emptied_mm2 == pytest.approx(float(left.area.sum())) and found.stays_mm2 == {}
+
+
+def test_beside_a_high_wall_one_stout_tool_does():
+    mesh = terraces([0, 12, 40], [-20, 34], [[14, 2]])
+    short = ball(3.0, "T1", neck=5.0, shank=8.0, stickout=40.0)
+    s = samples_of(mesh, 3.0)
+    wall = s.subset((s.normals[:, 0] > 0.9) & (np.abs(s.points[:, 0] - 12) < 1e-9) & (s.area > 0)
+                    & (s.points[:, 2] > 4.0))
+    left = wall.subset(~takes(mesh, short, wall))
+    found = asked(mesh, [short], left)
+    assert len(found.tools) == 1 and found.emptied_mm2 == pytest.approx(float(left.area.sum()))
+
+
+def test_under_a_roof_and_in_a_slot_too_narrow_nothing_is_proposed():
+    roof = joined(terraces([0, 20], [0, 20], [[2]]), box_mesh([5, 5, 6], [15, 15, 8]))
+    s = samples_of(roof, 2.0, {2})
+    under = s.subset((np.abs(s.points[:, :2] - 10) < 4.5).all(axis=1) & (s.points[:, 2] < 2.001))
+    found = asked(roof, AT_HAND, under)
+    assert found.tools == () and found.stays_mm2 == {"undercut": pytest.approx(float(under.area.sum()))}
+    slot = terraces([0, 8, 8.3, 16], [0, 12], [[14, 2, 14]])
+    s = samples_of(slot, 8.0)
+    deep = s.subset((s.points[:, 0] > 7.9) & (s.points[:, 0] < 8.4) & (s.points[:, 2] < 5.0) & (s.area > 0)
+                    & (s.points[:, 1] > 1.0) & (s.points[:, 1] < 11.0) & (s.points[:, 2] > 2.5))
+    found = asked(slot, AT_HAND, deep)
+    assert found.tools == () and found.stays_mm2 == {"slender": pytest.approx(float(deep.area.sum()))}
+    assert asked(slot, AT_HAND, deep, slenderness=100.0).emptied_mm2 == pytest.approx(float(deep.area.sum()))
+
+
+def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
+    mesh = channel()
+    s = samples_of(mesh, 4.0)
+    top = s.subset((s.normals[:, 2] > 0.99) & (s.points[:, 2] > 10.9) & (s.area > 0))
+    found = asked(mesh, AT_HAND, top)
+    assert found.tools == () and set(found.stays_mm2) == {"pass"}
+    left = remainder(mesh, AT_HAND)
+    found = asked(mesh, AT_HAND, left, least_mm2=1e6)
+    assert found.tools == () and found.stays_mm2["too little"] > 0.8 * float(left.area.sum())
+    assert asked(mesh, AT_HAND, left.subset(np.zeros(0, int))).stays_mm2 == {}
+
+
+def test_lengths_of_the_catalogue():
+    np.testing.assert_array_equal(catalogue(np.array([0.2, 3.0, 3.01, 20.0, 20.1, 25.0, 26.0])),
+                                  [1, 3, 4, 20, 25, 25, 30])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_cover_is_the_best_of_all_subsets(seed):
+    """Against every subset of ten tools: number of tools and area left, a tool worth ``least``."""
+    rng = np.random.default_rng(seed)
+    area = rng.uniform(0.0, 1.0, 30)
+    candidates = []
+    for _ in range(10):
+        body = ball(float(rng.choice([1.0, 2.0, 4.0])), neck=float(rng.integers(2, 20)))
+        rows = np.flatnonzero(rng.random(30) < 0.35)
+        candidates.append(proposal._Candidate(body, "", "", rows, np.zeros((len(rows), 2))))
+    least = float(rng.uniform(0.5, 2.0))
+
+    def cost(chosen):
+        got = np.zeros(30, bool)
+        for c in chosen:
+            got[c.rows] = True
+        ties = sum(proposal.PER_SLENDER * c.slenderness / proposal.MOST_SLENDER
+                   - proposal.PER_STOUT * c.body.diameter / max(proposal.DIAMETERS) for c in chosen)
+        return len(chosen) + ties + float(area[~got & reachable].sum()) / least
+
+    reachable = np.zeros(30, bool)
+    for c in candidates:
+        reachable[c.rows] = True
+    best = min(cost(s) for k in range(11) for s in combinations(candidates, k))
+    assert cost(proposal._fewest(candidates, area, least)) == pytest.approx(best, abs=2e-6)
