@@ -20,6 +20,7 @@ from schemas.tools import HolderSegment, Tool, numbered
 
 AXIS_TOLERANCE = 1e-6
 SHORTEST_AXIS = 1e-6
+SAME_DIRECTION = 1.0 - 1e-6  # cosine of the angle between two accesses
 Box = Annotated[list[Triple], Field(min_length=2, max_length=2, description="Lower and upper corner, mm.")]
 
 
@@ -57,16 +58,18 @@ class Access(WireModel):
     """A direction the part is machined from: tool tip to spindle, in the setup frame."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
-    direction: Annotated[Triple, Field(description="Tool axis; only [0, 0, 1] is built so far.")] = [0.0, 0.0, 1.0]
+    direction: Annotated[Triple, Field(description="Tool axis, any length but zero. The program of this access is in "
+                                       "the frame whose Z is this axis and whose X is the part of the setup's X "
+                                       "square to it.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 
     @model_validator(mode="after")
     def _check(self) -> Access:
-        x, y, z = self.direction
-        if z < SHORTEST_AXIS or math.hypot(x, y) > AXIS_TOLERANCE * z:
-            raise ValueError(f"access {self.id}: direction {self.direction} is not built yet, only [0, 0, 1]; turn "
-                             "the part with placement.z_axis instead")
+        length = math.hypot(*self.direction)
+        if length < SHORTEST_AXIS:
+            raise ValueError(f"access {self.id}: direction {self.direction} has length {length:g}, almost zero length; "
+                             "give a direction such as [0, 0, 1]")
         return self
 
 
@@ -187,15 +190,24 @@ class Setup(WireModel):
     @model_validator(mode="after")
     def _check(self) -> Setup:
         self.tools = numbered(self.tools)
-        ids = [a.id for a in self.access]
-        if len(ids) > 1:
-            raise ValueError("several access directions are not built yet; post one job per access, turned with "
-                             "placement")
+        _check_accesses(self.access)
         smallest = min(self.tools, key=lambda t: t.diameter_mm)
         if self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
             raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
                              f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")
         return self
+
+
+def _check_accesses(access: list[Access]) -> None:
+    """Refuse two accesses of one id, or of one direction."""
+    for k, a in enumerate(access):
+        for b in access[:k]:
+            if a.id == b.id:
+                raise ValueError(f"two accesses have the id {a.id}; give each its own")
+            cosine = sum(p * q for p, q in zip(a.direction, b.direction, strict=True))
+            cosine /= math.hypot(*a.direction) * math.hypot(*b.direction)
+            if cosine > SAME_DIRECTION:
+                raise ValueError(f"access {a.id} has the direction of {b.id}; leave one of them out")
 
 
 def _check_box(box: list[list[float]], name: str) -> None:

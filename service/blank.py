@@ -13,7 +13,7 @@ from geometry.errors import SetupError
 from geometry.part import Part
 from schemas.setup import Setup
 from service.convert import face_numbers
-from zones.zoning import SEEN, SEEN_SHARE
+from zones.machinable import SEEN, SEEN_SHARE
 
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
 AWAY = 1e-6  # of a unit normal: what looks along a side does not look at it

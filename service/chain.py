@@ -20,18 +20,20 @@ from output.linuxcnc import write_linuxcnc
 from output.model import StockBox, Workplan
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
-from schemas.setup import Setup, setup_sha256
+from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import tool_bodies
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
-from service.prepare import Prepared, prepare
+from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
-from service.scoring import score
+from service.scoring import Score, score
+from service.sides import Side, file_name, in_first_frame, joined_proofs
 from service.version import VERSION
-from toolpath.plan import CutData, Plan, PlanSettings, plan_job
+from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
 from verify.model import ProofSetup, ScoredSamples
 from verify.prove import prove
+from zones.view import View, turned_samples
 
 Progress = Callable[[str, float], None]
 
@@ -60,38 +62,68 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
     """
     out.mkdir(parents=True, exist_ok=True)
     ready = prepare(part_path, setup, progress)
-    stock = planning_stock(ready)
-    settings = plan_settings(ready, stock)
     scored = score(ready)
-    dense = scored.samples
-    made = plan_job(ready.zones, scored.checks(ready), ready.fields, cut_table(setup), stock, settings,
-                    lambda f: progress("plan", 0.28 + 0.37 * f))
-    progress("write", 0.66)
-    work = workplan(ready, made, settings)
-    program = write_linuxcnc(work) if made.steps else ""
-    zone, given_up = scored.without(made, ready.zones)
-    proof = prove([(PROGRAM_NAME, program)] if made.steps else [], ready.part, tool_bodies(setup), proof_setup(ready),
-                  ScoredSamples(dense, zone), [z.id for z in ready.zones],
-                  lambda f: progress("prove", 0.68 + 0.27 * f))
+    checks = scored.checks(ready)
+    sides: list[Side] = []
+    for k, view in enumerate(ready.views):
+        share = _Share(progress, k, len(ready.views))
+        sides.append(_side(ready, view, scored, checks, sum(len(s.made.steps) for s in sides), share))
     progress("report", 0.96)
-    report, rest = reporting.job_report(ready, made, proof, dense, zone, given_up)
-    files: dict[str, tuple[str, str, bytes]] = {}
+    made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
+    proof = joined_proofs(sides)
+    zone, given_up = scored.without(made, ready.zones)
+    report, rest = reporting.job_report(ready, made, proof, scored.samples, scored.labels, zone, given_up)
+    files: dict[str, tuple[str, str, str | None, bytes]] = {}
     if report["state"] == "proved":
-        files[PROGRAM_NAME] = ("program", "linuxcnc", program.encode())
-        files["job.stpnc"] = ("stepnc", "", write_stepnc_aim(work).encode())
-        files["job.arm.stpnc"] = ("stepnc-arm", "", write_stepnc_arm(work).encode())
-    files["zones.json"] = ("zones", "", _json(reporting.zones_document(report)))
-    _preview(ready, made, report, dense.points[rest], out / "preview.png")
-    files["preview.png"] = ("preview", "", (out / "preview.png").read_bytes())
-    access = setup.access[0].id
-    report["files"] = [{"name": name, "kind": kind, "access": access if kind == "program" else None,
-                        "dialect": dialect or None, "sha256": hashlib.sha256(data).hexdigest()}
-                       for name, (kind, dialect, data) in sorted(files.items())]
-    for name, (_, _, data) in files.items():
+        for s in sides:
+            if s.made.steps:
+                files[file_name(s.view, "program", "linuxcnc.ngc")] = ("program", "linuxcnc", s.view.id,
+                                                                      s.program.encode())
+                files[file_name(s.view, "job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(s.work).encode())
+                files[file_name(s.view, "job", "arm.stpnc")] = ("stepnc-arm", "", None,
+                                                                write_stepnc_arm(s.work).encode())
+    files["zones.json"] = ("zones", "", None, _json(reporting.zones_document(report)))
+    _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
+    files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
+    report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
+                        "sha256": hashlib.sha256(data).hexdigest()}
+                       for name, (kind, dialect, access, data) in sorted(files.items())]
+    for name, (*_, data) in files.items():
         _write(out / name, data)
     _write(out / "report.json", _json(report))
     progress("done", 1.0)
     return report
+
+
+class _Share:
+    """Progress of planning and proving one access of several: 0.28 to 0.95 shared out evenly."""
+
+    def __init__(self, progress: Progress, k: int, count: int) -> None:
+        self.progress, self.low, self.width = progress, 0.28 + 0.67 * k / count, 0.67 / count
+
+    def tell(self, stage: str, share: float) -> None:
+        """Report a share, 0 to 1, of this access."""
+        self.progress(stage, self.low + self.width * share)
+
+
+def _side(ready: Prepared, view: View, scored: Score, checks: list[Checks], steps: int, share: _Share) -> Side:
+    """Plan, write and prove the zones of one access. Each starts from the whole blank."""
+    stock = planning_stock(ready, view)
+    settings = plan_settings(ready, view, stock)
+    mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
+    zones = [ready.zones[k] for k in mine]
+    made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
+                    lambda f: share.tell("plan", 0.55 * f), first_step=steps + 1)
+    share.tell("write", 0.56)
+    work = workplan(ready, view, made, settings)
+    program = write_linuxcnc(work) if made.steps else ""
+    zone, _ = scored.without(made, ready.zones)
+    name = file_name(view, "program", "linuxcnc.ngc")
+    here = turned_samples(scored.samples, view.rotation @ view.first.T)
+    proof = prove([(name, program)] if made.steps else [], view.part, tool_bodies(ready.setup),
+                  proof_setup(ready, view), ScoredSamples(here, zone), [z.id for z in ready.zones],
+                  lambda f: share.tell("prove", 0.58 + 0.4 * f))
+    return Side(view, made, work, program, proof)
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, Any]:
@@ -119,8 +151,9 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         As ``plan``; ``ProgramError`` where the program cannot be read.
     """
     ready = prepare(part_path, setup, progress)
+    view = ready.views[0]
     dense = score(ready).samples
-    proof = prove([("program", program_text)], ready.part, tool_bodies(setup), proof_setup(ready),
+    proof = prove([("program", program_text)], view.part, tool_bodies(setup), proof_setup(ready, view),
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f))
     progress("done", 1.0)
     return reporting.verification_report(ready, proof, dense)
@@ -136,63 +169,76 @@ def cut_table(setup: Setup) -> dict[str, CutData]:
     return out
 
 
-def stock_corners(ready: Prepared) -> np.ndarray:
-    """(2, 3) corners of the nominal stock, mm, uncertainty left out."""
-    stock, bounds = ready.setup.stock, ready.part.bounds
-    if stock.kind == "box" and stock.box_mm is not None:
-        return np.array(stock.box_mm, dtype=np.float64)
-    grown = np.array([bounds[0] - stock.margin_mm, bounds[1] + stock.margin_mm])
+def stock_corners(ready: Prepared, view: View) -> np.ndarray:
+    """(2, 3) corners of the nominal stock in the frame of a view, mm, uncertainty left out."""
+    box = stock_box(ready.setup, ready.part)
+    if box is not None:
+        return turned_box(box, view.rotation)
+    bounds, margin = ready.part.bounds, ready.setup.stock.margin_mm
+    grown = np.array([bounds[0] - margin, bounds[1] + margin])
     grown[0, 2] = bounds[0, 2]
-    return grown
+    return turned_box(grown, view.rotation)
 
 
-def planning_stock(ready: Prepared) -> StockMap:
+def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
     stock = ready.setup.stock
-    lo, hi = stock_corners(ready)
+    lo, hi = stock_corners(ready, view)
     step = max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     if stock.kind == "box":
-        return StockMap.box(ready.tree, lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
-    return StockMap.around(ready.tree, ready.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
+        return StockMap.box(view.tree, lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
+    return StockMap.around(view.tree, view.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
 
 
-def plan_settings(ready: Prepared, stock: StockMap) -> PlanSettings:
+def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     """Tolerances and heights of the plan."""
     q, ops = ready.setup.quality, ready.setup.operations
-    tops = [stock.highest, float(ready.part.bounds[1, 2]) + q.stock_allowance_mm]
-    tops.extend(f.box_mm[1][2] for f in ready.setup.fixtures)
+    tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
+    tops.extend(float(f[1, 2]) for f in _fixtures(ready, view))
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either")
 
 
-def workplan(ready: Prepared, made: Plan, settings: PlanSettings) -> Workplan:
-    """The plan as the writers want it."""
+def _fixtures(ready: Prepared, view: View) -> tuple[np.ndarray, ...]:
+    """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
+    return tuple(turned_box(np.array(f.box_mm, dtype=np.float64), view.rotation) for f in ready.setup.fixtures)
+
+
+def _access(ready: Prepared, view: View) -> Access:
+    return next(a for a in ready.setup.access if a.id == view.id)
+
+
+def workplan(ready: Prepared, view: View, made: Plan, settings: PlanSettings) -> Workplan:
+    """The plan of one access as the writers want it."""
     setup = ready.setup
     used = {s.tool.id for s in made.steps}
-    lo, hi = stock_corners(ready)
+    lo, hi = stock_corners(ready, view)
     comments = tuple(f"warning: {w}" for w in ready.warnings)
+    if len(ready.views) > 1:
+        d = " ".join(f"{v:.6g}" for v in view.direction)
+        comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank", *comments)
     return Workplan(setup.labels.get("order", "zonemill job"), made.steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), settings.clearance,
-                    setup.access[0].work_offset, StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256,
-                    setup_sha256(setup), VERSION, dict(setup.labels), comments)
+                    _access(ready, view).work_offset, StockBox(lo, hi), reporting.material_name(setup),
+                    ready.part.sha256, setup_sha256(setup), VERSION, dict(setup.labels), comments)
 
 
-def proof_setup(ready: Prepared) -> ProofSetup:
-    """The setup in the plain words of the proof."""
+def proof_setup(ready: Prepared, view: View) -> ProofSetup:
+    """The setup in the plain words of the proof, in the frame of a view."""
     s = ready.setup
     c, q = s.clearance_mm, s.quality
-    box = stock_corners(ready) if s.stock.kind == "box" else None
+    box = stock_corners(ready, view) if s.stock.kind == "box" else None
     if box is not None:
         box = np.array([box[0] - s.stock.uncertainty_mm, box[1] + s.stock.uncertainty_mm])
     return ProofSetup(
         stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm, stock_box=box,
-        fixtures=tuple(np.array(f.box_mm, dtype=np.float64) for f in s.fixtures), clearance_neck=c.neck,
+        fixtures=_fixtures(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=s.access[0].work_offset,
+        rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=_access(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
         gauge_length={body.number: t.gauge_length_mm or 0.0 for t, body in zip(s.tools, tool_bodies(s), strict=True)},
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
@@ -200,7 +246,7 @@ def proof_setup(ready: Prepared) -> ProofSetup:
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])})
 
 
-def _preview(ready: Prepared, made: Plan, report: dict[str, Any], stays: np.ndarray, path: Path) -> None:
+def _preview(ready: Prepared, sides: list[Side], report: dict[str, Any], stays: np.ndarray, path: Path) -> None:
     owner: dict[int, str] = {}
     for z in ready.zones:
         for f in z.faces:
@@ -209,7 +255,8 @@ def _preview(ready: Prepared, made: Plan, report: dict[str, Any], stays: np.ndar
              "of what is in reach": f"{100 * report['reach_coverage']:.1f} %",
              "machining time": f"{report['machining_time_s'] / 60:.0f} min"}
     title = ready.setup.labels.get("order") or "zonemill"
-    draw_preview(ready.part, ready.decomposition, owner, made.steps, stays[:: max(1, len(stays) // 20_000)], path,
+    steps = [step for side in sides for step in in_first_frame(side)]
+    draw_preview(ready.views[0].part, ready.decomposition, owner, steps, stays[:: max(1, len(stays) // 20_000)], path,
                  title, facts)
 
 

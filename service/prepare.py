@@ -20,9 +20,13 @@ from schemas.setup import Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, tool_bodies
 from zones.decompose import decompose
+from zones.machinable import machinable_faces
 from zones.model import Decomposition
+from zones.planview import ChannelPlan
 from zones.reach import Clearances, TipField, lattice_step
-from zones.zoning import ZoneArea, build_zones, face_regions, machinable_faces
+from zones.regions import Regioner
+from zones.view import View, access_rotation, turned, turned_samples
+from zones.zoning import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²
 MOST_SAMPLES = 1_500_000
@@ -38,23 +42,37 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A part in the setup frame with everything known before the first pass is laid.
+    """A part with everything known before the first pass is laid.
 
-    samples : of the machinable area, planning density
-    lift    : mm, distance along the normal within which a touch counts as reach
+    part          : Part in the setup frame
+    views         : one per access direction, each in its own frame
+    decomposition : in the frame of the first view, as the samples
+    samples       : of the machinable area, planning density
+    zoning        : zones, each in the frame of its view
+    lift          : mm, distance along the normal within which a touch counts
     """
 
     setup: Setup
     part: Part
-    tree: TriangleTree
-    obstacles: TriangleTree
+    views: tuple[View, ...]
     decomposition: Decomposition
-    regions: dict[int, str]
-    samples: SurfaceSamples
-    fields: dict[str, TipField]
-    zones: tuple[ZoneArea, ...]
+    zoning: Zoning
     lift: float
     warnings: tuple[str, ...]
+
+    @property
+    def samples(self) -> SurfaceSamples:
+        """The samples in the frame of the first view."""
+        return self.views[0].samples
+
+    @property
+    def zones(self) -> tuple[ZoneArea, ...]:
+        """The zones in machining order."""
+        return self.zoning.zones
+
+    def view(self, access: str) -> View:
+        """The view of an access id."""
+        return next(v for v in self.views if v.id == access)
 
 
 def mesh_chord(setup: Setup) -> float:
@@ -97,15 +115,33 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
 
 
-def _room(body: ToolBody, part: Part, setup: Setup) -> float:
-    """How far round the part a tool is planned, mm; beside a block it has to get round what stands there."""
+def _room(body: ToolBody, bounds: F64, stock: F64 | None, setup: Setup) -> float:
+    """How far round the part a tool is planned, mm; beside a block it has to get round what stands there.
+
+    bounds : (2, 3) float64 of the part; stock : (2, 3) float64 of a box blank or None; both in the access frame
+    """
     beside = 0.0
-    if setup.stock.kind == "box":
-        box, spare = setup.stock.box_mm, setup.stock.margin_mm
-        if box is not None:
-            spare = float(np.max([part.bounds[0, :2] - box[0][:2], box[1][:2] - part.bounds[1, :2]]))
+    if stock is not None:
+        spare = float(np.max([bounds[0, :2] - stock[0, :2], stock[1, :2] - bounds[1, :2]]))
         beside = min(spare + setup.stock.uncertainty_mm + body.radius, MOST_ROOM)
     return body.radius + max(AIR, beside)
+
+
+def stock_box(setup: Setup, part: Part) -> F64 | None:
+    """(2, 3) corners of a box blank, mm, setup frame, uncertainty left out; None where the blank is no box."""
+    if setup.stock.kind != "box":
+        return None
+    if setup.stock.box_mm is not None:
+        return np.array(setup.stock.box_mm, dtype=np.float64)
+    grown = np.array([part.bounds[0] - setup.stock.margin_mm, part.bounds[1] + setup.stock.margin_mm])
+    grown[0, 2] = part.bounds[0, 2]
+    return grown
+
+
+def turned_box(box: F64, rotation: F64) -> F64:
+    """(2, 3) float64: the smallest box along the turned axes that holds a box (2, 3)."""
+    corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
 def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
@@ -120,31 +156,50 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     part = load(path, setup)
     check_against_part(setup, part)
     progress("zones", 0.12)
-    tree = TriangleTree(part.mesh)
-    obstacles = TriangleTree(obstacle_mesh(part, setup)) if setup.fixtures else tree
-    decomposition = decompose(part)
-    samples = planning_samples(part, decomposition, setup)
+    rotations = [access_rotation(a.direction) for a in setup.access]
+    first = turned(part, rotations[0])
+    decomposition = decompose(first)
+    samples = planning_samples(first, decomposition, setup, np.array([r[2] @ rotations[0].T for r in rotations]))
+    channels = ChannelPlan.of(first, decomposition)
     lift = max(0.1 * setup.quality.scallop_height_mm, 1.5 * part.chord)
-    fields = {}
-    for k, body in enumerate(tool_bodies(setup)):
-        step = lattice_step(body)
-        fields[body.id] = TipField(obstacles, body, clearances(setup), part.bounds, _room(body, part, setup), step,
-                                   setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
-        progress("zones", 0.14 + 0.08 * k / len(setup.tools))
-    regions = face_regions(part, decomposition, samples, tree)
-    zones = tuple(build_zones(samples, regions, fields, setup.quality.scallop_height_mm, lift))
+    views: list[View] = []
+    for k, rotation in enumerate(rotations):
+        views.append(_view(setup, k, part, rotation, rotations[0], samples, decomposition, channels))
+        progress("zones", 0.14 + 0.08 * (k + 1) / len(rotations))
+    zoning = build_zones(views, decomposition, setup.quality.scallop_height_mm, lift)
     progress("zones", 0.25)
-    return Prepared(setup, part, tree, obstacles, decomposition, regions, samples, fields, zones, lift,
-                    (*part.warnings, *decomposition.warnings))
+    return Prepared(setup, part, tuple(views), decomposition, zoning, lift, (*part.warnings, *decomposition.warnings))
 
 
-def planning_samples(part: Part, decomposition: Decomposition, setup: Setup) -> SurfaceSamples:
+def _view(setup: Setup, k: int, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
+          decomposition: Decomposition, channels: ChannelPlan) -> View:
+    """The k-th access: the part turned into its frame, tip limits of all tools, regions of the samples."""
+    here = turned(part, rotation)
+    tree = TriangleTree(here.mesh)
+    obstacles = tree
+    if setup.fixtures:
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotation
+        obstacles = TriangleTree(obstacle_mesh(part, setup).transformed(matrix))
+    box = stock_box(setup, part)
+    box = None if box is None else turned_box(box, rotation)
+    fields = {b.id: TipField(obstacles, b, clearances(setup), here.bounds, _room(b, here.bounds, box, setup),
+                             lattice_step(b), setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
+              for b in tool_bodies(setup)}
+    seen = turned_samples(samples, rotation @ first.T)
+    regioner = Regioner(here, decomposition, channels, first=k == 0)
+    there = None if k == 0 else (samples.points, samples.normals)
+    labels = regioner.of(seen.points, seen.normals, seen.face, there)
+    return View(setup.access[k].id, rotation, here, tree, obstacles, seen, labels, fields, regioner, first)
+
+
+def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> SurfaceSamples:
     """What zones are built of and passes are measured at.
 
     Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
     every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them.
     """
-    triangles = machinable_triangles(part, decomposition, setup)
+    triangles = machinable_triangles(part, decomposition, setup, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
     thin = min(1.0, MOST_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
     sets = []
@@ -157,8 +212,10 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup) -> 
     return joined(sets)
 
 
-def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup) -> np.ndarray:
+def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> np.ndarray:
     """Indices of the mesh triangles of the machinable area Ma.
+
+    directions : (d, 3) float64, of the accesses, in the frame of the part
 
     Raises
     ------
@@ -175,5 +232,5 @@ def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup)
     mesh = part.mesh
     facets = SurfaceSamples(mesh.triangles.mean(axis=1), mesh.normals, mesh.areas, mesh.face_ids,
                             np.arange(len(mesh.faces), dtype=np.int32))
-    faces = machinable_faces(facets, decomposition, wanted, excluded)
+    faces = machinable_faces(facets, decomposition, wanted, excluded, directions)
     return np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))

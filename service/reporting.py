@@ -16,6 +16,7 @@ from service.version import VERSION
 from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan, ZonePlan
 from verify.model import Proof
+from zones.regions import Labels
 from zones.remainder import Remainder, explain
 from zones.zoning import ZoneArea, is_open
 
@@ -61,10 +62,11 @@ def _shape(ready: Prepared) -> dict[str, Any]:
 
 
 def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
+    view = ready.view(zone.access)
     return {"id": zone.id, "kind": zone.kind, "profile": None, "level": None,
-            "open": is_open(zone, ready.fields[zone.tool.id]), "region": zone.region, "form": str(zone.form),
-            "faces": faces(zone.faces), "access": ready.setup.access[0].id, "tool": zone.tool.id,
-            "axis": [0.0, 0.0, 1.0], "depth_mm": [r(zone.top), r(zone.bottom)],
+            "open": is_open(zone, view.fields[zone.tool.id]), "region": zone.region, "merged": list(zone.merged),
+            "form": str(zone.form), "faces": faces(zone.faces), "access": zone.access, "tool": zone.tool.id,
+            "axis": [r(v, 9) for v in view.direction.tolist()], "depth_mm": [r(zone.top), r(zone.bottom)],
             "cutting_plane_mm": r(zone.plane), "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
             "strategy": {"steep": "zlevel", "level": "floor" if zone.tool.kind != "ball" else "zigzag",
                          "shallow": "zigzag"}[str(zone.form)],
@@ -78,21 +80,19 @@ def _remainder(items: list[Remainder]) -> list[dict[str, Any]]:
 
 def dry_report(ready: Prepared) -> dict[str, Any]:
     """zones.json without a plan: what the tools at hand reach and what they do not."""
-    taken = np.zeros(len(ready.samples), np.bool_)
-    for z in ready.zones:
-        taken[z.samples] = True
-    rest = ready.samples.subset(~taken)
-    items = explain(rest, ready.regions, ready.fields, ready.part, ready.tree, ready.decomposition, ready.lift)
+    rest = ~ready.zoning.taken
+    first = ready.views[0]
+    items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift)
     return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(items)}
 
 
-def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, zone: NDArray[np.int32],
-               given_up: NDArray[np.bool_]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
+               zone: NDArray[np.int32], given_up: NDArray[np.bool_]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """report.json without its files, and which proof samples stay uncut.
 
     A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
 
-    dense    : SurfaceSamples of the proof, n of them
+    dense    : SurfaceSamples of the proof, n of them, frame of the first view; labels : their regions
     zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
     given_up : (n,) bool, the plan's own measure says that no pass touches the sample though a tool could
 
@@ -102,8 +102,8 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     """
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
-    items = explain(dense.subset(rest), ready.regions, ready.fields, ready.part, ready.tree, ready.decomposition,
-                    ready.lift, given_up[rest])
+    items = explain(dense.subset(rest), labels.subset(rest), ready.views, ready.decomposition, ready.lift,
+                    given_up[rest])
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
     # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
@@ -201,7 +201,7 @@ def _step(step: Workingstep) -> dict[str, Any]:
 
 def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
     out = []
-    for f in ready.fields.values():
+    for f in ready.views[0].fields.values():
         t = f.tool
         slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
         out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),

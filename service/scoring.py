@@ -18,8 +18,11 @@ from scipy.spatial import cKDTree
 from geometry.sampling import SurfaceSamples, sample_surface
 from service.prepare import Prepared, machinable_triangles
 from toolpath.plan import Checks, Plan
+from zones.machinable import forms_of
 from zones.reach import touchable
-from zones.zoning import ZoneArea, forms_of
+from zones.regions import Labels
+from zones.view import View, turned_samples
+from zones.zoning import ZoneArea
 
 PROOF_DENSITY = 100.0  # samples a mm²
 PROOF_SEED = 20_011
@@ -30,12 +33,14 @@ NEIGHBOURS = 4
 class Score:
     """The samples of the proof and who answers for them.
 
-    samples : SurfaceSamples of the machinable area
+    samples : SurfaceSamples of the machinable area, frame of the first view
+    labels  : their regions there
     zone    : (n,) int32, 0 for none, else the place of the zone in ``ready.zones`` from 1
-    tips    : (n, 3) float64, mm, an admissible tip that touches each claimed sample
+    tips    : (n, 3) float64, mm, an admissible tip that touches each claimed sample, frame of the zone's view
     """
 
     samples: SurfaceSamples
+    labels: Labels
     zone: NDArray[np.int32]
     tips: NDArray[np.float64]
 
@@ -43,11 +48,12 @@ class Score:
         """Per zone, what its passes are measured at: its samples here, and the borders of its faces."""
         out = []
         for k, z in enumerate(ready.zones, start=1):
-            mine = self.zone == k
+            mine, view = self.zone == k, ready.view(z.access)
             border = ready.samples.area[z.samples] == 0
             edge = z.samples[border]
-            out.append(Checks(np.vstack([self.samples.points[mine], ready.samples.points[edge]]),
-                              np.vstack([self.samples.normals[mine], ready.samples.normals[edge]]),
+            here = turned_samples(self.samples.subset(mine), view.rotation @ ready.views[0].rotation.T)
+            out.append(Checks(np.vstack([here.points, view.samples.points[edge]]),
+                              np.vstack([here.normals, view.samples.normals[edge]]),
                               np.vstack([self.tips[mine], z.tips[border]])))
         return out
 
@@ -71,29 +77,39 @@ class Score:
 
 def score(ready: Prepared) -> Score:
     """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
-    triangles = machinable_triangles(ready.part, ready.decomposition, ready.setup)
-    dense = sample_surface(ready.part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles)
-    owner = np.zeros(len(ready.samples), np.int32)
-    for k, z in enumerate(ready.zones, start=1):
-        owner[z.samples] = k
-    zone = _neighbours(ready, owner, dense)
-    tips = np.zeros((len(dense), 3))
-    for k, z in enumerate(ready.zones, start=1):
-        mine = np.flatnonzero(zone == k)
-        if not len(mine):
-            continue
-        _, whole, tip = touchable(ready.fields[z.tool.id], dense.points[mine], dense.normals[mine], ready.lift)
-        tips[mine] = tip
-        zone[mine[~(whole & (dense.points[mine, 2] >= z.plane))]] = 0
-    return Score(dense, zone, tips)
+    first = ready.views[0]
+    directions = np.array([v.direction @ first.rotation.T for v in ready.views])
+    triangles = machinable_triangles(first.part, ready.decomposition, ready.setup, directions)
+    dense = sample_surface(first.part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles)
+    zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))
+    own = first.label(dense)
+    for view in ready.views:
+        here = turned_samples(dense, view.rotation @ first.rotation.T)
+        labels = own if view is first else view.label(here)
+        mine = [(k, z) for k, z in enumerate(ready.zones, start=1) if z.access == view.id]
+        owner = np.zeros(len(ready.samples), np.int32)
+        for k, z in mine:
+            owner[z.samples] = k
+        wanted = _neighbours(view, owner, here, labels)
+        names = labels.names
+        for k, z in mine:
+            rows = np.flatnonzero((wanted == k) & (zone == 0))
+            if not len(rows):
+                continue
+            _, whole, tip = touchable(view.fields[z.tool.id], here.points[rows], here.normals[rows], ready.lift)
+            good = whole & ~z.below_plane(names[rows], here.points[rows, 2])
+            zone[rows[good]], tips[rows[good]] = k, tip[good]
+    return Score(dense, own, zone, tips)
 
 
-def _neighbours(ready: Prepared, owner: NDArray[np.int32],
-                dense: SurfaceSamples) -> NDArray[np.int32]:
-    """Zone of the nearest owned of a few planning samples of the same face and form."""
+def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:
+    """Zone of the nearest owned of a few planning samples of the same face and form.
+
+    owner : (m,) zone of the planning samples, 0 for none; dense, labels : in the frame of the view
+    """
     zone = np.zeros(len(dense), np.int32)
     codes = {"level": 0, "shallow": 1, "steep": 2}
-    key = ready.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(ready.samples.normals)])
+    key = view.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(view.samples.normals)])
     wanted = dense.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(dense.normals)])
     order, dense_order = np.argsort(key, kind="stable"), np.argsort(wanted, kind="stable")
     for value in np.unique(wanted):
@@ -102,7 +118,7 @@ def _neighbours(ready: Prepared, owner: NDArray[np.int32],
         if not len(pool):
             continue
         k = min(NEIGHBOURS, len(pool))
-        _, near = cKDTree(ready.samples.points[pool]).query(dense.points[rows], k=k, workers=2)
+        _, near = cKDTree(view.samples.points[pool]).query(dense.points[rows], k=k, workers=2)
         near = pool[near.reshape(len(rows), k)]
         owners = owner[near]
         first = np.argmax(owners > 0, axis=1)

@@ -18,9 +18,13 @@ from geometry.toolbody import HolderSegment, ToolBody
 from toolpath.motion import Motion
 from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
+from zones.machinable import machinable_faces
 from zones.model import Decomposition
+from zones.planview import ChannelPlan
 from zones.reach import Clearances, TipField, lattice_step
-from zones.zoning import ZoneArea, build_zones, face_regions, machinable_faces
+from zones.regions import Labels, Regioner
+from zones.view import View
+from zones.zoning import ZoneArea, build_zones
 
 RAMP = math.radians(3.0)
 
@@ -155,6 +159,17 @@ def samples_of(mesh: TriangleMesh, density: float, faces: set[int] | None = None
                             for f in ("points", "normals", "area", "face", "triangle")))
 
 
+def view_of(part: Part, samples: SurfaceSamples, fields: dict[str, TipField],
+            decomposition: Decomposition | None = None,
+            labels: Labels | None = None, obstacles: TriangleTree | None = None) -> View:
+    """The part from +Z; regions by the plan view unless ``labels`` are given."""
+    d = decomposition or Decomposition((), (), ())
+    tree = TriangleTree(part.mesh)
+    regioner = Regioner(part, d, ChannelPlan.of(part, d))
+    named = labels or regioner.of(samples.points, samples.normals, samples.face)
+    return View("A1", np.eye(3), part, tree, obstacles or tree, samples, named, fields, regioner, np.eye(3))
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """A planned part and all that went into the plan."""
@@ -162,7 +177,7 @@ class Case:
     part: Part
     tree: TriangleTree
     samples: SurfaceSamples
-    regions: dict[int, str]
+    view: View
     fields: dict[str, TipField]
     zones: list[ZoneArea]
     settings: PlanSettings
@@ -192,9 +207,9 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
         machinable_faces(everything, nothing, faces, {1}))))
     fields = {t.id: TipField(obstacles, t, Clearances(), mesh.bounds, t.radius + max(4.0, spare + t.radius),
                              lattice_step(t), allowance, scallop) for t in tools}
-    regions = face_regions(part, nothing, samples, tree)
+    view = view_of(part, samples, fields, obstacles=obstacles)
     lift = max(0.1 * scallop, 0.002)
-    zones = build_zones(samples, regions, fields, scallop, lift)
+    zones = list(build_zones([view], nothing, scallop, lift).zones)
     lo, hi = mesh.bounds[0] - [spare, spare, 1.0], mesh.bounds[1] + [spare, spare, 1.0]
     stock = StockMap.around(tree, mesh.bounds, 1.0, 0.12) if near_net else StockMap.box(tree, lo, hi, 0.12)
     before = StockMap(stock.lattice, stock.top.copy())
@@ -203,4 +218,4 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
     checks = [Checks(samples.points[z.samples], samples.normals[z.samples], z.tips) for z in zones]
     plan = plan_job(zones, checks, fields, cut, stock, settings)
-    return Case(part, tree, samples, regions, fields, zones, settings, before, plan)
+    return Case(part, tree, samples, view, fields, zones, settings, before, plan)

@@ -7,7 +7,7 @@ never sets the step for a whole zone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +21,9 @@ from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
+from zones.machinable import Form
 from zones.reach import TipField
-from zones.zoning import Form, ZoneArea
+from zones.zoning import ZoneArea
 
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
@@ -106,9 +107,9 @@ class Plan:
     zones: tuple[ZonePlan, ...]
 
 
-def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: dict[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
-             progress: Progress | None = None) -> Plan:
+             progress: Progress | None = None, first_step: int = 1) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
@@ -117,6 +118,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: dict[s
     cut_data : CutData by tool id
     stock    : StockMap, lowered as the plan grows
     progress : called with the share done, 0 to 1
+    first_step : number of the first workingstep
 
     Returns
     -------
@@ -131,12 +133,13 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: dict[s
         mine = [z for z in zones if z.tool.id == tid]
         field, cut = fields[tid], cut_data[tid]
         if settings.roughing:
-            step = _layers(mine, field, cut, stock, settings, f"S{len(steps) + 1:02d}")
+            step = _layers(mine, field, cut, stock, settings, f"S{len(steps) + first_step:02d}")
             if step is not None:
                 steps.append(step)
         for zone in mine:
             if settings.finishing:
-                step, plan = _finish(zone, check_of[zone.id], field, cut, stock, settings, f"S{len(steps) + 1:02d}")
+                name = f"S{len(steps) + first_step:02d}"
+                step, plan = _finish(zone, check_of[zone.id], field, cut, stock, settings, name)
                 if step is not None:
                     steps.append(step)
                 plans.append(plan)

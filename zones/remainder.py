@@ -3,12 +3,14 @@
 A sample nobody took is asked, in this order: is something above it (undercut); can a tool at hand touch it after
 all (then it was too little for a zone, or no pass got there); could a cutter of the setup touch it if shank and
 holder were out of the way (then how much longer a tool it needs); would a thinner ball or a sharp-cornered end fit
-(then how thick it may be). What is left after that is a corner no rotating tool makes.
+(then how thick it may be). What is left after that is a corner no rotating tool makes. With several access
+directions each is asked, and the one counts along which least is in the way.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,13 +23,17 @@ from geometry.part import Part
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
+from zones.machinable import SEEN
 from zones.model import Decomposition
 from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
-from zones.zoning import SEEN
+from zones.regions import Labels
+from zones.view import View
 
 # mm, tried from stout to thin below the thinnest cutter at hand; nobody is asked to buy a thinner one than the last
 DIAMETERS = (40.0, 25.0, 16.0, 10.0, 6.0, 4.0, 2.5, 1.5, 1.0, 0.6, 0.4, 0.25, 0.15, 0.1)
 ASKED_AT_MOST = 6000  # samples that are asked one by one; the rest follow the nearest in kind by random choice
+# how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last
+GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "gap": 3, "corner": 4, "sharp corner": 5}
 
 
 @dataclass(frozen=True)
@@ -48,14 +54,13 @@ class Remainder:
     at: tuple[float, float, float]
 
 
-def explain(samples: SurfaceSamples, regions: dict[int, str], fields: dict[str, TipField], part: Part,
-            tree: TriangleTree, decomposition: Decomposition, lift: float,
-            given_up: NDArray[np.bool_] | None = None) -> list[Remainder]:
+def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], decomposition: Decomposition,
+            lift: float, given_up: NDArray[np.bool_] | None = None) -> list[Remainder]:
     """Group samples that stay by region and reason.
 
-    samples  : SurfaceSamples that no proved pass covers, mm, access frame
-    regions  : region of every face number
-    fields   : TipField by tool id, what was at hand
+    samples  : SurfaceSamples that no proved pass covers, mm, frame of the first view
+    labels   : their regions
+    views    : the access directions with the tools at hand
     lift     : mm, distance along the normal within which a touch counts
     given_up : (n,) bool, samples a tool could touch but no pass of the plan does
 
@@ -71,16 +76,17 @@ def explain(samples: SurfaceSamples, regions: dict[int, str], fields: dict[str, 
     asked = np.sort(rng.choice(n, ASKED_AT_MOST, replace=False)) if n > ASKED_AT_MOST else np.arange(n)
     few = samples.subset(asked)
     weight = float(samples.area.sum()) / max(float(few.area.sum()), 1e-12)
-    reason, need = _reasons(few, fields, part, tree, decomposition, lift)
+    reason, need = _of_views(few, views, decomposition, lift)
     if given_up is not None:
         for k in np.flatnonzero(given_up[asked] & np.isin(reason, ("gap", "corner", "sharp corner"))):
             reason[k], need[k] = "pass", {}
-    groups: dict[tuple[str, str, str], list[int]] = {}
+    base = [labels.regions[c].base for c in labels.code[asked]]
+    groups: dict[tuple[str, str, str, str], list[int]] = {}
     for row in range(len(few)):
         kind = str(need[row].get("kind"))  # a ball and a flat end are two tools to buy
-        groups.setdefault((regions[int(few.face[row])], str(reason[row]), kind), []).append(row)
+        groups.setdefault((base[row], str(reason[row]), kind, str(need[row].get("access"))), []).append(row)
     out = []
-    for (_, why, _), members in groups.items():
+    for (_, why, *_), members in groups.items():
         m = np.array(members)
         out.append(Remainder(tuple(int(f) for f in np.unique(few.face[m])), float(few.area[m].sum()) * weight, why,
                              _strictest([need[k] for k in members]), tuple(few.points[m[len(m) // 2]].tolist())))
@@ -95,13 +101,34 @@ def _strictest(needs: Needs) -> dict[str, object]:
     some = [n for n in needs if n]
     if not some:
         return {}
-    out: dict[str, object] = {"kind": some[0]["kind"]} if "kind" in some[0] else {}
+    out: dict[str, object] = {k: some[0][k] for k in ("kind", "access") if k in some[0]}
     for key, quantile in (("diameter_mm", 0.02), ("neck_length_mm", 0.98), ("stickout_mm", 0.98)):
         values = [float(str(n[key])) for n in some if key in n]
         if values:
             exact = 1e3 * float(np.quantile(values, quantile))
             out[key] = (math.floor(exact + 1e-6) if key == "diameter_mm" else math.ceil(exact - 1e-6)) / 1e3
     return out
+
+
+def _of_views(few: SurfaceSamples, views: Sequence[View], decomposition: Decomposition,
+              lift: float) -> tuple[NDArray[np.object_], Needs]:
+    """Reason and need of each sample along the view in which least is in its way.
+
+    few : in the frame of the first view
+    """
+    reason = np.full(len(few), "", dtype=object)
+    need: Needs = [{} for _ in range(len(few))]
+    gravity = np.full(len(few), np.inf)
+    for view in views:
+        turn = views[0].rotation @ view.rotation.T
+        here = few if view is views[0] else replace(few, points=few.points @ turn, normals=few.normals @ turn)
+        why, needs = _reasons(here, dict(view.fields), view.part, view.tree, decomposition, lift)
+        how = np.array([GRAVITY.get(str(w), len(GRAVITY)) for w in why])
+        for k in np.flatnonzero(how < gravity):
+            named = len(views) > 1 and needs[k] and needs[k].get("kind") != "other access"
+            reason[k], need[k] = why[k], {**needs[k], "access": view.id} if named else needs[k]
+        gravity = np.minimum(gravity, how)
+    return reason, need
 
 
 def _reasons(few: SurfaceSamples, fields: dict[str, TipField], part: Part, tree: TriangleTree,

@@ -1,64 +1,58 @@
-"""Which tool cuts which area: samples of the machinable area become zones.
+"""Which tool cuts which area from where: samples of the machinable area become zones.
 
-1. Ma, the machinable area: faces the access direction sees, without the seat and the excluded ones.
-2. Every face belongs to a *region*: a connection, a channel, the outside of a wall, wall tops, floors, or
-   free surface. Every sample has a *form*: level, steep or shallow.
-3. Tools are tried from the stoutest on. A tool takes the samples its cutting part can touch, down to the
-   cutting plane where its shank or holder first meets the surroundings (the neck rule); what lies deeper, or
-   where it does not fit, is left to the next tool. What no other tool takes either is then given to the stoutest
-   one that stands clear of it, below its cutting plane or not.
-4. Samples of one region, form and tool are one zone.
+1. Every sample has a *region* in each view (``zones.regions``: SCZ, or SCZI on, under or over a connection) and a
+   *form*: level, steep or shallow.
+2. Views are asked in turn. Between two opposite ones the walls are shared out first (``zones.planes``).
+3. In each region and form tools are tried from the stoutest on. A tool takes the samples its cutting part can touch,
+   down to the cutting plane where its shank or holder first meets the surroundings (the neck rule, cell by cell);
+   what lies deeper, or where it does not fit, is left to the next tool. What no other tool takes either is then given
+   to the stoutest one that stands clear of it, below its cutting plane or not.
+4. Samples of one region, form, tool and view are one zone. A cell under or over a connection joins the zone of its
+   channel or wall where the same tool gets there from the same side; else it is a zone of its own.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.part import Part
-from geometry.rays import first_hits
-from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
+from zones.machinable import Form
 from zones.model import Decomposition
-from zones.reach import TipField, touchable
+from zones.planes import neck_planes, shares
+from zones.reach import TipField
+from zones.regions import Region
+from zones.sight import Sight
+from zones.view import View
 
-STEEP = 0.70710678  # n_z below: steeper than 45 degrees, cut by waterlines
-LEVEL = 1.0 - 1e-6  # n_z above: a level plane, a flat end leaves no cusp
-SEEN = -0.02  # n_z above: the access direction sees it
-SEEN_SHARE = 0.005  # of the area of a face
 LEAST_ZONE_MM2 = 1.0
 LEAST_ZONE_SHARE = 0.002
 SMALL_REGION_MM2 = 30.0  # a region this small gets one tool, not a tool change for every corner
 ONE_TOOL_SHARE = 0.97
-PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids
-
-
-class Form(StrEnum):
-    """How a sample is cut."""
-
-    LEVEL = "level"
-    SHALLOW = "shallow"
-    STEEP = "steep"
 
 
 @dataclass(frozen=True, eq=False)
 class ZoneArea:
-    """A machinable zone: what one tool cuts in one region.
+    """A machinable zone: what one tool cuts in one region from one side. Heights and tips in the access frame, mm.
 
     id      : 'Z3'
-    region  : 'C2' a connection, 'H1' a channel, 'W1' the outside of a wall, 'top', 'floor' or 'free'
+    access  : 'A1'
+    region  : 'C2' a connection, 'H1' a channel, 'W1' the outside of a wall, 'top', 'floor' or 'free'; 'H1 over C2'
+              where the zone is only such a cell
+    merged  : names of the SCZI cells that were joined to it
     samples : (k,) indices into the samples of the machinable area
-    tips    : (k, 3) float64, mm, an admissible tip for each
-    plane   : z of the cutting plane below which the tool must not be asked, -inf where none
+    tips    : (k, 3) float64, an admissible tip for each
+    planes  : height of the cutting plane by name of the cell, below which the tool must not be asked; left out
+              where there is none
     rejected: alternatives with the reason and the numbers
     """
 
     id: str
+    access: str
     kind: str
     region: str
     form: Form
@@ -68,202 +62,180 @@ class ZoneArea:
     faces: tuple[int, ...]
     top: float
     bottom: float
-    plane: float
-    rejected: tuple[dict[str, object], ...] = field(default=())
+    planes: Mapping[str, float] = field(default_factory=dict)
+    merged: tuple[str, ...] = ()
+    rejected: tuple[dict[str, object], ...] = ()
+
+    @property
+    def plane(self) -> float:
+        """The highest of its cutting planes, -inf where there is none."""
+        return max(self.planes.values(), default=-np.inf)
+
+    def below_plane(self, names: NDArray[np.object_], heights: F64) -> NDArray[np.bool_]:
+        """(n,) bool: samples of cells ``names`` at ``heights`` that lie deeper than this tool may be asked."""
+        limit = np.array([self.planes.get(n, -np.inf) for n in names]) if self.planes else -np.inf
+        return np.asarray(heights < limit)
 
 
-def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, wanted: set[int] | None,
-                     excluded: set[int]) -> set[int]:
-    """Numbers of the faces of the machinable area Ma.
+@dataclass(frozen=True)
+class Mcz:
+    """Main computable zone: what one tool can touch along one axis, mm²; by its cutting part alone, and whole."""
 
-    By default every face of which the access direction sees at least ``SEEN_SHARE``, without the seat; else the
-    faces asked for. The share keeps the answer from hanging on one facet of rounding at the rim of an underside.
-    """
-    total = np.bincount(samples.face, weights=samples.area)
-    part = np.bincount(samples.face, weights=samples.area * (samples.normals[:, 2] > SEEN), minlength=len(total))
-    seen = {int(f) for f in np.flatnonzero((part > 0) & (part >= SEEN_SHARE * total))}
-    chosen = seen - set(decomposition.seat) if wanted is None else set(wanted)
-    return chosen - excluded
+    access: str
+    tool: str
+    cutter_area: float
+    area: float
 
 
-def forms_of(normals: F64) -> NDArray[np.object_]:
-    """Form of each sample by its outward unit normal (n, 3)."""
-    out = np.full(len(normals), Form.SHALLOW, dtype=object)
-    out[normals[:, 2] > LEVEL] = Form.LEVEL
-    out[normals[:, 2] < STEEP] = Form.STEEP
-    return out
+@dataclass(frozen=True, eq=False)
+class Zoning:
+    """Zones in machining order, the main computable zones, and (n,) bool which samples some zone holds."""
+
+    zones: tuple[ZoneArea, ...]
+    mcz: tuple[Mcz, ...]
+    taken: NDArray[np.bool_]
 
 
-def face_regions(part: Part, decomposition: Decomposition, samples: SurfaceSamples,
-                 tree: TriangleTree) -> dict[int, str]:
-    """Region of every face number.
-
-    Steep faces of a wall belong to the channel that most of their outward rays cross, else to the outside of
-    the wall; the other faces follow from their role.
-    """
-    region: dict[int, str] = {}
-    wall_of: dict[int, str] = {}
-    for w in decomposition.walls:
-        for f in w.faces:
-            wall_of[f] = w.id
-            region[f] = "top"
-        for f in w.sides:
-            region[f] = w.id
-    channel_of = {frozenset(c.walls): c.id for c in decomposition.channels}
-    for face, channel in _facing_channels(decomposition, samples, tree, part, wall_of, channel_of).items():
-        region[face] = channel
-    for c in decomposition.connections:
-        for f in c.faces:
-            region[f] = c.id
-    for info in part.faces:
-        if info.number not in region:
-            role = decomposition.face_role.get(info.number, "free")
-            region[info.number] = "floor" if role in ("floor", "base") else "free"
-    return region
-
-
-def _facing_channels(decomposition: Decomposition, samples: SurfaceSamples, tree: TriangleTree, part: Part,
-                     wall_of: dict[int, str], channel_of: dict[frozenset[str], str]) -> dict[int, str]:
-    sides = np.array(sorted({f for w in decomposition.walls for f in w.sides}), dtype=np.int64)
-    if not len(sides) or not channel_of:
-        return {}
-    pick = np.flatnonzero(np.isin(samples.face, sides) & (np.abs(samples.normals[:, 2]) < STEEP))[::4]
-    _, hit = first_hits(tree, samples.points[pick], samples.normals[pick], 1e-4, 1e6)
-    votes: dict[int, dict[str, int]] = {}
-    total: dict[int, int] = {}
-    for k, triangle in zip(pick.tolist(), np.asarray(hit).tolist(), strict=True):
-        face = int(samples.face[k])
-        total[face] = total.get(face, 0) + 1
-        if triangle < 0:
-            continue
-        other = wall_of.get(int(part.mesh.face_ids[triangle]))
-        if other is None:
-            continue
-        channel = channel_of.get(frozenset((wall_of[face], other)))
-        if channel:
-            mine = votes.setdefault(face, {})
-            mine[channel] = mine.get(channel, 0) + 1
-    out = {}
-    for face, mine in votes.items():
-        best = min(mine, key=lambda c: (-mine[c], c))
-        if mine[best] >= 0.3 * total[face]:
-            out[face] = best
-    return out
-
-
-def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
-    """(n,) bool: a strategy exists for this tool on samples with these normals (n, 3).
-
-    A corner of radius r cuts everything; a sharp-cornered flat end cuts level planes and walls so upright that
-    steps of at least 0.1 mm keep the scallop.
-    """
-    if tool.corner_radius > 0:
-        return np.ones(len(normals), np.bool_)
-    nz = normals[:, 2]
-    return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
-
-
-def preference(tool: ToolBody, form: Form) -> tuple[float, float, float]:
-    """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
-    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is Form.LEVEL else 0.0
-    return (kind, -tool.diameter, tool.stickout)
-
-
-def build_zones(samples: SurfaceSamples, regions: dict[int, str], fields: dict[str, TipField], scallop: float,
-                lift: float) -> list[ZoneArea]:
+def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: float, lift: float) -> Zoning:
     """Give every sample of the machinable area to the stoutest tool that can touch it.
 
-    samples : of the machinable area
-    regions : region of every face number
-    fields  : TipField by tool id
-    scallop : mm, allowed cusp
-    lift    : mm, distance along the normal within which a touch counts
+    views         : in the order they are machined; the same samples and tools in each
+    decomposition : in the frame of the first view
+    scallop       : mm, allowed cusp
+    lift          : mm, distance along the normal within which a touch counts
 
     Returns
     -------
-    list of ZoneArea
-        In machining order (tools by size, then from the top); samples in none of them are out of reach.
+    Zoning
+        Zones in machining order: views in turn, tools by size, then from the top; samples in none of them are out
+        of reach.
     """
-    forms = forms_of(samples.normals)
-    region = np.array([regions[int(f)] for f in samples.face], dtype=object)
-    reach = {tid: touchable(f, samples.points, samples.normals, lift) for tid, f in fields.items()}
-    can = {tid: able(f.tool, samples.normals, scallop) for tid, f in fields.items()}
+    sights = [Sight(v, decomposition, scallop, lift) for v in views]
+    area = views[0].samples.area
+    mcz = tuple(Mcz(s.view.id, t, float(area[r.by_cutter].sum()), float(area[r.by_tool].sum()))
+                for s in sights for t, r in s.reach.items())
+    taken = np.zeros(len(area), np.bool_)
     found: list[ZoneArea] = []
-    for name in sorted(set(region.tolist())):
-        for form in Form:
-            members = np.flatnonzero((region == name) & (forms == form))
-            if len(members):
-                found.extend(_split(samples, members, str(name), form, fields, reach, can))
-    found.sort(key=lambda z: (-z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), -z.top, z.region, z.form))
-    return [_named(z, k) for k, z in enumerate(found, start=1)]
+    first_choice = shares(sights)
+    rounds = [first_choice, [~taken] * len(sights)] if len(sights) > 1 else [[~taken]]
+    for allowed in rounds:
+        for sight, mine in zip(sights, allowed, strict=True):
+            for base, form, members in sight.groups(mine & ~taken):
+                for zone in _split(sight, members, base, form):
+                    taken[zone.samples] = True
+                    found.append(zone)
+    found = _joined(found, views)
+    place = {v.id: k for k, v in enumerate(views)}
+    found.sort(key=lambda z: (place[z.access], -z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), -z.top,
+                              z.region, z.form))
+    return Zoning(tuple(replace(z, id=f"Z{k}") for k, z in enumerate(found, start=1)), mcz, taken)
 
 
 def _stage(zone: ZoneArea) -> int:
     """Tops and connections before walls, walls before floors: nothing is undercut while it still stands."""
     if zone.form is Form.STEEP:
         return 1
-    return 2 if zone.region == "floor" else 0
+    return 2 if zone.region.split()[0] == "floor" else 0
 
 
-def _named(zone: ZoneArea, k: int) -> ZoneArea:
-    from dataclasses import replace
+@dataclass
+class _Take:
+    """What one tool gets of a group, and its cutting planes by cell."""
 
-    return replace(zone, id=f"Z{k}")
+    rows: NDArray[np.int64]
+    planes: dict[int, float]
+    tried: tuple[dict[str, object], ...]
 
 
-Reach = dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_], F64]]
-
-
-def _split(samples: SurfaceSamples, members: NDArray[np.int64], name: str, form: Form, fields: dict[str, TipField],
-           reach: Reach, can: dict[str, NDArray[np.bool_]]) -> list[ZoneArea]:
+def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> list[ZoneArea]:
     left = members
-    area = samples.area
+    area = sight.samples.area
     least = max(LEAST_ZONE_MM2, LEAST_ZONE_SHARE * float(area[members].sum()))
     tried: list[dict[str, object]] = []
-    out: dict[str, ZoneArea] = {}
-    order = sorted(fields, key=lambda t: (*preference(fields[t].tool, form), t))
+    out: dict[str, _Take] = {}
+    order = sight.order(form)
     if float(area[members].sum()) < SMALL_REGION_MM2:
-        gets = {t: float(area[members[can[t][members] & reach[t][1][members]]].sum()) for t in order}
+        gets = {t: float(area[members[sight.gets(t)[members]]].sum()) for t in order}
         most = max(gets.values())
         order.sort(key=lambda t: gets[t] < ONE_TOOL_SHARE * most)
     for tid, ruled in [*((t, True) for t in order), *((t, False) for t in order)]:
         if float(area[left].sum()) < least:
             break
-        tool = fields[tid].tool
-        by_cutter, by_tool, tips = reach[tid]
-        usable = can[tid][left]
-        stopped = left[usable & by_cutter[left] & ~by_tool[left]] if ruled else left[:0]
-        plane = float(samples.points[stopped, 2].max()) + PLANE_MARGIN if len(stopped) else -np.inf
-        take = left[usable & by_tool[left] & (samples.points[left, 2] >= plane)]
+        planes = neck_planes(sight, left, tid, base) if ruled else {}
+        limit = np.array([planes.get(int(c), -np.inf) for c in sight.view.labels.code[left]])
+        take = left[sight.gets(tid)[left] & (sight.samples.points[left, 2] >= limit)]
         got = float(area[take].sum())
         if got < least:
             if ruled:
-                tried.append(_refusal(tool, form, usable, by_cutter[left], got, least, plane))
+                tried.append(_refusal(sight, left, tid, form, got, least, max(planes.values(), default=-np.inf)))
             continue
         left = left[~np.isin(left, take)]
-        before = out.get(tid)
-        if before is not None:
-            take = np.sort(np.concatenate([before.samples, take]))
-        pts = samples.points[take]
-        out[tid] = ZoneArea("", "SCZI" if name.startswith("C") else "SCZ", name, form, tool, take, tips[take],
-                            tuple(int(f) for f in np.unique(samples.face[take])), float(pts[:, 2].max()),
-                            float(pts[:, 2].min()), plane, before.rejected if before is not None else tuple(tried))
+        if tid in out:
+            out[tid].rows, out[tid].planes = np.sort(np.concatenate([out[tid].rows, take])), {}
+        else:
+            out[tid] = _Take(take, planes, tuple(tried))
         tried.append({"tool": tid, "reason": "cuts another part of this region",
                       "value": round(got, 3), "limit": round(float(area[members].sum()), 3)})
-    return list(out.values())
+    return [z for tid, t in out.items() for z in _zones_of(sight, tid, t, base, form)]
 
 
-def _refusal(tool: ToolBody, form: Form, usable: NDArray[np.bool_], by_cutter: NDArray[np.bool_], got: float,
-             least: float, plane: float) -> dict[str, object]:
+def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form) -> list[ZoneArea]:
+    """One zone where the tool cuts the plain cells of the region too, else one for each cell."""
+    labels = sight.view.labels
+    cells = np.unique(labels.code[take.rows]).tolist()
+    plain = [c for c in cells if labels.regions[c] == Region(base)]
+    parts = [(base, cells)] if plain else [(labels.regions[c].name, [c]) for c in cells]
+    out = []
+    for name, codes in parts:
+        rows = take.rows[np.isin(labels.code[take.rows], codes)]
+        kind = "SCZI" if base.startswith("C") or not plain else "SCZ"
+        planes = {labels.regions[c].name: take.planes[c] for c in codes if c in take.planes}
+        merged = tuple(sorted(labels.regions[c].name for c in codes if labels.regions[c].name != name))
+        out.append(_zone(sight, tid, rows, kind, name, form, planes, merged, take.tried))
+    return out
+
+
+def _zone(sight: Sight, tid: str, rows: NDArray[np.int64], kind: str, name: str, form: Form,
+          planes: dict[str, float], merged: tuple[str, ...], tried: tuple[dict[str, object], ...]) -> ZoneArea:
+    z = sight.samples.points[rows, 2]
+    return ZoneArea("", sight.view.id, kind, name, form, sight.view.fields[tid].tool, rows,
+                    sight.reach[tid].tips[rows], tuple(int(f) for f in np.unique(sight.samples.face[rows])),
+                    float(z.max()), float(z.min()), planes, merged, tried)
+
+
+def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
+    """Zones of one view, region, form and tool made one: the second round may add to what the first one took."""
+    heights = {v.id: v.samples.points[:, 2] for v in views}
+    face = views[0].samples.face
+    groups: dict[tuple[str, str, Form, str], list[ZoneArea]] = {}
+    for z in zones:
+        groups.setdefault((z.access, z.region, z.form, z.tool.id), []).append(z)
+    out = []
+    for (access, *_), same in groups.items():
+        first = same[0]
+        if len(same) > 1:
+            rows = np.concatenate([z.samples for z in same])
+            order = np.argsort(rows, kind="stable")
+            h = heights[access][rows]
+            first = replace(first, samples=rows[order], tips=np.vstack([z.tips for z in same])[order],
+                            faces=tuple(int(f) for f in np.unique(face[rows])), top=float(h.max()),
+                            bottom=float(h.min()), planes={}, merged=tuple(sorted({m for z in same for m in z.merged})))
+        out.append(first)
+    return out
+
+
+def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: Form, got: float, least: float,
+             plane: float) -> dict[str, object]:
+    tool, usable, by_cutter = sight.view.fields[tid].tool, sight.can[tid][left], sight.reach[tid].by_cutter[left]
     if not usable.any():
-        return {"tool": tool.id, "reason": f"a sharp-cornered end leaves steps on {form} area", "value": 0.0,
+        return {"tool": tid, "reason": f"a sharp-cornered end leaves steps on {form} area", "value": 0.0,
                 "limit": 0.0}
     if not (usable & by_cutter).any():
-        return {"tool": tool.id, "reason": "too thick to touch it", "value": tool.diameter, "limit": 0.0}
+        return {"tool": tid, "reason": "too thick to touch it", "value": tool.diameter, "limit": 0.0}
     if np.isfinite(plane) and got < least:
-        return {"tool": tool.id, "reason": "shank or holder meets the surroundings above it",
+        return {"tool": tid, "reason": "shank or holder meets the surroundings above it",
                 "value": round(tool.neck_length, 3), "limit": round(plane, 3)}
-    return {"tool": tool.id, "reason": "adds less area than is worth a zone", "value": round(got, 3),
+    return {"tool": tid, "reason": "adds less area than is worth a zone", "value": round(got, 3),
             "limit": round(least, 3)}
 
 

@@ -14,7 +14,7 @@ from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.motion import Motion
 from toolpath.plan import Checks, CutData, PlanSettings, plan_job
 from toolpath.stock import StockMap
-from zones.zoning import Form
+from zones.machinable import Form
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it
 CUT = {"T1": CutData(11_000, 810, 210, 3100, 0.9), "T2": CutData(12_000, 820, 220, 3200, 1.2)}

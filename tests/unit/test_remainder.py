@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
-from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool
+from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.model import Connection, Decomposition
 from zones.reach import touchable
 from zones.remainder import explain
@@ -20,8 +19,8 @@ LIFT = 0.002
 
 def stays(mesh, tools, samples, decomposition=NOTHING, given_up=None):
     fields = {t.id: field_of(mesh, t) for t in tools}
-    regions = dict.fromkeys(range(int(mesh.face_ids.max()) + 1), "free")
-    return explain(samples, regions, fields, as_part(mesh), TriangleTree(mesh), decomposition, LIFT, given_up)
+    view = view_of(as_part(mesh), samples, fields)
+    return explain(samples, view.labels, [view], decomposition, LIFT, given_up)
 
 
 def out_of_reach(mesh, tools, samples):

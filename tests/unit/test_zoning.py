@@ -5,20 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
-from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, walls
+from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
+from zones.machinable import Form, forms_of, machinable_faces
 from zones.model import Channel, Connection, Decomposition, Wall
-from zones.zoning import (
-    Form,
-    able,
-    build_zones,
-    face_regions,
-    forms_of,
-    is_open,
-    machinable_faces,
-    preference,
-)
+from zones.regions import Labels, face_bases
+from zones.sight import able, preference
+from zones.zoning import build_zones, is_open
 
 NOTHING = Decomposition((), (), ())
 
@@ -27,8 +20,9 @@ def zones_of(mesh, tools, *, faces=None, scallop=0.02, lift=0.002, density=20.0,
     samples = samples_of(mesh, density, faces)
     samples = samples.subset(samples.normals[:, 2] > -0.02)
     fields = {t.id: field_of(mesh, t) for t in tools}
-    named = regions or dict.fromkeys(range(1, int(mesh.face_ids.max()) + 1), "free")
-    return samples, fields, build_zones(samples, named, fields, scallop, lift)
+    labels = None if regions is None else Labels.by_face(regions, samples.face)
+    view = view_of(as_part(mesh), samples, fields, labels=labels)
+    return samples, fields, list(build_zones([view], NOTHING, scallop, lift).zones)
 
 
 def face_at(mesh, point, normal) -> int:
@@ -52,7 +46,8 @@ def test_the_seat_and_what_faces_down_are_not_machinable():
     assert machinable_faces(samples, NOTHING, {4, 5}, {5}) == {4}
 
 
-def test_walls_that_face_each_other_share_a_channel():
+def two_walls():
+    """Part of two upright walls, its decomposition written by hand, and the faces of the sides by wall and side."""
     mesh = walls()
     left = {s: face_at(mesh, (5 if s < 0 else 7, 7, 6), (s, 0, 0)) for s in (-1, 1)}
     right = {s: face_at(mesh, (15 if s < 0 else 17, 7, 6), (s, 0, 0)) for s in (-1, 1)}
@@ -61,16 +56,23 @@ def test_walls_that_face_each_other_share_a_channel():
     d = Decomposition((Wall("W1", (*left.values(), tops), tuple(left.values()), 2, 3, 10),
                        Wall("W2", tuple(right.values()), tuple(right.values()), 2, 3, 10)), (),
                       (Channel("H1", ("W1", "W2"), 8.0, (7, 7, 6)),), {floor: "floor"})
-    region = face_regions(as_part(mesh), d, samples_of(mesh, 5.0), TriangleTree(mesh))
-    assert (region[left[1]], region[right[-1]]) == ("H1", "H1")
-    assert (region[left[-1]], region[right[1]]) == ("W1", "W2")
-    assert (region[tops], region[floor], region[1]) == ("top", "floor", "free")
+    return mesh, d, left, right, tops, floor
+
+
+def test_walls_that_face_each_other_share_a_channel():
+    mesh, d, left, right, tops, floor = two_walls()
+    samples = samples_of(mesh, 5.0).subset(samples_of(mesh, 5.0).area > 0)
+    label = view_of(as_part(mesh), samples, {}, d).labels
+    region = {f: set(label.names[samples.face == f].tolist()) for f in range(1, len(as_part(mesh).faces) + 1)}
+    assert region[left[1]] == region[right[-1]] == {"H1"}
+    assert (region[left[-1]], region[right[1]]) == ({"W1"}, {"W2"})
+    assert (region[tops], region[floor], region[1]) == ({"top"}, {"floor"}, {"free"})
 
 
 def test_faces_of_a_connection_are_its_region():
     mesh = walls()
     d = Decomposition((), (Connection("C1", (3, 4), ("W1", "W2"), 0, 1),), ())
-    region = face_regions(as_part(mesh), d, samples_of(mesh, 2.0), TriangleTree(mesh))
+    region = face_bases(as_part(mesh), d)
     assert region[3] == region[4] == "C1" and region[2] == "free"
 
 

@@ -1,0 +1,77 @@
+"""What was planned along each access direction, and the proofs of several taken as one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from output.model import Workplan
+from toolpath.motion import Workingstep
+from toolpath.plan import Plan
+from verify.findings import ordered
+from verify.model import Proof
+from zones.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """What was planned and proved along one access direction, in its frame."""
+
+    view: View
+    made: Plan
+    work: Workplan
+    program: str
+    proof: Proof
+
+
+def file_name(view: View, stem: str, end: str) -> str:
+    """'job.stpnc' for the first access, 'job.A2.stpnc' for a further one."""
+    return f"{stem}.{end}" if view.is_first else f"{stem}.{view.id}.{end}"
+
+
+def joined_proofs(sides: Sequence[Side]) -> Proof:
+    """One proof of a job of several programs; places of findings in the setup frame.
+
+    A sample is proved when some program leaves it inside the budget and none gouges it: what stands on it after
+    the others is for that program to take off. Residuals are those of the program that leaves least.
+    """
+    proofs = [s.proof for s in sides]
+    findings = [replace(f, point=None if f.point is None else tuple((np.array(f.point) @ s.view.rotation).tolist()))
+                for s in sides for f in s.proof.findings]
+    if len(sides) == 1:
+        return replace(proofs[0], findings=tuple(findings))
+    residual = np.stack([p.residual for p in proofs])
+    best = residual.argmin(axis=0)
+    rows = np.arange(residual.shape[1])
+    proved = np.any([p.proved for p in proofs], axis=0) & (np.stack([p.proved for p in proofs])[best, rows])
+    counts: Counter[str] = Counter()
+    minutes: Counter[int] = Counter()
+    zones = {}
+    for side in sides:
+        counts.update(side.proof.counts)
+        minutes.update(side.proof.minutes)
+        own = {p.zone.id for p in side.made.zones}
+        zones.update({k: z for k, z in side.proof.zones.items() if k in own or k not in zones})
+    top, _ = ordered(findings)
+    return replace(
+        proofs[0], findings=top, counts=dict(sorted(counts.items())), residual=residual[best, rows],
+        line=np.stack([p.line for p in proofs])[best, rows], program=best.astype(np.int32), proved=proved, zones=zones,
+        gouge_max=max(p.gouge_max for p in proofs), machining_time=sum(p.machining_time for p in proofs),
+        cutting_length=sum(p.cutting_length for p in proofs), minutes=dict(minutes),
+        error_bound=max(p.error_bound for p in proofs), line_spacing=max(p.line_spacing for p in proofs),
+        notes=tuple(f"{s.view.id}: {note}" for s in sides for note in s.proof.notes))
+
+
+def in_first_frame(side: Side) -> list[Workingstep]:
+    """The steps of a side with their points in the frame of the first access, for a picture."""
+    turn = side.view.rotation.T @ side.view.first.T
+    if np.array_equal(turn, np.eye(3)):
+        return list(side.made.steps)
+    return [replace(s, trajectories=tuple(replace(t, points=t.points @ turn) for t in s.trajectories))
+            for s in side.made.steps]
+
+
+__all__ = ["Side", "file_name", "in_first_frame", "joined_proofs"]

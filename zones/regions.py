@@ -1,0 +1,159 @@
+"""Which region of the part a point of its surface belongs to: SCZ and SCZI of the paper.
+
+A region is a channel, the outside of a wall, a connection, wall tops, floor or free surface. The cells of the plan
+view (``zones.planmap``) decide which channel a point of a wall side faces, and whether it lies under or over the
+footprint of a connection: then it is SCZI, else SCZ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
+from geometry.part import Part
+from geometry.rays import first_hits
+from zones.model import Decomposition
+from zones.planmap import PlanMap
+from zones.planview import CLEAR, ChannelPlan, footprints
+
+
+@dataclass(frozen=True)
+class Region:
+    """A cell of the split: what a point faces, and the connections above and below it.
+
+    base  : 'H1' a channel, 'W1' the outside of a wall, 'C1' a connection, 'top', 'floor' or 'free'
+    over  : connections that lie below the point; under : those that lie above it; along the access
+    """
+
+    base: str
+    over: tuple[str, ...] = ()
+    under: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """'H1', or 'H1 over C1', or 'floor under C1 C2'."""
+        words = [self.base]
+        for word, ids in (("over", self.over), ("under", self.under)):
+            if ids:
+                words += [word, *ids]
+        return " ".join(words)
+
+    @property
+    def connections(self) -> tuple[str, ...]:
+        """The connections that make it SCZI."""
+        own = (self.base,) if self.base.startswith("C") else ()
+        return tuple(sorted({*own, *self.over, *self.under}, key=lambda c: int(c[1:])))
+
+    @property
+    def kind(self) -> str:
+        """'SCZI' on, under or over a connection, else 'SCZ'."""
+        return "SCZI" if self.connections else "SCZ"
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Regions of n points: ``regions[code[i]]`` is that of point i."""
+
+    regions: tuple[Region, ...]
+    code: NDArray[np.int64]
+
+    def subset(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Labels:
+        """The labels of some of the points."""
+        return Labels(self.regions, self.code[rows])
+
+    @property
+    def names(self) -> NDArray[np.object_]:
+        """(n,) names of the regions."""
+        return np.array([r.name for r in self.regions], dtype=object)[self.code] if len(self.code) else \
+            np.zeros(0, dtype=object)
+
+    @staticmethod
+    def by_face(base: Mapping[int, str], face: NDArray[np.int32]) -> Labels:
+        """Labels where every face (n,) is one region, without looking at the plan."""
+        regions = tuple(Region(b) for b in sorted(set(base.values())))
+        place = {r.base: k for k, r in enumerate(regions)}
+        return Labels(regions, np.array([place[base[int(f)]] for f in face], dtype=np.int64))
+
+
+def face_bases(part: Part, decomposition: Decomposition) -> dict[int, str]:
+    """Base region of every face number by its role alone: sides of walls are their wall's outside."""
+    base: dict[int, str] = {}
+    for w in decomposition.walls:
+        base.update(dict.fromkeys(w.faces, "top"))
+        base.update(dict.fromkeys(w.sides, w.id))
+    for c in decomposition.connections:
+        base.update(dict.fromkeys(c.faces, c.id))
+    for info in part.faces:
+        role = decomposition.face_role.get(info.number, "free")
+        base.setdefault(info.number, "floor" if role in ("floor", "base") else "free")
+    return base
+
+
+class Regioner:
+    """Labels points of a part as one access direction sees it.
+
+    part, decomposition : in the access frame, +Z towards the spindle (ids of the decomposition are kept, its
+                          heights are not read)
+    channels            : ChannelPlan of the first access, which owns the split into channels
+    first               : whether this is the first access; else footprints are drawn anew along this one
+    """
+
+    def __init__(self, part: Part, decomposition: Decomposition, channels: ChannelPlan, first: bool = True) -> None:
+        self.base = face_bases(part, decomposition)
+        self.channels = channels
+        self.connections = decomposition.connections
+        self.plan = channels.plan if first else PlanMap.of(footprints(part, decomposition))
+        self.column = [self.plan.names.index(c.id) if c.id in self.plan.names else -1 for c in self.connections]
+        self.trees = {c.id: TriangleTree(_only(part, c.faces)) for c in decomposition.connections}
+
+    def of(self, points: F64, normals: F64, face: NDArray[np.int32], first: tuple[F64, F64] | None = None) -> Labels:
+        """Labels of points of the surface.
+
+        points, normals : (n, 3) float64 in the access frame, mm and unit
+        face            : (n,) face numbers
+        first           : the same points and normals in the frame of the first access; None where that is this one
+        """
+        there = (points, normals) if first is None else first
+        bases = sorted({*self.base.values(), *self.channels.names})
+        place = {b: k for k, b in enumerate(bases)}
+        table = np.full(max(self.base, default=0) + 1, -1, np.int64)
+        for number, name in self.base.items():
+            table[number] = place[name]
+        base = table[face]
+        channel = self.channels.channel_of(*there, face)
+        to_base = np.array([place[c] for c in self.channels.names], dtype=np.int64)
+        base = np.where(channel >= 0, to_base[channel] if len(to_base) else base, base)
+        over, under = self._stack(points, normals, base, bases)
+        key = np.column_stack([base[:, None], over, under])
+        found, code = np.unique(key, axis=0, return_inverse=True)
+        m = len(self.connections)
+        ids = [c.id for c in self.connections]
+        regions = tuple(Region(bases[row[0]], tuple(ids[k] for k in range(m) if row[1 + k]),
+                               tuple(ids[k] for k in range(m) if row[1 + m + k])) for row in found.tolist())
+        return Labels(regions, np.asarray(code, np.int64).reshape(-1))
+
+    def _stack(self, points: F64, normals: F64, base: NDArray[np.int64],
+               bases: list[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n, connections) bool twice: the connection lies below, above the point, within its footprint."""
+        covered = self.plan.over_at(points[:, :2] + CLEAR * normals[:, :2])[:, self.column]
+        covered &= np.array(self.column, dtype=np.int64) >= 0
+        under = np.zeros_like(covered)
+        for k, c in enumerate(self.connections):
+            if c.id in bases:  # a connection is not over itself
+                covered[base == bases.index(c.id), k] = False
+            rows = np.flatnonzero(covered[:, k])
+            if len(rows):
+                start = points[rows] + CLEAR * normals[rows]
+                _, hit = first_hits(self.trees[c.id], start, (0.0, 0.0, 1.0))
+                under[rows, k] = np.asarray(hit) >= 0
+        return covered & ~under, under
+
+
+def _only(part: Part, faces: tuple[int, ...]) -> TriangleMesh:
+    keep = np.isin(part.mesh.face_ids, faces)
+    return TriangleMesh(part.mesh.vertices, part.mesh.faces[keep], part.mesh.face_ids[keep])

@@ -1,0 +1,88 @@
+"""What every tool reaches along one access direction, and which tool is asked first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from zones.machinable import LEVEL, Form, forms_of
+from zones.model import Decomposition
+from zones.reach import touchable
+from zones.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Of one tool in one view: samples its cutting part touches, the whole tool touches, and the tips."""
+
+    by_cutter: NDArray[np.bool_]
+    by_tool: NDArray[np.bool_]
+    tips: F64
+
+
+def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
+    """(n,) bool: a strategy exists for this tool on samples with these normals (n, 3).
+
+    A corner of radius r cuts everything; a sharp-cornered flat end cuts level planes and walls so upright that
+    steps of at least 0.1 mm keep the scallop.
+    """
+    if tool.corner_radius > 0:
+        return np.ones(len(normals), np.bool_)
+    nz = normals[:, 2]
+    return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
+
+
+def preference(tool: ToolBody, form: Form) -> tuple[float, float, float]:
+    """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
+    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is Form.LEVEL else 0.0
+    return (kind, -tool.diameter, tool.stickout)
+
+
+def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list[tuple[float, float]]]:
+    """Heights, mm, between which each connection stands in a view, by the channels and walls it bridges."""
+    out: dict[str, list[tuple[float, float]]] = {}
+    mesh = view.part.mesh
+    for c in decomposition.connections:
+        z = mesh.triangles[np.isin(mesh.face_ids, c.faces)][:, :, 2]
+        if not z.size:
+            continue
+        for h in decomposition.channels:
+            if set(h.walls) <= set(c.walls):
+                out.setdefault(h.id, []).append((float(z.min()), float(z.max())))
+    return out
+
+
+class Sight:
+    """One view with what its tools reach."""
+
+    def __init__(self, view: View, decomposition: Decomposition, scallop: float, lift: float) -> None:
+        self.view, self.samples = view, view.samples
+        self.form = forms_of(self.samples.normals)
+        self.can = {t: able(f.tool, self.samples.normals, scallop) for t, f in view.fields.items()}
+        self.reach = {t: Reach(*touchable(f, self.samples.points, self.samples.normals, lift))
+                      for t, f in view.fields.items()}
+        self.bands = connection_bands(view, decomposition)
+
+    def gets(self, tool: str) -> NDArray[np.bool_]:
+        """(n,) bool: samples this tool can finish along this view."""
+        return np.asarray(self.can[tool] & self.reach[tool].by_tool)
+
+    def order(self, form: Form) -> list[str]:
+        """Ids of the tools, best first."""
+        return sorted(self.view.fields, key=lambda t: (*preference(self.view.fields[t].tool, form), t))
+
+    def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, Form, NDArray[np.int64]]]:
+        """Base region, form and samples of what is to be shared out, in a fixed order."""
+        labels = self.view.labels
+        base = np.array([r.base for r in labels.regions], dtype=object)[labels.code]
+        out = []
+        for name in sorted(set(base[rows].tolist())):
+            for form in Form:
+                members = np.flatnonzero(rows & (base == name) & (self.form == form))
+                if len(members):
+                    out.append((str(name), form, members))
+        return out

@@ -1,0 +1,104 @@
+"""The part as one access direction sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.sampling import SurfaceSamples
+from zones.reach import TipField
+from zones.regions import Labels, Regioner
+
+ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its own x axis is taken from Y
+
+
+def access_rotation(direction: ArrayLike) -> F64:
+    """Rotation into the frame of an access direction.
+
+    direction : (3,) float64, tool tip to spindle, in the setup frame; any length but zero
+    Returns (3, 3) float64 whose rows are the axes of the access frame in the setup frame: z the direction, x the
+    part of the setup's X square to it (of its Y where the direction runs along X). The origin stays.
+
+    >>> access_rotation([0, 0, -1]).tolist()
+    [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
+    """
+    z = np.asarray(direction, dtype=np.float64)
+    z = z / np.linalg.norm(z)
+    x = np.array([0.0, 1.0, 0.0] if abs(z[0]) > ALONG_X else [1.0, 0.0, 0.0])
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(z, x), z]) + 0.0
+
+
+def turned(part: Part, rotation: F64) -> Part:
+    """The part in another frame with the same origin: points p become ``rotation @ p``."""
+    if np.array_equal(rotation, np.eye(3)):
+        return part
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    mesh = part.mesh.transformed(matrix)
+    edges = tuple(replace(e, points=np.asarray(e.points @ rotation.T)) for e in part.edges)
+    return replace(part, mesh=mesh, edges=edges, bounds=mesh.bounds)
+
+
+def turned_samples(samples: SurfaceSamples, rotation: F64) -> SurfaceSamples:
+    """The samples in another frame with the same origin."""
+    if np.array_equal(rotation, np.eye(3)):
+        return samples
+    return replace(samples, points=np.ascontiguousarray(samples.points @ rotation.T),
+                   normals=np.ascontiguousarray(samples.normals @ rotation.T))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One access direction with all that is known along it; lengths mm, in the access frame (+Z to the spindle).
+
+    id       : 'A1'
+    rotation : (3, 3) float64, setup frame -> access frame
+    part     : Part; obstacles : TriangleTree of part and fixtures; tree : of the part alone
+    samples  : SurfaceSamples of the machinable area, the same rows in every view
+    labels   : their regions
+    fields   : TipField by tool id
+    regioner : labels other points; first : (3, 3) rotation of the first view, whose channels it uses
+    """
+
+    id: str
+    rotation: F64
+    part: Part
+    tree: TriangleTree
+    obstacles: TriangleTree
+    samples: SurfaceSamples
+    labels: Labels
+    fields: Mapping[str, TipField]
+    regioner: Regioner
+    first: F64
+
+    def label(self, samples: SurfaceSamples) -> Labels:
+        """Regions of other samples, given in this frame."""
+        turn = self.rotation.T @ self.first.T
+        there = None if self.is_first else (np.asarray(samples.points @ turn), np.asarray(samples.normals @ turn))
+        return self.regioner.of(samples.points, samples.normals, samples.face, there)
+
+    @property
+    def direction(self) -> F64:
+        """(3,) float64, unit, the tool axis in the setup frame."""
+        return np.asarray(self.rotation[2])
+
+    @property
+    def is_first(self) -> bool:
+        """Whether this is the first access, in whose frame walls are found."""
+        return bool(np.array_equal(self.rotation, self.first))
+
+    def into(self, vectors: F64) -> F64:
+        """Points or directions (n, 3) of the setup frame in the access frame."""
+        return np.asarray(vectors @ self.rotation.T)
+
+    def back(self, vectors: F64) -> F64:
+        """Points or directions (n, 3) of the access frame in the setup frame."""
+        return np.asarray(vectors @ self.rotation)
