@@ -10,6 +10,7 @@ import io
 import json
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ class Part:
         }
         sizes = np.array([len(e.points) for e in self.edges], dtype=np.int64)
         points: NDArray[np.float64] = np.concatenate([e.points for e in self.edges]) if self.edges else np.zeros((0, 3))
-        uv = {} if self.uv is None else {"uv": self.uv}
+        uv: dict[str, Any] = {} if self.uv is None else {"uv": self.uv}
         out = io.BytesIO()
         np.savez(out, vertices=self.mesh.vertices, triangles=self.mesh.faces, face_ids=self.mesh.face_ids,
                  bounds=self.bounds, edge_sizes=sizes, edge_points=points,

@@ -14,10 +14,12 @@ import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from geometry.asker import Label
 from geometry.kernels.trim import thin, trace
-from geometry.labelled import BOOL, I64, Label, Sheet, label_sheet, refined, sheet_of
+from geometry.labelled import label_sheet
 from geometry.mesh import F64
 from geometry.part import Part
+from geometry.sheet import BOOL, I64, Sheet, refined, sheet_of
 
 # Pieces narrower than the tolerance are noise of the label along a border; they go to the neighbour, in so many rounds.
 ABSORB_ROUNDS = 3
@@ -68,10 +70,12 @@ def trim_faces(part: Part, faces: Sequence[int] | None, label: Label, pitch: flo
     sheet = sheet_of(part, faces)
     if not len(sheet.corners):
         return {}
-    sheet = label_sheet(refined(sheet, pitch), label, tolerance)
-    twin = _twins(sheet.corners)
-    group = _absorb(sheet, twin, tolerance)
-    return _patches(sheet, twin, group, tolerance)
+    scale = _scales(sheet)
+    # half for finding the border, half for thinning it
+    sheet = label_sheet(refined(sheet, pitch), label, 0.5 * tolerance)
+    twin, areas = _twins(sheet.corners), sheet.areas()
+    group = _absorb(sheet, twin, areas, tolerance)
+    return _patches(sheet, twin, group, areas, scale, 0.5 * tolerance)
 
 
 def _twins(corners: I64) -> I64:
@@ -93,13 +97,12 @@ def _components(twin: I64, label: I64) -> I64:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _absorb(sheet: Sheet, twin: I64, tolerance: float) -> I64:
+def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
     """Give pieces narrower than the tolerance (twice area over border) to the neighbour with the longest border.
 
     Returns (t,) group numbers; ``sheet.label`` is changed with them.
     """
     start, end = sheet.corners.ravel(), sheet.corners[:, [1, 2, 0]].ravel()
-    areas = sheet.areas()
     group = _components(twin, sheet.label)
     for _ in range(ABSORB_ROUNDS):
         border = np.flatnonzero((twin >= 0) & (group[twin // 3] != np.repeat(group, 3)))
@@ -125,7 +128,8 @@ def _absorb(sheet: Sheet, twin: I64, tolerance: float) -> I64:
     return group
 
 
-def _patches(sheet: Sheet, twin: I64, group: I64, tolerance: float) -> dict[int, tuple[FacePatch, ...]]:
+def _patches(sheet: Sheet, twin: I64, group: I64, areas: F64, scale: F64,
+             tolerance: float) -> dict[int, tuple[FacePatch, ...]]:
     sides = 3 * len(sheet.corners)
     nodes, walked, at = np.empty(sides, np.int64), np.empty(sides, np.int64), np.empty(sides + 1, np.int64)
     count = trace(sheet.corners, twin, group, nodes, walked, at)
@@ -134,12 +138,11 @@ def _patches(sheet: Sheet, twin: I64, group: I64, tolerance: float) -> dict[int,
     owner = group[walked // 3]
     face_of = np.zeros(group.max() + 1, np.int64)
     face_of[group] = sheet.face[sheet.corners[:, 0]]
-    scale = _scales(sheet)
     keep = _kept(sheet, nodes, at, owner, other, scale, tolerance)
     _restore(sheet, nodes, at, owner, face_of, keep)
     label_of = np.zeros(len(face_of), np.int64)
     label_of[group] = sheet.label
-    area = np.bincount(group, weights=sheet.areas())
+    area = np.bincount(group, weights=areas)
     turn = np.bincount(face_of[group], weights=sheet.uv_areas(), minlength=face_of.max() + 1) >= 0
     pieces = np.bincount(face_of)
     loops: list[list[I64]] = [[] for _ in face_of]
@@ -163,13 +166,13 @@ def _shoelace(polygon: F64) -> float:
 
 
 def _scales(sheet: Sheet) -> F64:
-    """(n, 2) float64, mm a unit of u and of v on the face of each node: the 99 % quantile by area over its facets."""
+    """(f, 2) float64 by face number, mm a unit of u and of v: the 99 % quantile by area over the facets of the face."""
     p, q = sheet.nodes[sheet.corners, :3], sheet.nodes[sheet.corners, 3:5]
     e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     a, b = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
     double = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     area, face = sheet.areas(), sheet.face[sheet.corners[:, 0]]
-    out = np.zeros((len(sheet.nodes), 2))
+    out = np.zeros((int(face.max()) + 1, 2))
     for k, (x, y) in enumerate(((b[:, 1], -a[:, 1]), (-b[:, 0], a[:, 0]))):
         along = (x[:, None] * e + y[:, None] * f) / np.where(double != 0, double, np.inf)[:, None]
         size = np.linalg.norm(along, axis=1)
@@ -178,9 +181,7 @@ def _scales(sheet: Sheet) -> F64:
         ends = np.flatnonzero(np.append(np.diff(face[order]) != 0, True))
         before = np.concatenate([[0.0], total[ends[:-1]]])
         pick = np.minimum(np.searchsorted(total, before + 0.99 * (total[ends] - before)), ends)
-        table = np.zeros(int(face.max()) + 1)
-        table[face[order][ends]] = size[order][pick]
-        out[:, k] = table[sheet.face]
+        out[face[order][ends], k] = size[order][pick]
     return out
 
 
@@ -192,7 +193,7 @@ def _kept(sheet: Sheet, nodes: I64, at: I64, owner: I64, other: I64, scale: F64,
     """
     keep = np.zeros(len(sheet.nodes), bool)
     keep[:sheet.original] = True
-    points = np.concatenate([sheet.nodes[:, :3], sheet.nodes[:, 3:5] * scale], axis=1)
+    points = np.concatenate([sheet.nodes[:, :3], sheet.nodes[:, 3:5] * scale[sheet.face]], axis=1)
     for k in range(len(at) - 1):
         loop, beyond = nodes[at[k]:at[k + 1]], other[at[k]:at[k + 1]]
         ends = np.flatnonzero(beyond != np.roll(beyond, 1))
@@ -228,20 +229,22 @@ def _thin_ring(ring: I64, points: F64, tolerance: float, keep: BOOL) -> None:
 
 
 def _restore(sheet: Sheet, nodes: I64, at: I64, owner: I64, face_of: I64, keep: BOOL) -> None:
-    """Where thinning made a loop cross itself or fall flat, the borders of that face keep all their nodes."""
-    rings, number = [], []
+    """Where thinning made the loops of a piece cross or fall flat, the borders of its face keep all their nodes."""
+    rings: dict[int, list[F64]] = {}
+    bad = set()
     for k in range(len(at) - 1):
         loop = nodes[at[k]:at[k + 1]]
-        full, thinned = sheet.nodes[loop, 3:5], sheet.nodes[loop[keep[loop]], 3:5]
-        if len(full) == len(thinned):
-            continue
-        if len(thinned) < 3:
-            keep[loop] = True
-            continue
-        rings.append(shapely.LinearRing(thinned))
-        number.append(k)
-    simple = np.asarray(shapely.is_simple(np.array(rings, dtype=object))) if rings else np.ones(0, bool)
-    bad = {int(face_of[owner[at[k]]]) for k, fine in zip(number, simple, strict=True) if not fine}
+        ring = sheet.nodes[loop[keep[loop]], 3:5]
+        if len(ring) < 3:
+            bad.add(int(face_of[owner[at[k]]]))
+        else:
+            rings.setdefault(int(owner[at[k]]), []).append(ring)
+    pieces = []
+    for some in rings.values():
+        some.sort(key=lambda ring: -abs(_shoelace(ring)))
+        pieces.append(shapely.Polygon(some[0], some[1:]))
+    valid = shapely.is_valid(np.array(pieces, dtype=object))
+    bad |= {int(face_of[g]) for g, fine in zip(rings, valid, strict=True) if not fine}
     for k in range(len(at) - 1):
         if int(face_of[owner[at[k]]]) in bad:
             keep[nodes[at[k]:at[k + 1]]] = True
