@@ -1,0 +1,269 @@
+"""Bends of a curve in plan: how far it turns each way, whatever its place, size and noise.
+
+Notation
+    s          share of the length of the curve, 0..1
+    theta(s)   direction of the tangent, rad; falls where the curve turns right, that is where it bulges to the void
+               on its left (an *up* bend)
+    leg        stretch between a highest and the next lowest direction; its turn is the difference
+    height     of a leg: over its own chord or over that between the middles of the legs beside it, whichever is more
+    strength   of a leg: the lesser of its turn over 20 degrees and its height over that of noise, which is 0.2 % of the
+               size of the curve or six standard errors of the smoothed curve, whichever is more
+Weak legs are taken away one by one, the weakest first, and their neighbours grow together, as in a walk with
+hysteresis. Those left at strength 1 are the bends. The whole series is kept, since it says how far the curve is
+from another count.
+On a closed curve theta is measured against a circle walked at the same speed, so that an up bend is where the curve
+turns right more than its mean; an oval has two, a circle none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import finite_points
+from geometry.bspline import CONTROL_POINTS, SplineCurve, arc_length, fit_even, resample
+from geometry.mesh import F64
+
+# Control points tried, the paper's ten first; samples per polyline by its number of points.
+COUNTS = (CONTROL_POINTS, 14, 20, 28, 40, 56, 80)
+SAMPLES = ((400, 512), (200, 256), (100, 128), (0, 64))
+STEPS = 1200
+# A bend turns by this much (rad) and is this high over its chord: in sizes of the curve, and in standard errors of the
+# smoothed curve.
+TURN, HEIGHT, ERRORS = float(np.radians(20.0)), 0.002, 6.0
+# Distances below this share of the size of a curve are taken for zero when the number of control points is chosen.
+FLOOR = 2e-4
+# The middle half of the turn of a bend against what lies between a twentieth from either end of it.
+INNER, OUTER = (0.25, 0.75), (0.05, 0.95)
+ARC_SHARE = 0.5 / 0.9
+
+
+class Way(StrEnum):
+    """Which way a bend bulges."""
+
+    UP = "up"
+    """Towards the void, on the left of the walk: the curve turns right."""
+    DOWN = "down"
+    """Into the material: the curve turns left."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A stretch of a curve that turns one way.
+
+    way        : Way
+    turn       : rad, positive; against the mean turn where the curve is closed
+    start, end : shares of the length, 0..1; ``end`` of a closed curve may lie beyond 1
+    roundness  : length of the middle half of the turn over that of an arc; an arc has 1, a flat sine 0.84
+    """
+
+    way: Way
+    turn: float
+    start: float
+    end: float
+    roundness: float
+
+
+@dataclass(frozen=True)
+class BendLevel:
+    """The bends that are left when all of strength ``least`` or below are gone; the weakest of them has ``most``."""
+
+    least: float
+    most: float
+    bends: tuple[Bend, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BendMeasures:
+    """What the profile types are decided by.
+
+    closed : a ring
+    levels : BendLevel by rising strength, from 0 to infinity; the last has no bend
+    skew   : the centroid of the area between curve and chord, along the chord, off its middle, in chords; negative
+             towards the start. 0 when closed
+    turn   : rad, whole turn of the tangent, positive to the left
+    spline : the curve that was measured
+    """
+
+    closed: bool
+    levels: tuple[BendLevel, ...]
+    skew: float
+    turn: float
+    spline: SplineCurve
+
+    @property
+    def counted(self) -> int:
+        """Place of the level whose bends are those of the definition."""
+        return next(i for i, v in enumerate(self.levels) if v.most >= 1.0)
+
+
+def measure_bends(points: ArrayLike, closed: bool = False) -> BendMeasures:
+    """Bends of a polyline after it was smoothed by a B-spline.
+
+    points : (n, 2) float64, mm, in plan, walked with the void on the left
+    closed : a ring; the last point is not repeated
+
+    Returns
+    -------
+    BendMeasures
+        Of the B-spline of order 5 and, unless more explain the points better (Bayesian information criterion), ten
+        control points.
+
+    Raises
+    ------
+    GeometryError
+        Points of another shape, not finite, or without length.
+    """
+    p = finite_points(points, 2, "points")
+    spline, error = smooth(p, closed)
+    u = np.linspace(0.0, 1.0, STEPS + 1)
+    p = spline.at(u)
+    s, theta = _directions(spline, u)
+    turn, skew, size = float(theta[-1] - theta[0]), 0.0, size_of(p, closed)
+    if closed:
+        theta = theta - turn * s
+        top = int(np.argmax(theta[:-1]))
+        s = np.concatenate([s[top:-1], s[:top + 1] + 1.0])
+        theta = np.concatenate([theta[top:-1], theta[:top + 1]])
+        p = _unrolled(s, theta, float(arc_length(p)[-1]))
+    else:
+        skew = _skew(p)
+    legs = _Legs(s, theta, p, closed, max(HEIGHT * size, ERRORS * error))
+    return BendMeasures(closed, _levels(legs), skew, turn, spline)
+
+
+def size_of(points: F64, closed: bool) -> float:
+    """What lengths of a curve are compared with: its chord, or a third of its length where that is more (rings, hooks).
+
+    points : (n, 2) float64, mm
+    closed : a ring
+    Returns mm.
+    """
+    length = float(arc_length(points, closed)[-1])
+    return max(0.0 if closed else float(np.linalg.norm(points[-1] - points[0])), length / np.pi)
+
+
+def smooth(points: F64, closed: bool) -> tuple[SplineCurve, float]:
+    """The B-spline that stands for a polyline: as few control points as the points call for, ten at least.
+
+    points : (n, 2) float64, mm
+    closed : a ring
+    Returns the SplineCurve of order 5, with free ends, and its standard error along each axis, mm, as if what it leaves
+    were independent noise. Raises GeometryError for a polyline without length.
+    """
+    samples = next(m for least, m in SAMPLES if len(points) >= least)
+    even = resample(points, samples, closed)
+    floor = FLOOR * size_of(even, closed)
+    best: tuple[float, SplineCurve, float] | None = None
+    for count in COUNTS:
+        if count > samples // 2:
+            break
+        curve, left = fit_even(even, count, closed)
+        cost = 2 * samples * np.log(left**2 + floor**2) + 2 * count * np.log(2 * samples)
+        if best is None or cost < best[0]:
+            best = (float(cost), curve, left * float(np.sqrt(0.5 * count / (samples - count))))
+    assert best is not None
+    return best[1:]
+
+
+def _directions(spline: SplineCurve, u: F64) -> tuple[F64, F64]:
+    d = spline.at(u, 1)
+    speed = np.linalg.norm(d, axis=1)
+    s = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
+    return s / s[-1], np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
+
+
+def _unrolled(s: F64, theta: F64, length: float) -> F64:
+    """The curve of given directions; heights of the bends of a ring are measured on the ring without its mean turn."""
+    step = np.diff(s)[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])[:-1]
+    return length * np.vstack([np.zeros((1, 2)), np.cumsum(step, axis=0)])
+
+
+def _skew(p: F64) -> float:
+    chord = p[-1] - p[0]
+    size = float(np.linalg.norm(chord))
+    if size < 1e-6 * float(arc_length(p)[-1]):
+        return 0.0
+    e = chord / size
+    x, y = (p - p[0]) @ e, (p - p[0]) @ np.array([-e[1], e[0]])
+    weight = np.abs(0.5 * (y[1:] + y[:-1]) * np.diff(x))
+    total = float(weight.sum())
+    if total < 1e-12 * size**2:
+        return 0.0
+    return float((weight * 0.5 * (x[1:] + x[:-1])).sum() / total / size - 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Legs:
+    """Share of length, direction (rad) and place (mm) along a curve; ``height`` (mm) is that of noise."""
+
+    s: F64
+    theta: F64
+    p: F64
+    closed: bool
+    height: float
+
+    def strength(self, pivots: list[int], k: int) -> float:
+        """Of the leg from pivot k to the next."""
+        i, j = pivots[k], pivots[k + 1]
+        turn = float(self.theta[j] - self.theta[i])
+        # Sharp bends are low themselves; what shows is how far they stand out between the middles of their neighbours.
+        before = (pivots[k - 1] + i) // 2 if k > 0 else i
+        after = (j + pivots[k + 2]) // 2 if k + 2 < len(pivots) else j
+        height = max(self._height(i, j, i, j, turn), self._height(before, after, i, j, turn))
+        return min(abs(turn) / TURN, height / self.height)
+
+    def _height(self, a: int, b: int, i: int, j: int, turn: float) -> float:
+        """How far the curve from i to j bulges over the chord from a to b, mm."""
+        chord, rest = self.p[b] - self.p[a], self.p[i:j + 1] - self.p[a]
+        left = (chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / max(float(np.linalg.norm(chord)), 1e-12)
+        return max(0.0, float((left if turn < 0 else -left).max()))
+
+
+def _levels(legs: _Legs) -> tuple[BendLevel, ...]:
+    """The series of bends from all to none."""
+    rising = np.sign(np.diff(legs.theta))
+    rising[rising == 0] = 1
+    pivots = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(legs.theta) - 1]
+    out: list[BendLevel] = []
+    least = 0.0
+    while len(pivots) > 1:
+        strength = [legs.strength(pivots, k) for k in range(len(pivots) - 1)]
+        weakest = int(np.argmin(strength))
+        if strength[weakest] > least:
+            out.append(BendLevel(least, strength[weakest], _bends(legs.s, legs.theta, pivots)))
+            least = strength[weakest]
+        pivots = _without(pivots, weakest, legs.closed)
+    return (*out, BendLevel(least, np.inf, ()))
+
+
+def _without(pivots: list[int], leg: int, closed: bool) -> list[int]:
+    last = len(pivots) - 2
+    if closed and last < 2:
+        return []
+    if 0 < leg < last:
+        return pivots[:leg] + pivots[leg + 2:]
+    if closed:
+        return pivots[:1] + pivots[3:] if leg == 0 else pivots[:-3] + pivots[-1:]
+    return pivots[1:] if leg == 0 else pivots[:-1]
+
+
+def _bends(s: F64, theta: F64, pivots: list[int]) -> tuple[Bend, ...]:
+    out = []
+    for i, j in zip(pivots[:-1], pivots[1:], strict=True):
+        turn = float(theta[j] - theta[i])
+        way = Way.UP if turn < 0 else Way.DOWN
+        out.append(Bend(way, abs(turn), float(s[i]), float(s[j]), _roundness(s[i:j + 1], theta[i:j + 1])))
+    return tuple(out)
+
+
+def _roundness(s: F64, theta: F64) -> float:
+    done = np.maximum.accumulate((theta - theta[0]) / (theta[-1] - theta[0]))
+    inner, outer = (np.diff(np.interp(share, done, s))[0] for share in (INNER, OUTER))
+    return float(inner / max(outer, 1e-12) / ARC_SHARE)
+
+
+__all__ = ["Bend", "BendLevel", "BendMeasures", "Way", "measure_bends", "size_of", "smooth"]
