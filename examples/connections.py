@@ -21,7 +21,9 @@ from examples.walls import WallSpec
 KINDS = ("round_bar", "bar", "web", "arch", "bow")
 """round bar; square bar; flat web; strut bent in the vertical plane; strut bent in plan."""
 
-TRUTH_KIND = {"round_bar": "bar", "bar": "bar", "web": "web", "arch": "bent strut", "bow": "bent strut"}
+TRUTH_KIND = {
+    "round_bar": "bar", "bar": "bar", "web": "web", "arch": "bent strut", "bow": "bent strut", "fork": "fork",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ class ConnectionSpec:
         out = []
         for wall, point in zip(self.walls, (self.start, self.end), strict=True):
             z = min(max(float(point[2]), wall.z_floor), wall.z_top)
-            cut = line.intersection(wall.section(z).exterior)
+            cut = line.intersection(wall.section(z).boundary)
             points = list(getattr(cut, "geoms", [cut]))
             out += [line.project(Point(p.coords[0])) / line.length for p in points if not p.is_empty]
         if not out:
@@ -133,6 +135,15 @@ class ConnectionSpec:
         """Share of the span with at least 0.5 mm of void between underside and floor."""
         s = np.linspace(*self.span, 201)
         return float((self.axis_height(s) - 0.5 * self.depth > self.walls[0].z_floor + 0.5).mean())
+
+    @property
+    def point(self) -> F64:
+        """A point inside, in the middle of the span, (3,) float64, mm."""
+        s = np.array([0.5 * (self.span[0] + self.span[1])])
+        xy = self.start[:2] + (self.end - self.start)[:2] * s[0]
+        if self.kind == "bow":
+            xy = 0.5 * (self.start + self.end)[:2] + self.bend * self.lateral
+        return np.array([*xy, self.axis_height(s)[0]])
 
     @cached_property
     def floor_contact(self) -> bool:

@@ -18,9 +18,12 @@ import numpy as np
 
 from examples import linear
 from examples.connections import TRUTH_KIND, ConnectionSpec
+from examples.freewall import FreeWall
 from examples.gaps import Gap
 from examples.impeller import impeller
+from examples.joins import ForkSpec
 from examples.layout import Layout, LayoutError, check
+from examples.mixed import mixed, mixed_linear, mixed_radial
 from examples.setups import suggest_setup
 from examples.walls import WallSpec
 
@@ -32,8 +35,16 @@ RECIPES: dict[str, Callable[..., Layout]] = {
     "three_walls": linear.three_walls,
     "wavy": linear.wavy,
     "impeller": impeller,
+    "mixed": mixed,
+    "mixed_linear": mixed_linear,
+    "mixed_radial": mixed_radial,
 }
 """Name of each recipe and the function that draws it from a random generator."""
+
+NUMBERS = {"demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4, "three_walls": 5, "wavy": 6, "mixed": 7,
+           "mixed_linear": 8, "mixed_radial": 9}
+"""What each recipe adds to its seeds; a number stays with its recipe, so that new recipes change no part."""
+DRAWS, BUILDS = 60, 6
 
 STEP_TIME = "1970-01-01T00:00:00"
 
@@ -78,9 +89,16 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     overrides : passed to the recipe; the random one takes walls, connections and gap
     Raises LayoutError where 60 draws gave no layout that keeps the rules, or the union is no single valid solid.
     """
-    layout = draw_layout(seed, recipe, **overrides)
-    layout = replace(layout, fillet=fillet)
-    shape = build_solid(layout)
+    rng = _generator(seed, recipe)
+    for attempt in range(BUILDS):
+        layout = _draw(rng, seed, recipe, overrides)
+        layout = replace(layout, fillet=fillet) if fillet else layout
+        try:
+            shape = build_solid(layout)
+            break
+        except LayoutError:
+            if attempt == BUILDS - 1:
+                raise
     name = f"{recipe}-{seed}"
     truth = truth_of(layout, name)
     return FamilyPart(name, shape, truth, suggest_setup(layout, truth), layout)
@@ -88,9 +106,18 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
 
 def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
     """The layout of a part without building it; draws again, up to 60 times, until the rules hold."""
-    rng = np.random.default_rng([seed, sorted(RECIPES).index(recipe)])
+    return _draw(_generator(seed, recipe), seed, recipe, overrides)
+
+
+def _generator(seed: int, recipe: str) -> np.random.Generator:
+    if recipe not in RECIPES:
+        raise LayoutError(f"there is no recipe {recipe!r}; there are {', '.join(sorted(RECIPES))}")
+    return np.random.default_rng([seed, NUMBERS[recipe]])
+
+
+def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> Layout:
     reason: LayoutError | None = None
-    for _ in range(60):
+    for _ in range(DRAWS):
         try:
             layout = RECIPES[recipe](rng, **overrides)
             check(layout)
@@ -104,13 +131,26 @@ def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
 def build_solid(layout: Layout) -> Any:
     """Unite base, walls and connections into one cadquery Solid; raises LayoutError unless it is valid."""
     tools = [w.solid() for w in layout.walls] + [c.solid() for c in layout.connections]
-    if not all(t.isValid() and t.Volume() > 0 for t in tools):
+    if not all(t.isValid() and _volume(t) > 0 for t in tools):
         raise LayoutError(f"a wall or connection of {layout.name} is no valid solid")
-    solids = layout.base.solid().fuse(*tools).clean().Solids()
-    if len(solids) != 1 or not solids[0].isValid() or solids[0].Volume() <= 0:
+    union = layout.base.solid().fuse(*tools)
+    if layout.windows:
+        union = union.cut(*(w.solid() for w in layout.windows))
+    solids = union.clean().Solids()
+    if len(solids) != 1 or not solids[0].isValid() or _volume(solids[0]) <= 0:
         raise LayoutError(f"the union of {layout.name} is no single valid solid")
     solid = solids[0]
     return _filleted(solid, layout) if layout.fillet > 0 else solid
+
+
+def _volume(solid: Any) -> float:
+    """Volume, mm³; adaptive, because plain quadrature may be off by its sign on faces with a hundred knots."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    props = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid.wrapped, props, 1e-3, True, False)
+    return float(props.Mass())
 
 
 def _filleted(solid: Any, layout: Layout) -> Any:
@@ -119,8 +159,10 @@ def _filleted(solid: Any, layout: Layout) -> Any:
     feet = [e for e in solid.Edges() if all(abs(c - z) < 1e-6 for c in (e.BoundingBox().zmin, e.BoundingBox().zmax))]
     base = layout.base.solid()
     rims = [e for e in feet if not _on_rim(e, base)]
-    filleted = solid.fillet(layout.fillet, rims)
-    solids = filleted.Solids()
+    try:
+        solids = solid.fillet(layout.fillet, rims).Solids()
+    except Exception as error:  # the kernel's own classes, and what it raises through them
+        raise LayoutError(f"fillets of {layout.fillet} mm do not fit: {error}") from None
     if len(solids) != 1 or not solids[0].isValid():
         raise LayoutError(f"fillets of {layout.fillet} mm do not fit")
     return solids[0]
@@ -140,12 +182,14 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
     side faces the other wall, not a glimpse past or over a wall between) and the seat; all lengths mm.
     """
     gaps = layout.gaps()
+    free = any(isinstance(w, FreeWall) for w in layout.walls)
     return {
         "name": name,
         "recipe": layout.name,
         "unit": "mm",
         "seat_z": 0.0,
         "fillet": layout.fillet,
+        **({"features": features_of(layout, gaps)} if free else {}),
         "walls": [_wall_truth(k, w) for k, w in enumerate(layout.walls)],
         "connections": [_connection_truth(k, c) for k, c in enumerate(layout.connections)],
         "channels": [
@@ -156,6 +200,30 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
     }
 
 
+def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
+    """What a part holds, as sorted words, so that a failure can be laid to a cause.
+
+    layout : with FreeWall walls
+    gaps   : its true channels
+    """
+    words = set(layout.features) | {f"connection_{c.kind}" for c in layout.connections}
+    for wall in layout.walls:
+        if isinstance(wall, FreeWall):
+            words |= wall.features
+    for c in layout.connections:
+        words |= {"floor_contact"} if c.floor_contact else set()
+        words |= {"same_wall"} if len(set(c.indices)) == 1 else set()
+        words |= {"fork_of_three_walls"} if len(set(c.indices)) > 2 else set()
+    if any(a.footprint().intersects(b.footprint()) for k, a in enumerate(layout.connections) for b in layout.connections[:k]):
+        words.add("levels")
+    if any(g.gap_min < 1.0 and _primary(layout, g) for g in gaps):
+        words.add("narrow")
+    words |= {"window"} if layout.windows else set()
+    words |= {"foot_fillet"} if layout.fillet > 0 else set()
+    words |= {"connection_fillet"} if layout.rounded else set()
+    return sorted(words)
+
+
 def _primary(layout: Layout, gap: Gap) -> bool:
     smaller = min(layout.walls[k].length * layout.walls[k].height for k in gap.walls)
     return bool(gap.area >= 2 * 0.25 * smaller)
@@ -163,6 +231,11 @@ def _primary(layout: Layout, gap: Gap) -> bool:
 
 def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:
     middle = np.array([0.5])
+    shape: dict[str, Any] = {}
+    if isinstance(wall, FreeWall):
+        p = wall.profile
+        shape = {"drawn": p.type, "profiles": list(p.labels), "closed": p.closed, "strips": wall.strips, "merged": wall.merged,
+                 "control_points": [[round(float(c), 6) for c in q] for q in p.control]}
     return {
         "index": index,
         "kind": wall.kind,
@@ -173,14 +246,11 @@ def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:
         "lean": list(wall.lean),
         "z": [wall.z_floor, wall.z_top],
         "side_points": [[round(float(c), 4) for c in wall.side_point(s, middle, middle)[0]] for s in (1, -1)],
+        **shape,
     }
 
 
-def _connection_truth(index: int, c: ConnectionSpec) -> dict[str, Any]:
-    s = np.array([0.5 * (c.span[0] + c.span[1])])
-    xy = c.start[:2] + (c.end - c.start)[:2] * s[0]
-    if c.kind == "bow":
-        xy = 0.5 * (c.start + c.end)[:2] + c.bend * c.lateral
+def _connection_truth(index: int, c: ConnectionSpec | ForkSpec) -> dict[str, Any]:
     return {
         "index": index,
         "walls": list(c.indices),
@@ -190,7 +260,7 @@ def _connection_truth(index: int, c: ConnectionSpec) -> dict[str, Any]:
         "width": round(c.width, 4),
         "floor_contact": c.floor_contact,
         "void_share": round(c.void_share, 3),
-        "point": [round(float(v), 4) for v in (*xy, c.axis_height(s)[0])],
+        "point": [round(float(v), 4) for v in c.point],
     }
 
 

@@ -4,6 +4,8 @@ From a grid of points on each side of each wall a ray leaves along the normal; t
 first other wall it meets inside that wall's sides decides the channel, and the
 shortest such ray is the gap. Plan sections give the start, Newton on the ruled
 surface the exact foot. Connections are left out, as in the definition of the gap.
+A free wall may be closed and may face itself; its rays count where they meet the
+other side within 72 degrees of square (``facing_dot``).
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from examples.splines import F64
 from examples.walls import LEFT, RIGHT, WallSpec
@@ -22,6 +25,12 @@ Blocked = Callable[[F64, F64], np.ndarray]
 
 ZOOMS = 3
 """Times the grid is drawn again, eight times finer, round the shortest ray."""
+FARTHEST = 40.0
+"""mm; rays from and to free walls are not followed beyond."""
+STARTS = 6
+"""Places along a free wall where the search for the shortest ray begins."""
+SKIN = 1e-3
+"""mm; a ray does not meet its own wall nearer than that."""
 
 
 @dataclass(frozen=True)
@@ -42,19 +51,22 @@ class Gap:
     area: float
 
 
-def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 161, n_v: int = 5) -> list[Gap]:
+def channels(
+    walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 161, n_v: int = 5, foot: float = 0.0
+) -> list[Gap]:
     """All channels between the walls of a layout.
 
     walls    : the walls
     blocked  : tells which rays end in material that is no wall (a hub)
     n_u, n_v : samples along and up each side, for the areas and as the start of the search for the shortest ray;
                the gap is refined to 1/512 of that pitch, also where it ends at a border or a hub
+    foot     : mm above the floor where sides begin, the height of a fillet
     Returns Gap per pair with at least 1 % of a side facing, in order of the pair.
     """
     found: dict[tuple[int, int], Gap] = {}
     for i in range(len(walls)):
         for side in (LEFT, RIGHT):
-            for gap in _facing(walls, i, side, blocked, n_u, n_v):
+            for gap in _facing(walls, i, side, blocked, n_u, n_v, foot):
                 old = found.get(gap.walls)
                 if old is None or gap.gap_min < old.gap_min:
                     area = gap.area + (old.area if old else 0.0)
@@ -65,47 +77,80 @@ def channels(walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int 
     return [found[k] for k in sorted(found) if found[k].area >= floor[k]]
 
 
-def _facing(walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n_u: int, n_v: int) -> list[Gap]:
-    grid = np.meshgrid(np.linspace(0, 1, n_u), np.linspace(0, 1, n_v), indexing="ij")
+def _facing(
+    walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n_u: int, n_v: int, foot: float
+) -> list[Gap]:
+    low = foot / walls[i].height
+    grid = np.meshgrid(np.linspace(0, 1, n_u), np.linspace(low, 1, n_v), indexing="ij")
     u, v = (g.ravel() for g in grid)
     origin, first, reach = _cast(walls, i, side, u, v, blocked)
     du, dv = walls[i].side_derivatives(side, u, v)
-    weight = np.linalg.norm(np.cross(du, dv), axis=1) / ((n_u - 1) * (n_v - 1))
+    weight = (1.0 - low) * np.linalg.norm(np.cross(du, dv), axis=1) / ((n_u - 1) * (n_v - 1))
     out = []
     for j in np.unique(first[np.isfinite(reach)]):
         mine = np.flatnonzero(np.isfinite(reach) & (first == j))
-        best = mine[np.argmin(reach[mine])]
-        gap, at, border = float(reach[best]), origin[best], _on_border(u[best], v[best])
-        pitch = np.array([1.0 / (n_u - 1), 1.0 / (n_v - 1)])
-        centre = np.array([u[best], v[best]])
-        for _ in range(ZOOMS):
-            fine = [np.unique(np.clip(c + np.linspace(-h, h, 17), 0, 1)) for c, h in zip(centre, pitch, strict=True)]
-            fu, fv = (g.ravel() for g in np.meshgrid(*fine, indexing="ij"))
-            points, seen, far = _cast(walls, i, side, fu, fv, blocked)
-            far = np.where(seen == j, far, np.inf)
-            k = int(np.argmin(far))
-            if far[k] <= gap:
-                gap, at, border = float(far[k]), points[k], _on_border(fu[k], fv[k])
-                centre = np.array([fu[k], fv[k]])
-            pitch = pitch / 8.0
+        gap, at, border = np.inf, origin[0], False
+        for best in _starts(walls[i], reach, mine, n_v):
+            found = _zoom(walls, i, side, blocked, int(j), (u[best], v[best]), (n_u, n_v), low, float(reach[best]))
+            if found[0] < gap:
+                gap, at, border = found
         x, y, z = (float(c) for c in at)
         pair = (min(i, int(j)), max(i, int(j)))
         out.append(Gap(pair, gap, (x, y, z), border, float(weight[mine].sum())))
     return out
 
 
-def _on_border(u: float, v: float) -> bool:
-    return bool(min(u, v) <= 0.0 or max(u, v) >= 1.0)
+def _starts(wall: WallSpec, reach: F64, mine: np.ndarray, n_v: int) -> list[int]:
+    """Samples to search round: the shortest ray, on a free wall also other short ones elsewhere along it."""
+    order = mine[np.argsort(reach[mine], kind="stable")]
+    if not wall.sees_itself:
+        return [int(order[0])]
+    chosen: list[int] = []
+    for k in order[reach[order] <= 1.15 * reach[order[0]] + 0.1].tolist():
+        if len(chosen) < STARTS and all(abs(k // n_v - c // n_v) > 3 for c in chosen):
+            chosen.append(k)
+    return chosen
+
+
+def _zoom(
+    walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, start: tuple[float, float],
+    counts: tuple[int, int], low: float, gap: float,
+) -> tuple[float, F64, bool]:
+    """Shortest ray from a side of wall i to wall j round a sample: its length, its start, whether on the border."""
+    centre, pitch = np.array(start), np.array([1.0, 1.0]) / (np.array(counts) - 1)
+    at = walls[i].side_point(side, centre[:1], centre[1:])[0]
+    border = _on_border(walls[i], start[0], start[1], low)
+    for _ in range(ZOOMS):
+        fine = [np.unique(np.clip(c + np.linspace(-h, h, 17), b, 1))
+                for c, h, b in zip(centre, pitch, (0.0, low), strict=True)]
+        fu, fv = (g.ravel() for g in np.meshgrid(*fine, indexing="ij"))
+        points, seen, far = _cast(walls, i, side, fu, fv, blocked, 1.2 * gap + 1.0)
+        far = np.where(seen == j, far, np.inf)
+        k = int(np.argmin(far))
+        if far[k] <= gap:
+            gap, at, border = float(far[k]), points[k], _on_border(walls[i], fu[k], fv[k], low)
+            centre = np.array([fu[k], fv[k]])
+        pitch = pitch / 8.0
+    return gap, at, border
+
+
+def _on_border(wall: WallSpec, u: float, v: float, low: float) -> bool:
+    return bool(v <= low or v >= 1.0 or (not wall.closed and (u <= 0.0 or u >= 1.0)))
 
 
 def _cast(
-    walls: list[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None
+    walls: list[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None, farthest: float = FARTHEST
 ) -> tuple[F64, np.ndarray, F64]:
-    """Rays from points of one side: where they start, which wall they meet first, how far that is (inf: none)."""
+    """Rays from points of one side: where they start, which wall they meet first, how far that is (inf: none).
+
+    farthest : mm; free walls beyond are not looked at
+    """
     origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
     distance = np.full((len(walls), len(u)), np.inf)
     for j, other in enumerate(walls):
-        if j != i:
+        if j != i or other.sees_itself:
+            if other.sees_itself and _apart(origin, other) > farthest:
+                continue
             for facing in (LEFT, RIGHT):
                 distance[j] = np.minimum(distance[j], _ray_to_side(origin, normal, other, facing))
     first = np.argmin(distance, axis=0)
@@ -116,15 +161,23 @@ def _cast(
     return origin, first, reach
 
 
+def _apart(origin: F64, wall: WallSpec) -> float:
+    """Distance in plan between the boxes of points and of a wall, mm."""
+    x0, y0, x1, y1 = wall.bounds
+    low, high = origin[:, :2].min(axis=0), origin[:, :2].max(axis=0)
+    return float(np.hypot(*np.maximum(0.0, np.maximum([x0, y0] - high, low - [x1, y1]))))
+
+
 def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
     """Distance along rays to one side of a wall; inf where the ray misses it or comes from behind."""
-    grid = np.linspace(0.0, 1.0, 81)
+    grid = np.linspace(0.0, 1.0, wall.segments + 1)
     s, u = np.full(len(origin), np.inf), np.zeros(len(origin))
     levels = np.round(origin[:, 2], 6)
     for z in np.unique(levels):
         rows = np.flatnonzero(levels == z)
         v = np.full(len(grid), np.clip((z - wall.z_floor) / wall.height, 0.0, 1.0))
-        s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], wall.side_point(side, grid, v)[:, :2])
+        s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], wall.side_point(side, grid, v)[:, :2],
+                                   side if wall.sees_itself else 0)
     rows = np.flatnonzero(np.isfinite(s))
     if not len(rows):
         return s
@@ -133,8 +186,13 @@ def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
     return out
 
 
-def _plan_hit(p: F64, d: F64, line: F64) -> tuple[F64, F64]:
-    """First crossing of plan rays with a polyline: distances and polyline parameter (inf, 0 where none)."""
+def _plan_hit(p: F64, d: F64, line: F64, side: int) -> tuple[F64, F64]:
+    """First crossing of plan rays with a polyline: distances and polyline parameter (inf, 0 where none).
+
+    side : of the line that counts (LEFT or RIGHT), 0 for both
+    """
+    if side:
+        return _first_crossing(np.ascontiguousarray(p), np.ascontiguousarray(d), np.ascontiguousarray(line), side, SKIN)
     a, e = line[:-1], np.diff(line, axis=0)
     cross = d[:, None, 0] * e[None, :, 1] - d[:, None, 1] * e[None, :, 0]
     w = a[None] - p[:, None]
@@ -151,9 +209,28 @@ def _plan_hit(p: F64, d: F64, line: F64) -> tuple[F64, F64]:
     return s[rows, k], np.where(np.isfinite(s[rows, k]), (k + np.nan_to_num(t[rows, k])) / len(e), 0.0)
 
 
+@njit(cache=True, nogil=True)
+def _first_crossing(p: F64, d: F64, line: F64, side: int, skin: float) -> tuple[F64, F64]:
+    n, m = len(p), len(line) - 1
+    far, at = np.full(n, np.inf), np.zeros(n)
+    for i in range(n):
+        for k in range(m):
+            ex, ey = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
+            cross = d[i, 0] * ey - d[i, 1] * ex
+            if side * cross <= 0.0:
+                continue
+            wx, wy = line[k, 0] - p[i, 0], line[k, 1] - p[i, 1]
+            s, t = (wx * ey - wy * ex) / cross, (wx * d[i, 1] - wy * d[i, 0]) / cross
+            low, high = -0.5 if k == 0 else -1e-9, 1.5 if k == m - 1 else 1.0 + 1e-9
+            if skin < s < far[i] and low <= t <= high:
+                far[i], at[i] = s, (k + t) / m
+    return far, at
+
+
 def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64) -> F64:
     v = (origin[:, 2] - wall.z_floor) / wall.height
     for _ in range(12):
+        u = np.mod(u, 1.0) if wall.closed else u
         uc = np.clip(u, 0.0, 1.0)
         du, dv = wall.side_derivatives(side, uc, v)
         r = wall.side_point(side, uc, v) + du * (u - uc)[:, None] - origin - normal * s[:, None]
@@ -161,5 +238,5 @@ def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64)
         s, u, v = s + step[:, 0], u + step[:, 1], v + step[:, 2]
     missed = np.linalg.norm(r, axis=1) > 1e-7
     outside = (u < -1e-9) | (u > 1 + 1e-9) | (v < -1e-9) | (v > 1 + 1e-9)
-    facing = (wall.side_normal(side, np.clip(u, 0, 1), v) * normal).sum(axis=1) < 0
-    return np.where(missed | outside | ~facing | (s <= 0), np.inf, s)
+    facing = (wall.side_normal(side, np.clip(u, 0, 1), v) * normal).sum(axis=1) < wall.facing_dot
+    return np.where(missed | outside | ~facing | (s <= (SKIN if wall.sees_itself else 0)), np.inf, s)

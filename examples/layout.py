@@ -84,6 +84,58 @@ class HubDisc:
 
 
 @dataclass(frozen=True, eq=False)
+class WindowSpec:
+    """An opening straight through a wall.
+
+    index, wall : the wall and its place in the layout
+    u           : parameter of its middle along the wall
+    width       : mm along the wall
+    z           : mm, from and to
+    """
+
+    index: int
+    wall: WallSpec
+    u: float
+    width: float
+    z: tuple[float, float]
+
+    def footprint(self) -> Polygon:
+        """Plan outline of what is cut away, mm."""
+        low, high = (self.wall.axis_point(self.u, z) for z in self.z)
+        n = self.wall.plan_normal(np.array([self.u]))[0]
+        t = np.array([n[1], -n[0]])
+        reach = 0.5 * max(self.wall.thickness) + 0.5 + 0.5 * abs(float((high - low) @ n)) + self.width**2 / 40.0
+        middle = 0.5 * (low + high)
+        corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        return Polygon([middle + 0.5 * self.width * a * t + reach * b * n for a, b in corners])
+
+    def fits(self, layout: Layout) -> bool:
+        """Whether the opening passes the wall cleanly and leaves all else, and every least gap, alone."""
+        outline = self.footprint()
+        around = outline.buffer(1.0)
+        for z in self.z:
+            cut = self.wall.section(z).intersection(outline)
+            rest = self.wall.section(z).difference(outline)
+            pieces = 1 if self.wall.closed else 2
+            if cut.geom_type != "Polygon" or len(getattr(rest, "geoms", [rest])) != pieces:
+                return False
+        others = [w for k, w in enumerate(layout.walls) if k != self.index]
+        if any(w.section(z).intersects(outline.buffer(0.2)) for w in others for z in self.z):
+            return False
+        if any(c.footprint().intersects(around) for c in layout.connections):
+            return False
+        return not any(around.buffer(1.5).contains(Point(g.at[:2])) for g in layout.gaps(n_u=81, n_v=3) if self.index in g.walls)
+
+    def solid(self) -> Any:
+        """What is cut away, as a cadquery Solid."""
+        import cadquery as cq
+
+        corners = list(self.footprint().exterior.coords)[:-1]
+        wire = cq.Wire.makePolygon([cq.Vector(x, y, self.z[0]) for x, y in corners], close=True)
+        return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, self.z[1] - self.z[0]))
+
+
+@dataclass(frozen=True, eq=False)
 class Layout:
     """Everything a recipe decides.
 
@@ -92,6 +144,11 @@ class Layout:
     walls       : WallSpec in order, the indices of the truth
     connections : ConnectionSpec in order
     fillet      : mm, radius of the fillets between walls and floor, 0 for none
+    windows     : openings through walls
+    rounded     : mm, radius of the fillets where connections meet walls, 0 for none
+    least       : mm, no two walls stand nearer than this in plan
+    meets       : pairs of walls that are meant to meet (T, cross)
+    features    : words for what the recipe put in on purpose
     """
 
     name: str
@@ -99,9 +156,16 @@ class Layout:
     walls: list[WallSpec]
     connections: list[ConnectionSpec] = field(default_factory=list)
     fillet: float = 0.0
+    windows: list[WindowSpec] = field(default_factory=list)
+    rounded: float = 0.0
+    least: float = 0.5
+    meets: tuple[tuple[int, int], ...] = ()
+    features: tuple[str, ...] = ()
 
     def gaps(self, **sampling: int) -> list[Gap]:
         """True channels between the walls, see ``examples.gaps.channels``."""
+        if any(w.sees_itself for w in self.walls):
+            return channels(self.walls, self.base.blocked, **{"n_u": 241, "n_v": 5, **sampling}, foot=self.fillet)
         return channels(self.walls, self.base.blocked, **sampling)
 
 
@@ -183,9 +247,10 @@ def check(layout: Layout) -> None:
             raise LayoutError("a wall could face itself")
         if max(wall.thickness) > 0.45 * wall.height:
             raise LayoutError("a wall is a block")
+    pairs = {frozenset(p) for p in layout.meets}
     for i, a in enumerate(outlines):
-        for b in outlines[:i]:
-            if any(p.distance(q) < 0.5 for p, q in zip(a, b, strict=True)):
+        for j, b in enumerate(outlines[:i]):
+            if frozenset((i, j)) not in pairs and any(p.distance(q) < layout.least for p, q in zip(a, b, strict=True)):
                 raise LayoutError("two walls meet")
 
 

@@ -25,10 +25,22 @@ def interpolate(parameters: F64, points: F64) -> BSpline:
     return make_interp_spline(parameters, points, k=min(3, len(parameters) - 1))
 
 
-def to_edge(spline: BSpline) -> Any:
+def interpolate_closed(parameters: F64, points: F64) -> BSpline:
+    """Closed cubic B-spline through points, with the clamped knots that the CAD kernel wants.
+
+    parameters : (n,) float64, increasing
+    points     : (n, d) float64, mm, the last equal to the first
+    Returns scipy BSpline, twice differentiable across the seam.
+    """
+    slope = make_interp_spline(parameters, points, k=3, bc_type="periodic").derivative()(parameters[0])
+    return make_interp_spline(parameters, points, k=3, bc_type=([(1, slope)], [(1, slope)]))
+
+
+def to_edge(spline: BSpline, between: tuple[float, float] | None = None) -> Any:
     """The spline as a cadquery Edge with identical poles and knots.
 
-    spline : scipy BSpline with (m, 3) coefficients in mm and a clamped knot vector
+    spline  : scipy BSpline with (m, 3) coefficients in mm and a clamped knot vector
+    between : parameters the edge runs between, all of the curve when None
     Returns cadquery.Edge from parameter t[k] to t[-k-1].
     """
     import cadquery as cq
@@ -48,4 +60,5 @@ def to_edge(spline: BSpline) -> Any:
         values.SetValue(i, float(knot))
         multiplicities.SetValue(i, int(count))
     curve = Geom_BSplineCurve(poles, values, multiplicities, int(spline.k))
-    return cq.Edge(BRepBuilderAPI_MakeEdge(curve).Edge())
+    maker = BRepBuilderAPI_MakeEdge(curve, *between) if between else BRepBuilderAPI_MakeEdge(curve)
+    return cq.Edge(maker.Edge())

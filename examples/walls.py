@@ -43,6 +43,15 @@ class WallSpec:
     thickness: tuple[float, float]
     lean: tuple[float, float] = (0.0, 0.0)
 
+    closed = False
+    """Whether the wall is a ring; the left side is then the inner one."""
+    facing_dot = 0.0
+    """Two sides face each other where the product of their normals is below this."""
+    segments = 80
+    """Chords of the plan section that rays start from."""
+    sees_itself = False
+    """Whether a side may face another stretch of the same wall."""
+
     @property
     def z_top(self) -> float:
         """Height of the top face, mm."""
@@ -65,6 +74,12 @@ class WallSpec:
         """Length of the centre line on the floor, mm (polyline of 400 chords)."""
         p = self.centre_line(np.linspace(0.0, 1.0, 401))
         return float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Box of floor and top in plan: x0, y0, x1, y1, mm."""
+        boxes = np.array([self.section(z).bounds for z in (self.z_floor, self.z_top)])
+        return (*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0))
 
     def plan_normal(self, u: F64) -> F64:
         """Unit plan normals to the left of the centre line.
