@@ -36,6 +36,8 @@ STEPS = 1200
 TURN, HEIGHT, ERRORS = float(np.radians(20.0)), 0.002, 6.0
 # Distances below this share of the size of a curve are taken for zero when the number of control points is chosen.
 FLOOR = 2e-4
+# Legs that turn by less (rad) are not looked at one by one.
+RIPPLE = float(np.radians(0.2))
 # The middle half of the turn of a bend against what lies between a twentieth from either end of it.
 INNER, OUTER = (0.25, 0.75), (0.05, 0.95)
 ARC_SHARE = 0.5 / 0.9
@@ -225,9 +227,7 @@ class _Legs:
 
 def _levels(legs: _Legs) -> tuple[BendLevel, ...]:
     """The series of bends from all to none."""
-    rising = np.sign(np.diff(legs.theta))
-    rising[rising == 0] = 1
-    pivots = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(legs.theta) - 1]
+    pivots = _pivots(legs.theta.tolist(), RIPPLE)
     out: list[BendLevel] = []
     least = 0.0
     while len(pivots) > 1:
@@ -238,6 +238,21 @@ def _levels(legs: _Legs) -> tuple[BendLevel, ...]:
             least = strength[weakest]
         pivots = _without(pivots, weakest, legs.closed)
     return (*out, BendLevel(least, np.inf, ()))
+
+
+def _pivots(theta: list[float], ripple: float) -> list[int]:
+    """Places where the direction turns back by more than ``ripple`` (rad), and both ends."""
+    out, low, high, way, last = [0], 0, 0, 0, len(theta) - 1
+    for k, v in enumerate(theta):
+        low, high = (k if v < theta[low] else low), (k if v > theta[high] else high)
+        if way >= 0 and v < theta[high] - ripple:
+            out.append(high)
+            way, low = -1, k
+        elif way <= 0 and v > theta[low] + ripple:
+            out.append(low)
+            way, high = 1, k
+    out += [{-1: low, 0: 0, 1: high}[way], last]
+    return [k for i, k in enumerate(out) if i == 0 or k > out[i - 1]]
 
 
 def _without(pivots: list[int], leg: int, closed: bool) -> list[int]:

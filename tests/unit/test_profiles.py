@@ -8,7 +8,7 @@ import pytest
 from geometry.bspline import SplineCurve
 from geometry.errors import GeometryError
 from tests.profile_curves import DRAW, draw
-from zones.bends import Way, measure_bends
+from zones.bends import Way, _pivots, measure_bends
 from zones.profiles import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
 
 # Limits were chosen on seeds below 1000; scores are taken on these.
@@ -147,3 +147,17 @@ def test_bends_of_a_ring_start_behind_its_least_curvature() -> None:
 def test_no_curve_no_type(points) -> None:
     with pytest.raises(GeometryError):
         classify(points)
+
+
+def test_turning_points_leave_no_ripple_and_lose_no_turn() -> None:
+    """Between two of them the direction never turns back by more than the ripple; all but the outer legs exceed it."""
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        theta = rng.normal(size=int(rng.integers(2, 60))).cumsum()
+        pivots = _pivots(theta.tolist(), 0.5)
+        assert pivots[0] == 0 and pivots[-1] == len(theta) - 1
+        legs = np.diff(theta[pivots])
+        assert (legs[1:] * legs[:-1] <= 0).all() and (np.abs(legs[1:-1]) > 0.5).all()
+        for i, j in zip(pivots[:-1], pivots[1:], strict=True):
+            way = theta[i:j + 1] * (1 if theta[j] >= theta[i] else -1)
+            assert (np.maximum.accumulate(way) - way).max() <= 0.5
