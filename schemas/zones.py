@@ -9,6 +9,7 @@ from pydantic import Field
 from schemas.base import ReportModel
 
 Share = Annotated[float, Field(ge=0, le=1)]
+Level = Literal["simple", "medium", "high"]
 
 
 class PartFacts(ReportModel):
@@ -52,22 +53,78 @@ class Rejection(ReportModel):
     limit: Any = None
 
 
+class SideProfile(ReportModel):
+    """Profile of one side of a wall in plan."""
+
+    wall: Annotated[str, Field(examples=["W1"])]
+    profile: Annotated[str | None, Field(description="C1 to C10; null: straight.")] = None
+    level: Level
+    margin: Annotated[float, Field(ge=0, le=1, description="Least relative change of a measure that would change the "
+                                                           "type.")]
+
+
+class ApproachCone(ReportModel):
+    """A circular cone of tool axes by each of which the tool gets to all of a zone."""
+
+    axis: Annotated[list[float], Field(min_length=3, max_length=3, description="Tip to spindle, setup frame.")]
+    half_angle_deg: float
+    resolution_deg: Annotated[float, Field(description="How far the half angle may be off.")]
+
+
+class Patch(ReportModel):
+    """What a zone holds of a face, as a trimmed face."""
+
+    face: Annotated[str, Field(examples=["F12"])]
+    area_mm2: float
+    whole: Annotated[bool, Field(description="The zone holds all of the face.")]
+    loops: Annotated[int, Field(description="Borders: the outer one and the holes.")]
+
+
 class ZoneFacts(ReportModel):
     """A machinable zone with its tool, axis and depth; the figures of passes and proof stand only in a report."""
 
     id: Annotated[str, Field(examples=["Z3"])]
-    kind: Annotated[Literal["SCZ", "SCZI"] | None, Field(description="Single-channel zone, without or with a "
-                                                                    "connection.")] = None
-    profile: str | None = None
-    level: int | None = None
-    open: bool | None = None
+    kind: Annotated[Literal["SCZ", "SCZI"] | None, Field(description="Split computable zone; SCZI: on, under or over "
+                                                                    "a connection.")] = None
+    profile: Annotated[str | None, Field(description="Profile type C1 to C10 of the most complex side; null: straight, "
+                                                     "or no wall.")] = None
+    level: Annotated[Level | None, Field(description="Complexity of the profile; null: no wall.")] = None
+    profiles: Annotated[list[SideProfile], Field(description="The sides of walls the zone lies on.")] = []
+    open: Annotated[bool | None, Field(description="Passes can leave the zone at its deepest.")] = None
+    region: Annotated[str | None, Field(examples=["H1", "H1 over C2", "W1", "C2", "top", "floor", "free"])] = None
+    merged: Annotated[list[str], Field(description="Cells over or under connections that were joined to it.")] = []
+    form: Literal["level", "shallow", "steep"] | None = None
     faces: list[Any] = []
+    patches: Annotated[list[Patch], Field(description="The same as trimmed faces.")] = []
     access: str | None = None
     tool: str | None = None
-    axis: list[float] | None = None
-    depth_mm: Annotated[list[float] | None, Field(description="Top and bottom, mm.")] = None
+    axis: Annotated[list[float] | None, Field(description="Tool axis in the setup frame.")] = None
+    approach: ApproachCone | None = None
+    depth_mm: Annotated[list[float] | None, Field(description="Top and bottom along the axis, mm.")] = None
+    cutting_plane_mm: Annotated[float | None, Field(description="Height along the axis below which the tool is not "
+                                                                "asked.")] = None
+    area_mm2: float | None = None
     strategy: str | None = None
     rejected: list[Rejection] = []
+
+
+class ComputableZone(ReportModel):
+    """Main computable zone: what one tool can touch along one axis."""
+
+    access: str
+    tool: str
+    area_mm2: Annotated[float, Field(description="With shank and holder clear.")]
+    cutter_area_mm2: Annotated[float, Field(description="By the cutting part alone.")]
+
+
+class CuttingPlane(ReportModel):
+    """Where a tool, or an access, ends in a region."""
+
+    access: str
+    z_mm: Annotated[float, Field(description="Along the access direction.")]
+    region: str
+    tool: str | None = None
+    reason: str
 
 
 class Remainder(ReportModel):
@@ -79,6 +136,32 @@ class Remainder(ReportModel):
     would_need: dict[str, Any] = {}
 
 
+class ProposedTool(ReportModel):
+    """A tool to add, lengths from the tip."""
+
+    kind: str
+    diameter_mm: float
+    corner_radius_mm: float
+    flute_length_mm: float
+    neck_diameter_mm: float
+    neck_length_mm: float
+    shank_diameter_mm: float
+    stickout_mm: float
+    slenderness: Annotated[float, Field(description="Neck length over diameter.")]
+    instead_of: Annotated[str | None, Field(description="Tool at hand with the same cutter.")] = None
+    access: str
+    area_mm2: Annotated[float, Field(description="Of the remainder, what it takes.")]
+
+
+class Proposal(ReportModel):
+    """The fewest tools to add, and what they leave."""
+
+    tools: list[ProposedTool]
+    emptied_mm2: float
+    stays_mm2: Annotated[dict[str, float], Field(description="By reason: undercut, sharp corner, slender, pass, "
+                                                             "too little.")]
+
+
 class Zones(ReportModel):
     """zones.json."""
 
@@ -86,5 +169,8 @@ class Zones(ReportModel):
     walls: list[WallFacts]
     connections: list[ConnectionFacts]
     channels: list[ChannelFacts]
+    mcz: list[ComputableZone] = []
+    cutting_planes: list[CuttingPlane] = []
     zones: list[ZoneFacts]
     remainder: list[Remainder]
+    proposal: Proposal | None = None

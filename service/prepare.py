@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,15 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface
 from geometry.step import read_part
 from geometry.toolbody import ToolBody
+from geometry.trim import FacePatch
 from schemas.setup import Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, tool_bodies
+from zones.categories import Categories
 from zones.decompose import decompose
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
+from zones.patches import zone_patches
 from zones.planview import ChannelPlan
 from zones.reach import Clearances, TipField, lattice_step
 from zones.regions import Regioner
@@ -69,6 +73,11 @@ class Prepared:
     def zones(self) -> tuple[ZoneArea, ...]:
         """The zones in machining order."""
         return self.zoning.zones
+
+    @cached_property
+    def patches(self) -> dict[str, tuple[FacePatch, ...]]:
+        """Trimmed faces of every zone; of the remainder under ''."""
+        return zone_patches(self.views[0], self.zones)
 
     def view(self, access: str) -> View:
         """The view of an access id."""
@@ -166,7 +175,7 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     for k, rotation in enumerate(rotations):
         views.append(_view(setup, k, part, rotation, rotations[0], samples, decomposition, channels))
         progress("zones", 0.14 + 0.08 * (k + 1) / len(rotations))
-    zoning = build_zones(views, decomposition, setup.quality.scallop_height_mm, lift)
+    zoning = build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels))
     progress("zones", 0.25)
     return Prepared(setup, part, tuple(views), decomposition, zoning, lift, (*part.warnings, *decomposition.warnings))
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import Setup, setup_sha256
+from service import advice
 from service.prepare import Prepared
 from service.version import VERSION
 from toolpath.motion import Motion, Workingstep
@@ -22,7 +23,7 @@ from zones.zoning import ZoneArea, is_open
 
 RAPID_MM_MIN = 10000.0
 REMAINDER_FLOOR_MM2 = 0.005
-ZONES_KEYS = ("part", "walls", "connections", "channels", "zones", "remainder")
+ZONES_KEYS = ("part", "walls", "connections", "channels", "mcz", "cutting_planes", "zones", "remainder", "proposal")
 
 
 def r(value: float, digits: int = 4) -> float | None:
@@ -57,25 +58,55 @@ def _shape(ready: Prepared) -> dict[str, Any]:
         "connections": [{"id": c.id, "walls": list(c.walls), "faces": faces(c.faces),
                          "z_mm": [r(c.z_bottom), r(c.z_top)]} for c in d.connections],
         "channels": [{"id": c.id, "walls": list(c.walls), "gap_min_mm": r(c.gap_min),
-                      "at_mm": [r(v) for v in c.at]} for c in d.channels],
+                      "at_mm": _place(ready, c.at)} for c in d.channels],
+        "mcz": [{"access": m.access, "tool": m.tool, "area_mm2": r(m.area, 3),
+                 "cutter_area_mm2": r(m.cutter_area, 3)} for m in ready.zoning.mcz],
+        "cutting_planes": [{"access": p.access, "z_mm": r(p.height), "region": p.region, "tool": p.tool,
+                            "reason": p.reason} for p in ready.zoning.planes],
     }
 
 
 def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
     view = ready.view(zone.access)
-    return {"id": zone.id, "kind": zone.kind, "profile": None, "level": None,
+    profile = zone.category.profile
+    return {"id": zone.id, "kind": zone.kind, "profile": str(profile.type) if profile and profile.type else None,
+            "level": str(profile.level) if profile else None, "profiles": _profiles(zone),
             "open": is_open(zone, view.fields[zone.tool.id]), "region": zone.region, "merged": list(zone.merged),
             "form": str(zone.form), "faces": faces(zone.faces), "access": zone.access, "tool": zone.tool.id,
             "axis": [r(v, 9) for v in view.direction.tolist()], "depth_mm": [r(zone.top), r(zone.bottom)],
-            "cutting_plane_mm": r(zone.plane), "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
+            "approach": _cone(ready, zone), "cutting_plane_mm": r(zone.plane),
+            "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
             "strategy": {"steep": "zlevel", "level": "floor" if zone.tool.kind != "ball" else "zigzag",
                          "shallow": "zigzag"}[str(zone.form)],
+            "patches": [{"face": f"F{p.face}", "area_mm2": r(p.area, 3), "whole": p.whole, "loops": len(p.loops)}
+                        for p in ready.patches.get(zone.id, ())],
             "rejected": list(zone.rejected)}
 
 
-def _remainder(items: list[Remainder]) -> list[dict[str, Any]]:
+def _cone(ready: Prepared, zone: ZoneArea) -> dict[str, Any] | None:
+    """Approach cone of a zone: axis in the setup frame and half angle, degrees."""
+    cone = advice.cone_of(ready, zone)
+    if cone is None:
+        return None
+    return {"axis": [r(v, 6) for v in cone.axis.tolist()], "half_angle_deg": r(math.degrees(cone.half_angle), 2),
+            "resolution_deg": r(math.degrees(cone.resolution), 2)}
+
+
+def _profiles(zone: ZoneArea) -> list[dict[str, Any]]:
+    """The sides a zone got its profile from, the most complex first."""
+    return [{"wall": s.wall, "profile": str(s.profile.type) if s.profile.type else None, "level": str(s.profile.level),
+             "margin": r(s.profile.margin, 3), "closed": s.profile.closed, "bends": len(s.profile.bends)}
+            for s in zone.category.sides]
+
+
+def _place(ready: Prepared, at: tuple[float, float, float]) -> list[float | None]:
+    """A point of the frame of the first access in the setup frame."""
+    return [r(v) for v in ready.views[0].back(np.array(at)).tolist()]
+
+
+def _remainder(ready: Prepared, items: list[Remainder]) -> list[dict[str, Any]]:
     return [{"faces": faces(x.faces), "area_mm2": r(x.area, 3), "reason": x.reason, "would_need": x.would_need,
-             "at_mm": [r(v) for v in x.at]} for x in items if x.area >= REMAINDER_FLOOR_MM2]
+             "at_mm": _place(ready, x.at)} for x in items if x.area >= REMAINDER_FLOOR_MM2]
 
 
 def dry_report(ready: Prepared) -> dict[str, Any]:
@@ -83,7 +114,8 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
     rest = ~ready.zoning.taken
     first = ready.views[0]
     items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift)
-    return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(items)}
+    return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(ready, items),
+            "proposal": advice.as_dict(advice.proposals(ready))}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
@@ -109,7 +141,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
     reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == "pass")
     coverage = done / total if total > 0 else 0.0
-    remainder = _remainder(items)
+    remainder = _remainder(ready, items)
     unmet = _unmet(ready, made, coverage, remainder)
     findings = [*(f.as_dict() for f in proof.findings), *unmet]
     plans = {p.zone.id: p for p in made.zones}
@@ -119,7 +151,8 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "labels": dict(ready.setup.labels),
         "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
-        "steps": [_step(s) for s in made.steps], "remainder": remainder, "findings": findings,
+        "steps": [_step(s) for s in made.steps], "remainder": remainder,
+        "proposal": advice.as_dict(advice.proposals(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machinable_area_mm2": r(total, 3), "machining_time_s": r(proof.machining_time, 1),

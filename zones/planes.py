@@ -10,6 +10,7 @@ Source: ALGORITHMS 1, step 2 of the 4-step algorithm.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,24 @@ from zones.sight import Sight
 PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids
 OPPOSITE = -0.99  # d1·d2 below: two views look at each other
 SHARED_SHARE = 0.995  # of an area a tool must get to be said to get all of it
+FITS_SHARE = 0.5  # of an area the cutting part of a tool must touch for its neck to decide
+
+
+@dataclass(frozen=True)
+class CuttingPlane:
+    """A plane that ends what a tool is asked for in a region.
+
+    height : mm along the access direction
+    region : name of the cell, or of the region two opposite accesses share
+    tool   : id, None between two accesses
+    reason : 'neck', 'neck, moved above a connection', or 'between A1 and A2'
+    """
+
+    access: str
+    height: float
+    region: str
+    tool: str | None
+    reason: str
 
 
 def snapped(plane: float, bands: Sequence[tuple[float, float]]) -> float:
@@ -45,39 +64,51 @@ def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> d
     return out
 
 
-def shares(sights: Sequence[Sight]) -> list[NDArray[np.bool_]]:
-    """What each view is asked for first: all, but of walls in reach of two opposite views only its own side.
+def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[CuttingPlane]]:
+    """What each view is asked for first, and the planes between two.
+
+    All, but of walls in reach of two opposite views only its own side.
 
     No plane where the stoutest tool of the earlier view gets the whole height. Else the plane is at half height
     where both get their half with the stoutest tool; else at the deepest reach of the earlier one.
     Source: ALGORITHMS 1, step 2 of the 4-step algorithm.
     """
     allowed = [np.ones(len(s.samples), np.bool_) for s in sights]
+    planes: list[CuttingPlane] = []
     for i, a in enumerate(sights):
         for j in range(i + 1, len(sights)):
             b = sights[j]
             if float(a.view.direction @ b.view.direction) > OPPOSITE:
                 continue
             both = np.any([a.gets(t) for t in a.reach], axis=0) & np.any([b.gets(t) for t in b.reach], axis=0)
-            for _, form, members in a.groups(both & (a.form == Form.STEEP)):
+            for base, form, members in a.groups(both & (a.form == Form.STEEP)):
                 z, plane = a.samples.points[members, 2], common_plane(a, b, members, form)
+                if np.isfinite(plane):
+                    planes.append(CuttingPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
                 allowed[i][members[z < plane]] = False
                 allowed[j][members[z >= plane]] = False
-    return allowed
+    return allowed, planes
 
 
 def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> float:
-    """Height in the frame of ``a`` of the plane between two opposite views; -inf where ``a`` needs none."""
-    z, area = a.samples.points[members, 2], a.samples.area[members]
-    mine, other = a.gets(a.order(form)[0])[members], b.gets(b.order(form)[0])[members]
+    """Height in the frame of ``a`` of the plane between two opposite views; -inf where ``a`` needs none.
 
-    def whole(got: NDArray[np.bool_], rows: NDArray[np.bool_]) -> bool:
-        return bool(area[rows & got].sum() >= SHARED_SHARE * area[rows].sum())
+    Asked of the stoutest tool whose cutting part touches most of the area, for what its shank and holder forbid.
+    """
+    z, area = a.samples.points[members, 2], a.samples.area[members]
+    fits = [t for t in a.order(form)
+            if area[a.can[t][members] & a.reach[t].by_cutter[members]].sum() >= FITS_SHARE * area.sum()]
+    if not fits:
+        return -np.inf
+    mine, other = (s.can[fits[0]][members] & s.reach[fits[0]].by_cutter[members] & ~s.reach[fits[0]].by_tool[members]
+                   for s in (a, b))
+
+    def whole(missed: NDArray[np.bool_], rows: NDArray[np.bool_]) -> bool:
+        return bool(area[rows & missed].sum() <= (1.0 - SHARED_SHARE) * area[rows].sum())
 
     if whole(mine, np.ones(len(z), np.bool_)):
         return -np.inf
     half = 0.5 * float(z.min() + z.max())
     if whole(mine, z >= half) and whole(other, z < half):
         return half
-    missed = z[~mine]
-    return float(missed.max()) + PLANE_MARGIN if len(missed) else -np.inf
+    return float(z[mine].max()) + PLANE_MARGIN

@@ -67,6 +67,8 @@ class ChannelPlan:
     wall     : (faces + 1,) int, row in ``of_wall`` of the wall a face is a side of, -1 for other faces
     height   : (walls,) float64, mm, where each wall was cut
     gap      : (walls,) float64, mm, least gap of the channels of each wall
+    faced    : per curve the share of its length that faces each channel
+    shadows  : footprints of the connections by id
     """
 
     plan: PlanMap
@@ -76,6 +78,8 @@ class ChannelPlan:
     wall: NDArray[np.int64]
     height: F64
     gap: F64
+    faced: tuple[dict[str, float], ...]
+    shadows: dict[str, shapely.Geometry]
 
     @staticmethod
     def of(part: Part, decomposition: Decomposition) -> ChannelPlan:
@@ -85,18 +89,20 @@ class ChannelPlan:
         """
         d = decomposition
         curves = wall_sections(part, d)
-        strips = _strips(part, d, curves)
+        shadows = footprints(part, d)
+        strips, faced = _strips(part, d, curves, shadows)
         names = tuple(c.id for c in d.channels)
         areas = [Area(n, shapely.union_all([s.area for s in strips if s.channel == n]).buffer(CLOSE)) for n in names]
-        areas += _traces(d, curves) + footprints(part, d)
+        areas += _traces(d, curves) + shadows
         plan = PlanMap.of([a for a in areas if not a.shape.is_empty], [s.centre_line for s in strips])
-        of_wall = np.array([[w.id in c.walls for c in d.channels] for w in d.walls], bool).reshape(len(d.walls), len(names))
+        of_wall = np.array([[w.id in c.walls for c in d.channels] for w in d.walls], bool)
+        of_wall = of_wall.reshape(len(d.walls), len(names))
         wall = np.full(len(part.faces) + 1, -1, np.int64)
         for k, w in enumerate(d.walls):
             wall[list(w.sides)] = k
         height = np.array([_cut_height(w.id, curves, 0.5 * (w.z_bottom + w.z_top)) for w in d.walls])
         gap = np.array([min((c.gap_min for c in d.channels if w.id in c.walls), default=np.inf) for w in d.walls])
-        return ChannelPlan(plan, names, curves, of_wall, wall, height, gap)
+        return ChannelPlan(plan, names, curves, of_wall, wall, height, gap, faced, {a.name: a.shape for a in shadows})
 
     def channel_of(self, points: F64, normals: F64, face: NDArray[np.int32]) -> NDArray[np.int64]:
         """(n,) row in ``names`` of the channel that each point of a wall side faces, -1 for none.
@@ -172,7 +178,9 @@ def _cut_height(wall: str, curves: Sequence[SideCurve], middle: float) -> float:
     return next((c.z for c in curves if c.wall == wall), middle)
 
 
-def _strips(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[Strip]:
+def _strips(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve],
+            shadows: Sequence[Area]) -> tuple[list[Strip], tuple[dict[str, float], ...]]:
+    """Strips of all sides, and per side the share of its rays in each channel."""
     d = decomposition
     through = {f for c in d.connections for f in c.faces} | {f.number for f in part.faces if f.sliver}
     through |= {f for f, role in d.face_role.items() if role == "fillet"}
@@ -182,18 +190,23 @@ def _strips(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve
     owner = {f: w.id for w in d.walls for f in w.sides}
     channel = {frozenset(c.walls): c for c in d.channels}
     skin = 1e-6 * float(np.linalg.norm(part.bounds[1] - part.bounds[0]))
-    holes = shapely.union_all([a.shape for a in footprints(part, d)]).buffer(CLEAR)
+    holes = shapely.union_all([a.shape for a in shadows]).buffer(CLEAR)
     out: list[Strip] = []
+    faced = []
     for curve in curves:
-        out += _strips_of(curve, mesh, tree, owner, channel, holes, skin)
-    return out
+        found, names = _strips_of(curve, mesh, tree, owner, channel, holes, skin)
+        out += found
+        faced.append({n: names.count(n) / len(names) for n in sorted({s.channel for s in found})})
+    return out, tuple(faced)
 
 
 def _strips_of(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: dict[int, str],
-               channel: dict[frozenset[str], Channel], holes: shapely.Geometry, skin: float) -> list[Strip]:
+               channel: dict[frozenset[str], Channel], holes: shapely.Geometry,
+               skin: float) -> tuple[list[Strip], list[str]]:
+    """Strips of one side, and the channel of each of its rays ('' for none)."""
     start, normal = spread(curve.points, curve.closed, PITCH)
     if len(start) < 2:
-        return []
+        return [], []
     origin = np.column_stack([start, np.full(len(start), curve.z)])
     way = np.column_stack([normal, np.zeros(len(start))])
     far, hit = first_hits(tree, origin, way, max(skin, CLEAR))
@@ -204,7 +217,8 @@ def _strips_of(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: 
     length = np.where(np.isfinite(far), far, 0.0)
     _bridge(named, length, shapely.contains_xy(holes, start[:, 0], start[:, 1]), curve.closed)
     foot = start + length[:, None] * normal
-    return [Strip(named[run[0]], start[run], foot[run]) for run in _runs(named, curve.closed) if len(run) > 1]
+    runs = [run for run in _runs(named, curve.closed) if len(run) > 1]
+    return [Strip(named[run[0]], start[run], foot[run]) for run in runs], named
 
 
 def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool) -> None:

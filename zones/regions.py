@@ -129,13 +129,11 @@ class Regioner:
         to_base = np.array([place[c] for c in self.channels.names], dtype=np.int64)
         base = np.where(channel >= 0, to_base[channel] if len(to_base) else base, base)
         over, under = self._stack(points, normals, base, bases)
-        key = np.column_stack([base[:, None], over, under])
-        found, code = np.unique(key, axis=0, return_inverse=True)
-        m = len(self.connections)
+        code, example = _distinct(base, over, under)
         ids = [c.id for c in self.connections]
-        regions = tuple(Region(bases[row[0]], tuple(ids[k] for k in range(m) if row[1 + k]),
-                               tuple(ids[k] for k in range(m) if row[1 + m + k])) for row in found.tolist())
-        return Labels(regions, np.asarray(code, np.int64).reshape(-1))
+        regions = tuple(Region(bases[base[k]], tuple(c for c, on in zip(ids, over[k], strict=True) if on),
+                               tuple(c for c, on in zip(ids, under[k], strict=True) if on)) for k in example.tolist())
+        return Labels(regions, code)
 
     def _stack(self, points: F64, normals: F64, base: NDArray[np.int64],
                bases: list[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -152,6 +150,18 @@ class Regioner:
                 _, hit = first_hits(self.trees[c.id], start, (0.0, 0.0, 1.0))
                 under[rows, k] = np.asarray(hit) >= 0
         return covered & ~under, under
+
+
+def _distinct(base: NDArray[np.int64], over: NDArray[np.bool_],
+              under: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number of each distinct combination (n,), in order of base and connections, and a row that has it."""
+    key = base
+    for k in range(over.shape[1]):
+        key = 3 * key + over[:, k] + 2 * under[:, k]
+        if k % 16 == 15:  # before the numbers grow too long
+            key = np.unique(key, return_inverse=True)[1].reshape(-1)
+    _, first, code = np.unique(key, return_index=True, return_inverse=True)
+    return np.asarray(code, np.int64).reshape(-1), first
 
 
 def _only(part: Part, faces: tuple[int, ...]) -> TriangleMesh:

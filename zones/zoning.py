@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from zones.categories import Categories, Category
 from zones.machinable import Form
 from zones.model import Decomposition
-from zones.planes import neck_planes, shares
+from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach import TipField
 from zones.regions import Region
 from zones.sight import Sight
@@ -49,6 +50,7 @@ class ZoneArea:
     planes  : height of the cutting plane by name of the cell, below which the tool must not be asked; left out
               where there is none
     rejected: alternatives with the reason and the numbers
+    category: profile type and level of its walls
     """
 
     id: str
@@ -65,6 +67,7 @@ class ZoneArea:
     planes: Mapping[str, float] = field(default_factory=dict)
     merged: tuple[str, ...] = ()
     rejected: tuple[dict[str, object], ...] = ()
+    category: Category = Category()
 
     @property
     def plane(self) -> float:
@@ -89,26 +92,29 @@ class Mcz:
 
 @dataclass(frozen=True, eq=False)
 class Zoning:
-    """Zones in machining order, the main computable zones, and (n,) bool which samples some zone holds."""
+    """Zones in machining order, main computable zones, cutting planes, and (n,) bool which samples some zone holds."""
 
     zones: tuple[ZoneArea, ...]
     mcz: tuple[Mcz, ...]
+    planes: tuple[CuttingPlane, ...]
     taken: NDArray[np.bool_]
 
 
-def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: float, lift: float) -> Zoning:
+def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: float, lift: float,
+                categories: Categories | None = None) -> Zoning:
     """Give every sample of the machinable area to the stoutest tool that can touch it.
 
     views         : in the order they are machined; the same samples and tools in each
     decomposition : in the frame of the first view
     scallop       : mm, allowed cusp
     lift          : mm, distance along the normal within which a touch counts
+    categories    : profiles of the regions; none are given where None
 
     Returns
     -------
     Zoning
-        Zones in machining order: views in turn, tools by size, then from the top; samples in none of them are out
-        of reach.
+        Zones in machining order: views in turn, tools by size, simple profiles first, then from the top; samples in
+        none of them are out of reach.
     """
     sights = [Sight(v, decomposition, scallop, lift) for v in views]
     area = views[0].samples.area
@@ -116,7 +122,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
                 for s in sights for t, r in s.reach.items())
     taken = np.zeros(len(area), np.bool_)
     found: list[ZoneArea] = []
-    first_choice = shares(sights)
+    first_choice, between = shares(sights)
     rounds = [first_choice, [~taken] * len(sights)] if len(sights) > 1 else [[~taken]]
     for allowed in rounds:
         for sight, mine in zip(sights, allowed, strict=True):
@@ -125,10 +131,24 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
                     taken[zone.samples] = True
                     found.append(zone)
     found = _joined(found, views)
+    if categories is not None:
+        found = [replace(z, category=categories.of(z.region)) for z in found]
     place = {v.id: k for k, v in enumerate(views)}
-    found.sort(key=lambda z: (place[z.access], -z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), -z.top,
-                              z.region, z.form))
-    return Zoning(tuple(replace(z, id=f"Z{k}") for k, z in enumerate(found, start=1)), mcz, taken)
+    found.sort(key=lambda z: (place[z.access], -z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), z.category.rank,
+                              -z.top, z.region, z.form))
+    zones = tuple(replace(z, id=f"Z{k}") for k, z in enumerate(found, start=1))
+    return Zoning(zones, mcz, (*between, *_neck_planes(zones, sights)), taken)
+
+
+def _neck_planes(zones: Sequence[ZoneArea], sights: Sequence[Sight]) -> list[CuttingPlane]:
+    """The planes the zones end at, highest first in each region."""
+    out = set()
+    above = {s.view.id: {high + PLANE_MARGIN for bands in s.bands.values() for _, high in bands} for s in sights}
+    for z in zones:
+        for name, height in z.planes.items():
+            moved = height in above[z.access]
+            out.add((z.access, name, -height, z.tool.id, "neck, moved above a connection" if moved else "neck"))
+    return [CuttingPlane(access, -low, name, tool, reason) for access, name, low, tool, reason in sorted(out)]
 
 
 def _stage(zone: ZoneArea) -> int:

@@ -1,0 +1,103 @@
+"""Categorised computable zones (CCZ): the profile type and level of what a region's walls look like in plan.
+
+A channel has the profiles of the sides that face it, the outside of a wall those of the sides that face none, and an
+SCZI cell or a connection those of the stretches of sides it touches. The most complex one counts for the zone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from geometry.mesh import F64
+from zones.planview import ChannelPlan
+from zones.profiles import Level, Profile, classify
+from zones.sections import SideCurve
+
+RANK = {Level.SIMPLE: 0, Level.MEDIUM: 1, Level.HIGH: 2}
+NEAR = 0.05  # mm round a footprint within which a side counts as touched
+LEAST_POINTS = 4
+FACING_SHARE = 0.5  # of a side that faces channels, below which it is an outside
+
+
+@dataclass(frozen=True, eq=False)
+class SideProfile:
+    """The profile of one side of a wall, or of a stretch of it."""
+
+    wall: str
+    curve: SideCurve
+    profile: Profile
+
+
+@dataclass(frozen=True, eq=False)
+class Category:
+    """What decides the type of a zone: its sides, the most complex first."""
+
+    sides: tuple[SideProfile, ...] = ()
+
+    @property
+    def profile(self) -> Profile | None:
+        """Of the most complex side; None where the region has no side."""
+        return self.sides[0].profile if self.sides else None
+
+    @property
+    def rank(self) -> int:
+        """0 simple, 1 medium, 2 high; 0 for regions without a side."""
+        return RANK[self.profile.level] if self.profile else 0
+
+
+class Categories:
+    """Profiles of regions by their names; each side is fitted once."""
+
+    def __init__(self, plan: ChannelPlan) -> None:
+        self.plan = plan
+        self.known: dict[str, Category] = {}
+
+    @cached_property
+    def whole(self) -> tuple[SideProfile, ...]:
+        """The profile of every side."""
+        return tuple(SideProfile(c.wall, c, classify(c.points, c.closed)) for c in self.plan.curves)
+
+    def of(self, region: str) -> Category:
+        """Category of a region, by its name: 'H1', 'W2', 'C1', 'H1 over C2', 'floor'."""
+        if region not in self.known:
+            base, connections = region.split()[0], [w for w in region.split() if w.startswith("C")]
+            sides = self._touched(base, connections) if connections else self._of_base(base)
+            self.known[region] = Category(tuple(sorted(sides, key=lambda s: (
+                -RANK[s.profile.level], -len(s.profile.bends), s.wall, s.profile.type or ""))))
+        return self.known[region]
+
+    def _of_base(self, base: str) -> list[SideProfile]:
+        return [s for k, s in enumerate(self.whole) if self._is_of(k, base)]
+
+    def _is_of(self, curve: int, base: str) -> bool:
+        faced = self.plan.faced[curve]
+        if base in self.plan.names:
+            return faced.get(base, 0.0) > 0.0
+        return self.plan.curves[curve].wall == base and sum(faced.values()) < FACING_SHARE
+
+    def _touched(self, base: str, connections: list[str]) -> list[SideProfile]:
+        shape = shapely.union_all([self.plan.shadows[c] for c in connections if c in self.plan.shadows]).buffer(NEAR)
+        out = []
+        for k, s in enumerate(self.whole):
+            if base.startswith("C") or self._is_of(k, base):
+                stretch = _within(s.curve, shape)
+                if stretch is not None:
+                    out.append(SideProfile(s.wall, s.curve, classify(stretch, False)))
+        return out
+
+
+def _within(curve: SideCurve, shape: shapely.Geometry) -> F64 | None:
+    """The longest stretch of a side inside a shape, (k, 2) float64, mm; None where there is none to speak of."""
+    line = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    cut = shapely.line_merge(shapely.intersection(shapely.LineString(line), shape))
+    parts = [g for g in shapely.get_parts(cut) if g.geom_type == "LineString" and g.length > 0]
+    if not parts:
+        return None
+    best = max(parts, key=lambda g: (round(g.length, 6), g.bounds))
+    if len(best.coords) < LEAST_POINTS:
+        best = shapely.segmentize(best, best.length / LEAST_POINTS)
+    return np.asarray(best.coords)

@@ -1,0 +1,103 @@
+"""Zones as trimmed faces of the part: what each zone holds of every B-rep face, with its borders in (u, v).
+
+A point belongs to the zone of the nearest sample of its own face, form and cell of the plan view. So borders between
+cells and forms are exact, and those where a tool ends its reach are right to the spacing of the samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64, I32
+from geometry.sampling import SurfaceSamples
+from geometry.trim import FacePatch, trim_faces
+from zones.machinable import LEVEL, STEEP
+from zones.view import View
+from zones.zoning import ZoneArea
+
+PITCH = 0.35  # mm between the points a face is asked at first; wider where that would be more than MOST of them
+MOST = 4e5
+TOLERANCE = 0.01  # mm, how near a border is to the change of zone
+REST = 0  # label of what no zone holds
+MOST_CELLS = 1 << 20
+
+
+def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FacePatch, ...]]:
+    """Trimmed faces of every zone, and of the remainder under ''.
+
+    view  : the first access, whose samples the zones index
+    zones : in any order
+
+    Returns
+    -------
+    dict
+        By zone id; pieces by face number. The pieces of all zones and the remainder partition the machinable faces.
+    """
+    samples = view.samples
+    faces = [int(f) for f in np.unique(samples.face)]
+    area = float(view.part.mesh.areas[np.isin(view.part.mesh.face_ids, faces)].sum())
+    owner = np.full(len(samples), REST, np.int64)
+    for k, z in enumerate(zones, start=1):
+        owner[z.samples] = k
+    found = trim_faces(view.part, faces, Nearest(view, owner), max(PITCH, float(np.sqrt(2.0 * area / MOST))), TOLERANCE)
+    names = {REST: "", **{k: z.id for k, z in enumerate(zones, start=1)}}
+    return {names[label]: patches for label, patches in found.items()}
+
+
+class Nearest:
+    """Label function: the owner of the nearest sample of the same face, form and cell; of the face where there is none.
+
+    view  : the first access; owner : (n,) int64, label of each of its samples
+    """
+
+    def __init__(self, view: View, owner: NDArray[np.int64]) -> None:
+        # samples on the borders stand for no area: what they say of themselves would be given a strip of it
+        inner = np.flatnonzero(view.samples.area > 0)
+        s = view.samples.subset(inner)
+        self.view, self.owner = view, owner[inner]
+        self.names = {r: k for k, r in enumerate(view.labels.regions)}
+        self.cells = _trees(_key(s, view.labels.code[inner]), s.points)
+        self.faces = _trees(s.face.astype(np.int64), s.points)
+
+    def __call__(self, points: F64, normals: F64, face: I32) -> NDArray[np.int64]:
+        """Labels (k,) of points (k, 3) mm with unit normals on faces (k,)."""
+        here = SurfaceSamples(points, normals, np.zeros(len(points)), face, np.zeros(len(points), np.int32))
+        labels = self.view.label(here)
+        code = np.array([self.names.get(r, -1) for r in labels.regions], dtype=np.int64)[labels.code]
+        found = _nearest(self.cells, np.where(code >= 0, _key(here, code), -1), points)
+        lone = np.flatnonzero(found < 0)
+        found[lone] = _nearest(self.faces, face[lone].astype(np.int64), points[lone])
+        return np.where(found >= 0, self.owner[found], REST)
+
+
+Trees = dict[int, tuple[NDArray[np.int64], cKDTree]]
+
+
+def _key(samples: SurfaceSamples, code: NDArray[np.int64]) -> NDArray[np.int64]:
+    nz = samples.normals[:, 2]
+    form = np.where(nz > LEVEL, 0, np.where(nz < STEEP, 2, 1))
+    return np.asarray((samples.face.astype(np.int64) * 3 + form) * MOST_CELLS + code)
+
+
+def _groups(key: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
+    order = np.argsort(key, kind="stable")
+    cuts = np.flatnonzero(np.diff(key[order])) + 1
+    return [(int(key[rows[0]]), rows) for rows in np.split(order, cuts) if len(rows)]
+
+
+def _trees(key: NDArray[np.int64], points: F64) -> Trees:
+    return {k: (rows, cKDTree(points[rows])) for k, rows in _groups(key)}
+
+
+def _nearest(trees: Trees, key: NDArray[np.int64], points: F64) -> NDArray[np.int64]:
+    """(k,) row of the nearest sample with the same key, -1 where none has it."""
+    out = np.full(len(points), -1, np.int64)
+    for value, rows in _groups(key):
+        if value in trees:
+            pool, tree = trees[value]
+            out[rows] = pool[tree.query(points[rows], workers=2)[1]]
+    return out
