@@ -11,6 +11,8 @@ from geometry.sheet import BOOL, I64, Sheet
 
 # Rounds of bending; each takes about three quarters off the error that is left.
 BEND_ROUNDS = 10
+# Nodes put in for each cut there was; a ragged border would otherwise be followed into every tooth.
+BUDGET = 8
 # A node never comes nearer to the far corner of the facet it is moved in than this fraction of the way.
 REACH = 0.9
 
@@ -25,8 +27,9 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
     The node goes along the line to the far corner of the facet on its wrong side, so no facet turns over.
     """
     settled = np.zeros(0, np.int64)
+    key, facets, places = _borders(sheet)
+    most = len(sheet.nodes) + BUDGET * len(key)
     for _ in range(BEND_ROUNDS):
-        key, facets, places = _borders(sheet)
         open_ = ~np.isin(key, settled)
         key, facets, places = key[open_], facets[open_], places[open_]
         if not len(key):
@@ -55,6 +58,9 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
         way, _, _ = bisect(ask, end, middle[rows], face[rows], here, here, tolerance, False)
         node = sheet.add(end + way[:, None] * (middle[rows] - end), face[rows])
         _insert(sheet, facets[rows], places[rows], node)
+        if len(sheet.nodes) > most:
+            return
+        key, facets, places = _borders(sheet)
 
 
 def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
