@@ -41,8 +41,8 @@ RECIPES: dict[str, Callable[..., Layout]] = {
 }
 """Name of each recipe and the function that draws it from a random generator."""
 
-NUMBERS = {"demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4, "three_walls": 5, "wavy": 6, "mixed": 7,
-           "mixed_linear": 8, "mixed_radial": 9}
+NUMBERS = {"demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4, "three_walls": 5, "wavy": 6,
+           "mixed": 7, "mixed_linear": 8, "mixed_radial": 9}
 """What each recipe adds to its seeds; a number stays with its recipe, so that new recipes change no part."""
 DRAWS, BUILDS = 60, 6
 
@@ -214,7 +214,8 @@ def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
         words |= {"floor_contact"} if c.floor_contact else set()
         words |= {"same_wall"} if len(set(c.indices)) == 1 else set()
         words |= {"fork_of_three_walls"} if len(set(c.indices)) > 2 else set()
-    if any(a.footprint().intersects(b.footprint()) for k, a in enumerate(layout.connections) for b in layout.connections[:k]):
+    outlines = [c.footprint() for c in layout.connections]
+    if any(a.intersects(b) for k, a in enumerate(outlines) for b in outlines[:k]):
         words.add("levels")
     if any(g.gap_min < 1.0 and _primary(layout, g) for g in gaps):
         words.add("narrow")
@@ -234,7 +235,8 @@ def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:
     shape: dict[str, Any] = {}
     if isinstance(wall, FreeWall):
         p = wall.profile
-        shape = {"drawn": p.type, "profiles": list(p.labels), "closed": p.closed, "strips": wall.strips, "merged": wall.merged,
+        shape = {"drawn": p.type, "profiles": list(p.labels), "closed": p.closed, "strips": wall.strips,
+                 "merged": wall.merged,
                  "control_points": [[round(float(c), 6) for c in q] for q in p.control]}
     return {
         "index": index,

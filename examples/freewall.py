@@ -1,4 +1,4 @@
-"""Walls along any profile: open or closed, tapered, leaning, twisted, their faces whole, in strips or merged into one."""
+"""Walls along any profile: open or closed, tapered, leaning, twisted; faces whole, in strips or merged into one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from examples.walls import BURIED, LEFT, RIGHT, WallSpec
 
 SECTION_SAMPLES = 321
 CAP_NODES = 7
-NODES = {None: 5, "C1": 17, "C4": 17, "C2": 25, "C3": 33, "C7": 41, "C8": 41, "C9": 33, "C10": 45, "oval": 33, "C5": 61, "C6": 49}
+NODES = {None: 5, "C1": 17, "C4": 17, "C2": 25, "C3": 33, "C7": 41, "C8": 41, "C9": 33, "C10": 45,
+         "oval": 33, "C5": 61, "C6": 49}
 """Nodes of each rail, in step with the bends: every knot costs triangles later."""
 
 
@@ -96,7 +97,7 @@ class FreeWall(WallSpec):
         return interpolate_closed(u, points)
 
     def loop(self, v: float) -> BSpline:
-        """Both sides and both rounded ends as one closed curve: right side forward, then left side back; parameter 0..4.
+        """Both sides and both rounded ends as one closed curve, right side forward, left side back; parameter 0..4.
 
         v : 0 at the floor, 1 at the top
         """

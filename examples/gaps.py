@@ -10,7 +10,7 @@ other side within 72 degrees of square (``facing_dot``).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +52,8 @@ class Gap:
 
 
 def channels(
-    walls: list[WallSpec], blocked: Blocked | None = None, *, n_u: int = 161, n_v: int = 5, foot: float = 0.0
+    walls: Sequence[WallSpec], blocked: Blocked | None = None, *, n_u: int = 161, n_v: int = 5, foot: float = 0.0,
+    exact: bool = True,
 ) -> list[Gap]:
     """All channels between the walls of a layout.
 
@@ -61,12 +62,13 @@ def channels(
     n_u, n_v : samples along and up each side, for the areas and as the start of the search for the shortest ray;
                the gap is refined to 1/512 of that pitch, also where it ends at a border or a hub
     foot     : mm above the floor where sides begin, the height of a fillet
+    exact    : whether the shortest ray is refined between the samples
     Returns Gap per pair with at least 1 % of a side facing, in order of the pair.
     """
     found: dict[tuple[int, int], Gap] = {}
     for i in range(len(walls)):
         for side in (LEFT, RIGHT):
-            for gap in _facing(walls, i, side, blocked, n_u, n_v, foot):
+            for gap in _facing(walls, i, side, blocked, n_u, n_v, foot, exact):
                 old = found.get(gap.walls)
                 if old is None or gap.gap_min < old.gap_min:
                     area = gap.area + (old.area if old else 0.0)
@@ -78,7 +80,7 @@ def channels(
 
 
 def _facing(
-    walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, n_u: int, n_v: int, foot: float
+    walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, n_u: int, n_v: int, foot: float, exact: bool
 ) -> list[Gap]:
     low = foot / walls[i].height
     grid = np.meshgrid(np.linspace(0, 1, n_u), np.linspace(low, 1, n_v), indexing="ij")
@@ -87,11 +89,13 @@ def _facing(
     du, dv = walls[i].side_derivatives(side, u, v)
     weight = (1.0 - low) * np.linalg.norm(np.cross(du, dv), axis=1) / ((n_u - 1) * (n_v - 1))
     out = []
+    near = {i, *np.unique(first[np.isfinite(reach)]).tolist()} if walls[i].sees_itself else None
     for j in np.unique(first[np.isfinite(reach)]):
         mine = np.flatnonzero(np.isfinite(reach) & (first == j))
         gap, at, border = np.inf, origin[0], False
         for best in _starts(walls[i], reach, mine, n_v):
-            found = _zoom(walls, i, side, blocked, int(j), (u[best], v[best]), (n_u, n_v), low, float(reach[best]))
+            found = _zoom(walls, i, side, blocked, int(j), (u[best], v[best]), (n_u, n_v), low, float(reach[best]),
+                          near, ZOOMS if exact else 0)
             if found[0] < gap:
                 gap, at, border = found
         x, y, z = (float(c) for c in at)
@@ -113,18 +117,18 @@ def _starts(wall: WallSpec, reach: F64, mine: np.ndarray, n_v: int) -> list[int]
 
 
 def _zoom(
-    walls: list[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, start: tuple[float, float],
-    counts: tuple[int, int], low: float, gap: float,
+    walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, start: tuple[float, float],
+    counts: tuple[int, int], low: float, gap: float, near: set[int] | None, zooms: int,
 ) -> tuple[float, F64, bool]:
     """Shortest ray from a side of wall i to wall j round a sample: its length, its start, whether on the border."""
     centre, pitch = np.array(start), np.array([1.0, 1.0]) / (np.array(counts) - 1)
     at = walls[i].side_point(side, centre[:1], centre[1:])[0]
     border = _on_border(walls[i], start[0], start[1], low)
-    for _ in range(ZOOMS):
+    for _ in range(zooms):
         fine = [np.unique(np.clip(c + np.linspace(-h, h, 17), b, 1))
                 for c, h, b in zip(centre, pitch, (0.0, low), strict=True)]
         fu, fv = (g.ravel() for g in np.meshgrid(*fine, indexing="ij"))
-        points, seen, far = _cast(walls, i, side, fu, fv, blocked, 1.2 * gap + 1.0)
+        points, seen, far = _cast(walls, i, side, fu, fv, blocked, 1.2 * gap + 1.0, near)
         far = np.where(seen == j, far, np.inf)
         k = int(np.argmin(far))
         if far[k] <= gap:
@@ -139,16 +143,18 @@ def _on_border(wall: WallSpec, u: float, v: float, low: float) -> bool:
 
 
 def _cast(
-    walls: list[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None, farthest: float = FARTHEST
+    walls: Sequence[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None, farthest: float = FARTHEST,
+    among: set[int] | None = None,
 ) -> tuple[F64, np.ndarray, F64]:
     """Rays from points of one side: where they start, which wall they meet first, how far that is (inf: none).
 
     farthest : mm; free walls beyond are not looked at
+    among    : walls that are looked at, all when None
     """
     origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
     distance = np.full((len(walls), len(u)), np.inf)
     for j, other in enumerate(walls):
-        if j != i or other.sees_itself:
+        if (j != i or other.sees_itself) and (among is None or j in among):
             if other.sees_itself and _apart(origin, other) > farthest:
                 continue
             for facing in (LEFT, RIGHT):
@@ -175,9 +181,13 @@ def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
     levels = np.round(origin[:, 2], 6)
     for z in np.unique(levels):
         rows = np.flatnonzero(levels == z)
-        v = np.full(len(grid), np.clip((z - wall.z_floor) / wall.height, 0.0, 1.0))
-        s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], wall.side_point(side, grid, v)[:, :2],
-                                   side if wall.sees_itself else 0)
+        share = float(np.clip((z - wall.z_floor) / wall.height, 0.0, 1.0))
+        if wall.sees_itself:
+            s[rows], u[rows] = _first_crossing(origin[rows, :2].copy(), normal[rows, :2].copy(),
+                                               wall.trace(side, share), side, SKIN)
+        else:
+            trace = wall.side_point(side, grid, np.full(len(grid), share))[:, :2]
+            s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], trace)
     rows = np.flatnonzero(np.isfinite(s))
     if not len(rows):
         return s
@@ -186,13 +196,8 @@ def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
     return out
 
 
-def _plan_hit(p: F64, d: F64, line: F64, side: int) -> tuple[F64, F64]:
-    """First crossing of plan rays with a polyline: distances and polyline parameter (inf, 0 where none).
-
-    side : of the line that counts (LEFT or RIGHT), 0 for both
-    """
-    if side:
-        return _first_crossing(np.ascontiguousarray(p), np.ascontiguousarray(d), np.ascontiguousarray(line), side, SKIN)
+def _plan_hit(p: F64, d: F64, line: F64) -> tuple[F64, F64]:
+    """First crossing of plan rays with a polyline: distances and polyline parameter (inf, 0 where none)."""
     a, e = line[:-1], np.diff(line, axis=0)
     cross = d[:, None, 0] * e[None, :, 1] - d[:, None, 1] * e[None, :, 0]
     w = a[None] - p[:, None]
@@ -211,6 +216,7 @@ def _plan_hit(p: F64, d: F64, line: F64, side: int) -> tuple[F64, F64]:
 
 @njit(cache=True, nogil=True)
 def _first_crossing(p: F64, d: F64, line: F64, side: int, skin: float) -> tuple[F64, F64]:
+    """As ``_plan_hit`` for crossings of one side (LEFT or RIGHT) of the polyline from its void, beyond ``skin`` mm."""
     n, m = len(p), len(line) - 1
     far, at = np.full(n, np.inf), np.zeros(n)
     for i in range(n):
@@ -236,6 +242,8 @@ def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64)
         r = wall.side_point(side, uc, v) + du * (u - uc)[:, None] - origin - normal * s[:, None]
         step = np.linalg.solve(np.stack([normal, -du, -dv], axis=-1), r[..., None])[..., 0]
         s, u, v = s + step[:, 0], u + step[:, 1], v + step[:, 2]
+        if wall.sees_itself and float(np.abs(step).max()) < 1e-12:
+            break
     missed = np.linalg.norm(r, axis=1) > 1e-7
     outside = (u < -1e-9) | (u > 1 + 1e-9) | (v < -1e-9) | (v > 1 + 1e-9)
     facing = (wall.side_normal(side, np.clip(u, 0, 1), v) * normal).sum(axis=1) < wall.facing_dot

@@ -1,10 +1,11 @@
-"""Connections between free walls: from a wall straight across to whatever wall comes first, its own other stretch included.
+"""Connections between free walls: straight across to whatever comes first, another stretch of the same wall included.
 
 A fork leaves one wall, divides over the channel and ends at two places of the walls beyond.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +23,7 @@ from examples.walls import WallSpec
 LONGEST = 12.5
 """mm; connections do not span more."""
 BURIED_BY = 0.1
-KEEP_OFF = 0.8
+KEEP_OFF = 1.0
 """mm; no connection stands nearer to the place where a gap is least."""
 
 
@@ -79,14 +80,14 @@ def _fork_outline(ends: F64, node: F64, width: float) -> Polygon:
 
 @dataclass(frozen=True, eq=False)
 class Across:
-    """Where a plan ray from the middle of a wall ends: on the centre line of wall ``other``, ``void`` mm beyond its own."""
+    """Where a plan ray from the middle of a wall ends: on the centre line of wall ``other``, across ``void`` mm."""
 
     other: int
     end: F64
     void: float
 
 
-def look_across(walls: list[WallSpec], i: int, start: F64, way: F64, z: float) -> Across:
+def look_across(walls: Sequence[WallSpec], i: int, start: F64, way: F64, z: float) -> Across:
     """What a plan ray from the centre line of a wall meets first.
 
     walls : of the layout
@@ -98,6 +99,8 @@ def look_across(walls: list[WallSpec], i: int, start: F64, way: F64, z: float) -
     entries: list[tuple[float, int]] = []
     leave = 0.0
     for k, wall in enumerate(walls):
+        if _apart(ray, wall):
+            continue
         cut = ray.intersection(wall.section(z))
         for piece in getattr(cut, "geoms", [cut]):
             if piece.is_empty:
@@ -111,7 +114,8 @@ def look_across(walls: list[WallSpec], i: int, start: F64, way: F64, z: float) -
         raise LayoutError("nothing stands opposite")
     enter, other = min(entries)
     middle = ray.intersection(LineString(_middle(walls[other], z)))
-    points = [np.array(p.coords[0]) for p in getattr(middle, "geoms", [middle]) if not p.is_empty and p.geom_type == "Point"]
+    hits = [p for p in getattr(middle, "geoms", [middle]) if not p.is_empty and p.geom_type == "Point"]
+    points = [np.array(p.coords[0]) for p in hits]
     beyond = [p for p in points if float((p - start) @ way) > enter]
     if not beyond:
         raise LayoutError("the opposite wall is missed")
@@ -119,6 +123,12 @@ def look_across(walls: list[WallSpec], i: int, start: F64, way: F64, z: float) -
     if float((end - start) @ way) - enter > 2.0 * max(walls[other].thickness):
         raise LayoutError("met too obliquely")
     return Across(other, end, enter - leave)
+
+
+def _apart(shape: LineString | Polygon, wall: WallSpec) -> bool:
+    """Whether the boxes of a plan shape and of a wall lie more than 1 mm apart."""
+    a, b = shape.bounds, wall.bounds
+    return bool(a[0] > b[2] + 1 or b[0] > a[2] + 1 or a[1] > b[3] + 1 or b[1] > a[3] + 1)
 
 
 def _middle(wall: WallSpec, z: float) -> F64:
@@ -135,8 +145,8 @@ def _tangent_at(wall: WallSpec, point: F64, z: float) -> F64:
 
 
 def join(
-    walls: list[WallSpec], i: int, side: int, u: float, kind: str, z: tuple[float, float], *, width: float, depth: float,
-    bend: float = 0.0,
+    walls: Sequence[WallSpec], i: int, side: int, u: float, kind: str, z: tuple[float, float], *, width: float,
+    depth: float, bend: float = 0.0,
 ) -> ConnectionSpec:
     """Connection from the side of a wall square across the channel.
 
@@ -154,8 +164,8 @@ def join(
     tangents = np.array([_tangent_at(first, start, z[0]), _tangent_at(second, found.end, z[1])])
     if min(abs(t[0] * way[1] - t[1] * way[0]) for t in tangents) < 0.75:
         raise LayoutError("met too obliquely")
-    spec = ConnectionSpec(kind, (first, second), (i, found.other), np.array([*start, z[0]]), np.array([*found.end, z[1]]),
-                          tangents, width, depth, bend)
+    ends = np.array([*start, z[0]]), np.array([*found.end, z[1]])
+    spec = ConnectionSpec(kind, (first, second), (i, found.other), *ends, tangents, width, depth, bend)
     for _ in range(6):
         if spec.buried(BURIED_BY):
             break
@@ -168,12 +178,17 @@ def join(
     return spec
 
 
-def _ends_only_there(walls: list[WallSpec], outline: Polygon, wanted: set[int], z: tuple[float, float], ends: int) -> None:
+def _ends_only_there(
+    walls: Sequence[WallSpec], outline: Polygon, wanted: set[int], z: tuple[float, float], ends: int
+) -> None:
     """Hold a footprint to meeting the wanted walls alone, in as many places as it has ends."""
     for level in z:
         pieces = 0
         for k, wall in enumerate(walls):
-            cut = wall.section(min(max(level, wall.z_floor), wall.z_top)).intersection(outline.buffer(0.0 if k in wanted else 0.5))
+            if _apart(outline, wall):
+                continue
+            around = outline if k in wanted else outline.buffer(0.5)
+            cut = wall.section(min(max(level, wall.z_floor), wall.z_top)).intersection(around)
             parts = [g for g in getattr(cut, "geoms", [cut]) if g.area > 1e-6]
             if parts and k not in wanted:
                 raise LayoutError("meets a third wall")
@@ -182,7 +197,9 @@ def _ends_only_there(walls: list[WallSpec], outline: Polygon, wanted: set[int], 
             raise LayoutError("meets a wall twice")
 
 
-def fork(walls: list[WallSpec], i: int, side: int, u: float, z: float, spread: float, width: float, depth: float) -> ForkSpec:
+def fork(
+    walls: Sequence[WallSpec], i: int, side: int, u: float, z: float, *, spread: float, width: float, depth: float
+) -> ForkSpec:
     """Forked connection from the side of a wall.
 
     walls, i, side, u : as in ``join``
@@ -213,10 +230,12 @@ def fork(walls: list[WallSpec], i: int, side: int, u: float, z: float, spread: f
     return ForkSpec(indices if len(indices) > 1 else indices * 2, np.array(ends), node, width, depth, z, visible)
 
 
-def _first_middle(walls: list[WallSpec], start: F64, way: F64, z: float) -> tuple[int, F64]:
+def _first_middle(walls: Sequence[WallSpec], start: F64, way: F64, z: float) -> tuple[int, F64]:
     ray = LineString([start, start + 25.0 * way])
     found: list[tuple[float, int, F64]] = []
     for k, wall in enumerate(walls):
+        if _apart(ray, wall):
+            continue
         cut = ray.intersection(LineString(_middle(wall, z)))
         for p in getattr(cut, "geoms", [cut]):
             if not p.is_empty and p.geom_type == "Point":
@@ -229,7 +248,7 @@ def _first_middle(walls: list[WallSpec], start: F64, way: F64, z: float) -> tupl
 
 
 def _fork_buried(
-    walls: list[WallSpec], at: tuple[int, ...], ends: F64, node: F64, width: float, levels: tuple[float, float]
+    walls: Sequence[WallSpec], at: tuple[int, ...], ends: F64, node: F64, width: float, levels: tuple[float, float]
 ) -> bool:
     for k, end in zip(at, ends, strict=True):
         d = (end - node) / np.hypot(*(end - node))
@@ -241,7 +260,9 @@ def _fork_buried(
     return True
 
 
-def draw_joins(rng: Generator, walls: list[WallSpec], gaps: list[Gap], count: int, kinds: tuple[str, ...]) -> list[Any]:
+def draw_joins(
+    rng: Generator, walls: Sequence[WallSpec], gaps: list[Gap], count: int, kinds: tuple[str, ...]
+) -> list[Any]:
     """Draw up to ``count`` connections anywhere between the walls, some over each other.
 
     gaps : true channels; no connection covers the place where one is least
@@ -274,7 +295,7 @@ def _covers(spec: Any, gaps: list[Gap]) -> bool:
                and outline.contains(Point(g.at[:2])) for g in gaps)
 
 
-def _draw(rng: Generator, walls: list[WallSpec], start: tuple[int, int, float], kind: str) -> Any:
+def _draw(rng: Generator, walls: Sequence[WallSpec], start: tuple[int, int, float], kind: str) -> Any:
     i, side, u = start
     wall = walls[i]
     depth = float(rng.uniform(0.8, 1.5) if kind == "web" else rng.uniform(1.0, 2.2))
@@ -287,7 +308,8 @@ def _draw(rng: Generator, walls: list[WallSpec], start: tuple[int, int, float], 
         raise LayoutError("too low for it")
     z0 = z1 = low + (high - low) * float(draw[0])
     if kind == "fork":
-        return fork(walls, i, side, u, z0, float(0.45 + 0.3 * draw[1]), 0.8 * min(width, 1.9), depth)
+        return fork(walls, i, side, u, z0, spread=float(0.45 + 0.3 * draw[1]),
+                    width=0.8 * min(width, 1.9), depth=depth)
     if kind in ("bar", "round_bar", "arch") and draw[1] < 0.4:
         z1 = low + (high - low) * float(draw[2])
     if kind == "bar" and draw[1] > 0.75:

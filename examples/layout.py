@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,7 +110,7 @@ class WindowSpec:
         corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return Polygon([middle + 0.5 * self.width * a * t + reach * b * n for a, b in corners])
 
-    def fits(self, layout: Layout) -> bool:
+    def fits(self, layout: Layout, gaps: list[Gap]) -> bool:
         """Whether the opening passes the wall cleanly and leaves all else, and every least gap, alone."""
         outline = self.footprint()
         around = outline.buffer(1.0)
@@ -124,7 +125,8 @@ class WindowSpec:
             return False
         if any(c.footprint().intersects(around) for c in layout.connections):
             return False
-        return not any(around.buffer(1.5).contains(Point(g.at[:2])) for g in layout.gaps(n_u=81, n_v=3) if self.index in g.walls)
+        around = around.buffer(1.5)
+        return not any(around.contains(Point(g.at[:2])) for g in gaps if self.index in g.walls)
 
     def solid(self) -> Any:
         """What is cut away, as a cadquery Solid."""
@@ -142,7 +144,7 @@ class Layout:
     name        : of the recipe
     base        : Plate or HubDisc
     walls       : WallSpec in order, the indices of the truth
-    connections : ConnectionSpec in order
+    connections : ConnectionSpec or ForkSpec in order
     fillet      : mm, radius of the fillets between walls and floor, 0 for none
     windows     : openings through walls
     rounded     : mm, radius of the fillets where connections meet walls, 0 for none
@@ -153,8 +155,8 @@ class Layout:
 
     name: str
     base: Plate | HubDisc
-    walls: list[WallSpec]
-    connections: list[ConnectionSpec] = field(default_factory=list)
+    walls: Sequence[WallSpec]
+    connections: Sequence[Any] = field(default_factory=list)
     fillet: float = 0.0
     windows: list[WindowSpec] = field(default_factory=list)
     rounded: float = 0.0
@@ -162,15 +164,15 @@ class Layout:
     meets: tuple[tuple[int, int], ...] = ()
     features: tuple[str, ...] = ()
 
-    def gaps(self, **sampling: int) -> list[Gap]:
+    def gaps(self, **sampling: Any) -> list[Gap]:
         """True channels between the walls, see ``examples.gaps.channels``."""
         if any(w.sees_itself for w in self.walls):
-            return channels(self.walls, self.base.blocked, **{"n_u": 241, "n_v": 5, **sampling}, foot=self.fillet)
+            return channels(self.walls, self.base.blocked, foot=self.fillet, **{"n_u": 241, "n_v": 5, **sampling})
         return channels(self.walls, self.base.blocked, **sampling)
 
 
 def connect(
-    walls: list[WallSpec],
+    walls: Sequence[WallSpec],
     pair: tuple[int, int],
     kind: str,
     u: float,

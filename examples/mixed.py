@@ -11,8 +11,9 @@ from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
 from examples.freewall import FreeWall
+from examples.gaps import Gap
 from examples.joins import draw_joins
-from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec
+from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
 from examples.profiles import CLOSED_TYPES, OPEN_TYPES, Profile, clear, draw_closed, draw_hairpin, draw_open
 from examples.walls import LEFT, RIGHT
 
@@ -65,12 +66,14 @@ def mixed(
     kind = arrangement if arrangement is not None else ("linear" if rng.random() < 0.65 else "radial")
     style = Style(float(np.round(rng.uniform(3.0, 6.0), 1)), float(rng.uniform(8.0, 17.0)))
     layout = _linear(rng, count, gap, style) if kind == "linear" else _radial(rng, count, style)
-    if isinstance(layout.base, HubDisc) and not all(_shows(layout.base, w) for w in layout.walls):
+    hub = layout.base if isinstance(layout.base, HubDisc) else None
+    if hub is not None and not all(_shows(hub, w) for w in layout.walls if isinstance(w, FreeWall)):
         raise LayoutError("a profile came out near the border of its type")
     layout = _rounded_feet(rng, layout)
-    drawn = draw_joins(rng, list(layout.walls), layout.gaps(n_u=81, n_v=3), wanted, KINDS) if wanted else []
-    layout = replace(layout, connections=drawn)
-    return _windows(rng, layout) if rng.random() < 0.15 else layout
+    check(layout)
+    gaps = layout.gaps(n_u=121, n_v=3, exact=False)
+    layout = replace(layout, connections=draw_joins(rng, layout.walls, gaps, wanted, KINDS))
+    return _windows(rng, layout, gaps) if rng.random() < 0.15 else layout
 
 
 def mixed_linear(rng: Generator, **overrides: Any) -> Layout:
@@ -209,7 +212,7 @@ def _straight(rng: Generator, style: Style, a: tuple[float, float], b: tuple[flo
 
 
 def _slide(placed: list[FreeWall], arriving: list[FreeWall], gap: float, way: tuple[float, float]) -> float:
-    """How far walls must move along ``way`` (unit, mm) to stand ``gap`` mm from placed ones, coming from beyond them."""
+    """How far, mm, walls must move along ``way`` (unit) to stand ``gap`` mm from placed ones, coming from beyond."""
     z = placed[0].z_floor
     levels = [z + f * max(w.height for w in placed + arriving) for f in (0.0, 0.5, 1.0)]
     there = [unary_union([w.section(min(h, w.z_top)) for w in placed]) for h in levels]
@@ -278,7 +281,7 @@ def _radial(rng: Generator, count: int, style: Style) -> Layout:
     split = count % 2 == 0 and count >= 6 and rng.random() < 0.6
     bore = float(rng.uniform(8.0, 9.0) + 0.45 * max(count - 6, 0))
     radius = bore + float(rng.uniform(20, 27))
-    disc = HubDisc(radius=round(radius + 4.0, 1), thickness=style.z, hub_radius=(bore, bore - 1.0), hub_height=style.height + 2)
+    disc = HubDisc(round(radius + 4.0, 1), style.z, (bore, bore - 1.0), style.height + 2.0)
     kinds = [_blade_type(rng), _blade_type(rng)]
     seeds = rng.integers(2**31, size=2)
     walls = []
@@ -308,7 +311,7 @@ def _rounded_feet(rng: Generator, layout: Layout) -> Layout:
     return replace(layout, fillet=round(radius, 2)) if nearest > 2.0 * radius + 0.4 else layout
 
 
-def _windows(rng: Generator, layout: Layout) -> Layout:
+def _windows(rng: Generator, layout: Layout, gaps: list[Gap]) -> Layout:
     """An opening through one wall, clear of everything else; the layout unchanged where 20 draws found no place."""
     for _ in range(20):
         k = int(rng.integers(len(layout.walls)))
@@ -319,6 +322,6 @@ def _windows(rng: Generator, layout: Layout) -> Layout:
             continue
         z = float(rng.uniform(low, wall.z_top - 2.0 - tall))
         window = WindowSpec(k, wall, u, width, (z, z + tall))
-        if window.fits(layout):
+        if window.fits(layout, gaps):
             return replace(layout, windows=[window])
     return layout

@@ -38,13 +38,14 @@ _TWO_LOBES = [(1.0, -0.6), (1.5, 0.0), (0.9, 0.7), (0.2, -0.35), (-0.3, 1.2), (-
 
 BENDS: dict[str | None, tuple[int, ...]] = {
     None: (), "C1": (UP,), "C2": (UP, DOWN, UP), "C3": (UP, DOWN) * 2 + (UP,), "C4": (DOWN,),
-    "C7": (UP, DOWN) * 2 + (UP,), "C8": (UP, DOWN) * 2 + (UP,), "C9": (UP, DOWN) * 2 + (UP,), "C10": (UP, DOWN) * 3 + (UP,),
+    "C7": (UP, DOWN) * 2 + (UP,), "C8": (UP, DOWN) * 2 + (UP,), "C9": (UP, DOWN) * 2 + (UP,),
+    "C10": (UP, DOWN) * 3 + (UP,),
 }
 """Bends that each open type is drawn with, walking with the void on the left."""
 
 OTHER_SIDE: dict[str | None, str | None] = {
-    None: None, "C1": "C4", "C2": "C1", "C3": "C2", "C4": "C1", "C5": "C5", "C6": "C6", "C7": "C2", "C8": "C2", "C9": "C2",
-    "C10": "C3", "oval": "C4",
+    None: None, "C1": "C4", "C2": "C1", "C3": "C2", "C4": "C1", "C5": "C5", "C6": "C6", "C7": "C2", "C8": "C2",
+    "C9": "C2", "C10": "C3", "oval": "C4",
 }
 """Type seen from the other side, set by hand: ups become downs, and the number of ups decides first."""
 
@@ -170,7 +171,8 @@ def bends(points: F64, closed: bool = False) -> list[tuple[float, float]]:
     runs = np.split(np.arange(len(turn)), cut)
     if closed and len(runs) > 1 and np.sign(turn[0]) == np.sign(turn[-1]):
         runs = [np.concatenate([runs[-1], runs[0]]), *runs[1:-1]]
-    return [(float(np.degrees(turn[r].sum())), float(curvature[r].std() / max(abs(curvature[r].mean()), 1e-12))) for r in runs]
+    spread = [float(curvature[r].std() / max(abs(curvature[r].mean()), 1e-12)) for r in runs]
+    return [(float(np.degrees(turn[r].sum())), v) for r, v in zip(runs, spread, strict=True)]
 
 
 def skew(points: F64) -> float:

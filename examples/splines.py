@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
 F64 = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def interpolate_closed(parameters: F64, points: F64) -> BSpline:
     points     : (n, d) float64, mm, the last equal to the first
     Returns scipy BSpline, twice differentiable across the seam.
     """
-    slope = make_interp_spline(parameters, points, k=3, bc_type="periodic").derivative()(parameters[0])
+    slope = CubicSpline(parameters, points, bc_type="periodic")(parameters[0], 1)
     return make_interp_spline(parameters, points, k=3, bc_type=([(1, slope)], [(1, slope)]))
 
 

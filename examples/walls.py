@@ -75,7 +75,7 @@ class WallSpec:
         p = self.centre_line(np.linspace(0.0, 1.0, 401))
         return float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Box of floor and top in plan: x0, y0, x1, y1, mm."""
         boxes = np.array([self.section(z).bounds for z in (self.z_floor, self.z_top)])
@@ -107,6 +107,10 @@ class WallSpec:
     def _rails(self) -> dict[tuple[int, int], BSpline]:
         return {(side, end): self._rail(side, float(end)) for side in (LEFT, RIGHT) for end in (0, 1)}
 
+    @cached_property
+    def _slopes(self) -> dict[tuple[int, int], BSpline]:
+        return {key: rail.derivative() for key, rail in self._rails.items()}
+
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface.
 
@@ -126,7 +130,7 @@ class WallSpec:
         """
         lo, hi = self._rails[side, 0], self._rails[side, 1]
         w = np.asarray(v)[..., None]
-        dlo, dhi = lo.derivative()(u), hi.derivative()(u)
+        dlo, dhi = self._slopes[side, 0](u), self._slopes[side, 1](u)
         return np.asarray(dlo + (dhi - dlo) * w), np.asarray(hi(u) - lo(u))
 
     def side_normal(self, side: int, u: F64, v: F64) -> F64:
@@ -138,6 +142,17 @@ class WallSpec:
         du, dv = self.side_derivatives(side, u, v)
         n = -side * np.cross(du, dv)
         return np.asarray(n / np.linalg.norm(n, axis=-1)[..., None])
+
+    @cached_property
+    def _coarse(self) -> dict[int, tuple[F64, F64]]:
+        u = np.linspace(0.0, 1.0, self.segments + 1)
+        low, high = np.zeros(len(u)), np.ones(len(u))
+        return {s: (self.side_point(s, u, low)[:, :2], self.side_point(s, u, high)[:, :2]) for s in (LEFT, RIGHT)}
+
+    def trace(self, side: int, v: float) -> F64:
+        """A side cut at share v of the height by ``segments`` chords, (segments + 1, 2) float64, mm."""
+        low, high = self._coarse[side]
+        return np.asarray(low + (high - low) * v)
 
     def section(self, z: float, samples: int = 121) -> Polygon:
         """The wall cut at height z, as a shapely polygon (mm); ``samples`` points a side."""
