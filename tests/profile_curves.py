@@ -124,19 +124,18 @@ def multiple(rng: Generator) -> Drawn:
 
 def five_closed(rng: Generator) -> Drawn:
     """Four control points a lobe: two outside, two inside."""
-    a = rng.uniform(0.15, 0.35)
+    a = rng.uniform(0.2, 0.4)
     r = np.tile([1 + a, 1 + a, 1 - a, 1 - a], 5) * rng.uniform(0.96, 1.04, 20)
     t = (np.arange(20) + rng.uniform(-0.1, 0.1, 20)) * 2 * np.pi / 20
     return _ring(np.column_stack([r * np.cos(t), r * np.sin(t)]), rng)
 
 
 def two_closed(rng: Generator) -> Drawn:
-    """An oval 1.8 to 4 times as long as wide, one end up to twice as wide as the other, or drawn in at the waist."""
+    """Two lobes of sixteen control points round a centre, one up to 1.7 times as long, and a deep waist."""
     n = 16
-    t = (np.arange(n) + rng.uniform(-0.1, 0.1, n)) * 2 * np.pi / n
-    end = 1 + rng.uniform(0, 0.33) * np.cos(t)
-    waist = 1 - rng.uniform(0, 0.4) * np.sin(t) ** 2 * (rng.random() < 0.4)
-    return _ring(np.column_stack([rng.uniform(1.8, 4.0) * np.cos(t), end * waist * np.sin(t)]), rng)
+    t = (np.arange(n) + rng.uniform(-0.08, 0.08, n)) * 2 * np.pi / n
+    r = (1 + rng.uniform(0.6, 0.8) * np.cos(2 * t)) * (1 + rng.uniform(0, 0.25) * np.cos(t))
+    return _ring(np.column_stack([r * np.cos(t), r * np.sin(t)]), rng)
 
 
 DRAW: dict[str, Callable[[Generator], Drawn]] = {

@@ -11,8 +11,7 @@ Notation
 Weak legs are taken away one by one, the weakest first, and their neighbours grow together, as in a walk with
 hysteresis. Those left at strength 1 are the bends. The whole series is kept, since it says how far the curve is
 from another count.
-On a closed curve theta is measured against a circle walked at the same speed, so that an up bend is where the curve
-turns right more than its mean; an oval has two, a circle none.
+A closed curve without a turn back, such as an oval, is one bend of a whole turn.
 """
 
 from __future__ import annotations
@@ -36,6 +35,8 @@ STEPS = 1200
 TURN, HEIGHT, ERRORS = float(np.radians(20.0)), 0.002, 6.0
 # Distances below this share of the size of a curve are taken for zero when the number of control points is chosen.
 FLOOR = 2e-4
+# A walk round a ring starts in its second round, and looks half a round beyond both ends.
+ROUNDS = 4
 # Legs that turn by less (rad) are not looked at one by one.
 RIPPLE = float(np.radians(0.2))
 # The middle half of the turn of a bend against what lies between a twentieth from either end of it.
@@ -57,7 +58,7 @@ class Bend:
     """A stretch of a curve that turns one way.
 
     way        : Way
-    turn       : rad, positive; against the mean turn where the curve is closed
+    turn       : rad, positive
     start, end : shares of the length, 0..1; ``end`` of a closed curve may lie beyond 1
     roundness  : length of the middle half of the turn over that of an arc; an arc has 1, a flat sine 0.84
     """
@@ -83,7 +84,7 @@ class BendMeasures:
     """What the profile types are decided by.
 
     closed : a ring
-    levels : BendLevel by rising strength, from 0 to infinity; the last has no bend
+    levels : BendLevel by rising strength, from 0 to infinity; the last has no bend, or the one of a ring
     skew   : the centroid of the area between curve and chord, along the chord, off its middle, in chords; negative
              towards the start. 0 when closed
     turn   : rad, whole turn of the tangent, positive to the left
@@ -124,17 +125,12 @@ def measure_bends(points: ArrayLike, closed: bool = False) -> BendMeasures:
     u = np.linspace(0.0, 1.0, STEPS + 1)
     p = spline.at(u)
     s, theta = _directions(spline, u)
-    turn, skew, size = float(theta[-1] - theta[0]), 0.0, size_of(p, closed)
+    turn, size = float(theta[-1] - theta[0]), size_of(p, closed)
+    height = max(HEIGHT * size, ERRORS * error)
     if closed:
-        theta = theta - turn * s
-        top = int(np.argmax(theta[:-1]))
-        s = np.concatenate([s[top:-1], s[:top + 1] + 1.0])
-        theta = np.concatenate([theta[top:-1], theta[:top + 1]])
-        p = _unrolled(s, theta, float(arc_length(p)[-1]))
-    else:
-        skew = _skew(p)
-    legs = _Legs(s, theta, p, closed, max(HEIGHT * size, ERRORS * error))
-    return BendMeasures(closed, _levels(legs), skew, turn, spline)
+        return BendMeasures(True, _levels(_ring(s, theta, p, height)), 0.0, turn, spline)
+    legs = _Legs(s, theta, p, height, 0)
+    return BendMeasures(False, _levels(legs), _skew(p), turn, spline)
 
 
 def size_of(points: F64, closed: bool) -> float:
@@ -178,12 +174,6 @@ def _directions(spline: SplineCurve, u: F64) -> tuple[F64, F64]:
     return s / s[-1], np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
 
 
-def _unrolled(s: F64, theta: F64, length: float) -> F64:
-    """The curve of given directions; heights of the bends of a ring are measured on the ring without its mean turn."""
-    step = np.diff(s)[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])[:-1]
-    return length * np.vstack([np.zeros((1, 2)), np.cumsum(step, axis=0)])
-
-
 def _skew(p: F64) -> float:
     chord = p[-1] - p[0]
     size = float(np.linalg.norm(chord))
@@ -200,44 +190,98 @@ def _skew(p: F64) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Legs:
-    """Share of length, direction (rad) and place (mm) along a curve; ``height`` (mm) is that of noise."""
+    """Share of length, direction (rad) and place (mm) along a curve; ``height`` (mm) is that of noise.
+
+    period : steps once round a ring, whose arrays hold ``ROUNDS`` rounds; 0 for an open curve
+    """
 
     s: F64
     theta: F64
     p: F64
-    closed: bool
     height: float
+    period: int
 
-    def strength(self, pivots: list[int], k: int) -> float:
-        """Of the leg from pivot k to the next."""
-        i, j = pivots[k], pivots[k + 1]
-        turn = float(self.theta[j] - self.theta[i])
-        # Sharp bends are low themselves; what shows is how far they stand out between the middles of their neighbours.
-        before = (pivots[k - 1] + i) // 2 if k > 0 else i
-        after = (j + pivots[k + 2]) // 2 if k + 2 < len(pivots) else j
-        height = max(self._height(i, j, i, j, turn), self._height(before, after, i, j, turn))
-        return min(abs(turn) / TURN, height / self.height)
+    def pivots(self) -> list[int]:
+        """Where the direction turns back; of a ring from its second round on, as many highest as lowest."""
+        if not self.period:
+            return _pivots(self.theta.tolist(), RIPPLE)
+        falling = self.theta if self.theta[-1] < self.theta[0] else -self.theta
+        # From the end of the greatest turn back, so that the walk starts and ends on one of the extremes.
+        rise = falling - np.minimum.accumulate(falling)
+        first = int(np.argmax(rise)) % self.period + self.period
+        found = [first + k for k in _pivots(falling[first:first + self.period + 1].tolist(), RIPPLE)][:-1]
+        return found[:len(found) - len(found) % 2]
 
-    def _height(self, a: int, b: int, i: int, j: int, turn: float) -> float:
+    def ends(self, pivots: list[int]) -> list[int]:
+        """Pivots with that which ends the last leg."""
+        return [*pivots, pivots[0] + self.period] if self.period and pivots else pivots
+
+    def strengths(self, pivots: list[int]) -> list[float]:
+        """Of every leg; sharp bends are low themselves but stand out between their neighbours."""
+        ends = self.ends(pivots)
+        middle = [(i + j) // 2 for i, j in zip(ends[:-1], ends[1:], strict=True)]
+        before, after = [ends[0], *middle[:-1]], [*middle[1:], ends[-1]]
+        if self.period:
+            before[0], after[-1] = middle[-1] - self.period, middle[0] + self.period
+        out = []
+        for i, j, a, b in zip(ends[:-1], ends[1:], before, after, strict=True):
+            turn = float(self.theta[j] - self.theta[i])
+            high = max(self._bulge(i, j, i, j, turn), self._bulge(a, b, i, j, turn))
+            out.append(min(abs(turn) / TURN, high / self.height))
+        return out
+
+    def _bulge(self, a: int, b: int, i: int, j: int, turn: float) -> float:
         """How far the curve from i to j bulges over the chord from a to b, mm."""
         chord, rest = self.p[b] - self.p[a], self.p[i:j + 1] - self.p[a]
         left = (chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / max(float(np.linalg.norm(chord)), 1e-12)
         return max(0.0, float((left if turn < 0 else -left).max()))
 
+    def without(self, pivots: list[int], leg: int) -> list[int]:
+        """Pivots after a leg has gone: its neighbours become one, or the end of an open curve moves in."""
+        last = len(self.ends(pivots)) - 2
+        if self.period:
+            return [k for i, k in enumerate(pivots) if i not in (leg, (leg + 1) % len(pivots))]
+        if 0 < leg < last:
+            return pivots[:leg] + pivots[leg + 2:]
+        return pivots[1:] if leg == 0 else pivots[:-1]
+
+    def bends(self, pivots: list[int]) -> tuple[Bend, ...]:
+        """One for every leg; a ring that never turns back is one."""
+        ends = self.ends(pivots)
+        if self.period and not pivots:
+            ends = [self.period, 2 * self.period]
+        legs = zip(ends[:-1], ends[1:], strict=True)
+        return tuple(self._bend(i, j) for i, j in legs if self.theta[i] != self.theta[j])
+
+    def _bend(self, i: int, j: int) -> Bend:
+        turn = float(self.theta[j] - self.theta[i])
+        rounds = float(np.floor(self.s[i]))
+        roundness = _roundness(self.s[i:j + 1], self.theta[i:j + 1])
+        way = Way.UP if turn < 0 else Way.DOWN
+        return Bend(way, abs(turn), float(self.s[i]) - rounds, float(self.s[j]) - rounds, roundness)
+
+
+def _ring(s: F64, theta: F64, p: F64, height: float) -> _Legs:
+    """Several rounds of a closed curve whose last row is its first again."""
+    n, turn = len(s) - 1, theta[-1] - theta[0]
+    rounds = np.repeat(np.arange(ROUNDS), n)
+    shares, directions = np.tile(s[:-1], ROUNDS) + rounds, np.tile(theta[:-1], ROUNDS) + turn * rounds
+    return _Legs(shares, directions, np.tile(p[:-1], (ROUNDS, 1)), height, n)
+
 
 def _levels(legs: _Legs) -> tuple[BendLevel, ...]:
-    """The series of bends from all to none."""
-    pivots = _pivots(legs.theta.tolist(), RIPPLE)
+    """The series of bends from all to none, or to the one bend of a ring that never turns back."""
+    pivots = legs.pivots()
     out: list[BendLevel] = []
     least = 0.0
     while len(pivots) > 1:
-        strength = [legs.strength(pivots, k) for k in range(len(pivots) - 1)]
+        strength = legs.strengths(pivots)
         weakest = int(np.argmin(strength))
         if strength[weakest] > least:
-            out.append(BendLevel(least, strength[weakest], _bends(legs.s, legs.theta, pivots)))
+            out.append(BendLevel(least, strength[weakest], legs.bends(pivots)))
             least = strength[weakest]
-        pivots = _without(pivots, weakest, legs.closed)
-    return (*out, BendLevel(least, np.inf, ()))
+        pivots = legs.without(pivots, weakest)
+    return (*out, BendLevel(least, np.inf, legs.bends(pivots[:0])))
 
 
 def _pivots(theta: list[float], ripple: float) -> list[int]:
@@ -253,26 +297,6 @@ def _pivots(theta: list[float], ripple: float) -> list[int]:
             way, high = 1, k
     out += [{-1: low, 0: 0, 1: high}[way], last]
     return [k for i, k in enumerate(out) if i == 0 or k > out[i - 1]]
-
-
-def _without(pivots: list[int], leg: int, closed: bool) -> list[int]:
-    last = len(pivots) - 2
-    if closed and last < 2:
-        return []
-    if 0 < leg < last:
-        return pivots[:leg] + pivots[leg + 2:]
-    if closed:
-        return pivots[:1] + pivots[3:] if leg == 0 else pivots[:-3] + pivots[-1:]
-    return pivots[1:] if leg == 0 else pivots[:-1]
-
-
-def _bends(s: F64, theta: F64, pivots: list[int]) -> tuple[Bend, ...]:
-    out = []
-    for i, j in zip(pivots[:-1], pivots[1:], strict=True):
-        turn = float(theta[j] - theta[i])
-        way = Way.UP if turn < 0 else Way.DOWN
-        out.append(Bend(way, abs(turn), float(s[i]), float(s[j]), _roundness(s[i:j + 1], theta[i:j + 1])))
-    return tuple(out)
 
 
 def _roundness(s: F64, theta: F64) -> float:

@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike
 from geometry.arrays import finite_points
 from zones.bends import Bend, BendMeasures, Way, measure_bends
 
+# Limits of the table; beyond the last relative distance there is no second type.
 SKEW = 0.10
 ROUND = 0.88
-FIVE = 5
+NOTHING_NEAR = 0.99
 
 
 class ProfileType(StrEnum):
@@ -37,7 +38,7 @@ class ProfileType(StrEnum):
     C5 = "C5"
     """Five up, closed."""
     C6 = "C6"
-    """Two, closed, with ends that may differ."""
+    """Two up, closed, with ends that may differ."""
     C7 = "C7"
     """Triple up, to the left."""
     C8 = "C8"
@@ -64,6 +65,11 @@ LEVEL: dict[ProfileType, Level] = {
 }
 """Level of each type; a straight curve is simple."""
 
+OPEN = {0: ProfileType.C4, 1: ProfileType.C1, 2: ProfileType.C2}
+"""Type by number of up bends, where that alone decides; more than three are C10."""
+CLOSED = {0: ProfileType.C4, 1: ProfileType.C1, 2: ProfileType.C6, 5: ProfileType.C5}
+"""The same on a ring; other numbers are C10."""
+
 
 class VoidSide(StrEnum):
     """Where the void lies for who walks along the points."""
@@ -80,8 +86,8 @@ class Profile:
     level     : Level
     margin    : 0..1, the least relative change of one measure (strength of a bend, skew, roundness) that would give
                 another type: |measure - limit| over the greater of the two
-    second    : the type on the other side of that limit
-    bends     : tuple of Bend, in walking order; on a ring from the least curvature on
+    second    : the type on the other side of that limit; None for straight, and where nothing is near (margin 1)
+    bends     : tuple of Bend, in walking order; on a ring from its least curvature on
     skew      : centroid of the area between curve and chord off the middle, in chords, negative to the left
     roundness : mean over the up bends, 1 for arcs; 0 without any
     closed    : a ring
@@ -134,28 +140,18 @@ def roundness_of(bends: tuple[Bend, ...]) -> float:
 
 def _decide(measures: BendMeasures, bends: tuple[Bend, ...], skew: float, roundness: float) -> ProfileType | None:
     """The decision table."""
-    ups = sum(b.way == Way.UP for b in bends)
-    if measures.closed:
-        return _decide_closed(measures.turn, ups)
     if not bends:
         return None
-    if ups == 3:
-        return _decide_triple(skew, roundness)
-    return {0: ProfileType.C4, 1: ProfileType.C1, 2: ProfileType.C2}.get(ups, ProfileType.C10)
+    ups = sum(b.way == Way.UP for b in bends)
+    if measures.closed:
+        return CLOSED.get(ups, ProfileType.C10)
+    return _decide_triple(skew, roundness) if ups == 3 else OPEN.get(ups, ProfileType.C10)
 
 
 def _decide_triple(skew: float, roundness: float) -> ProfileType:
     if abs(skew) > SKEW:
         return ProfileType.C7 if skew < 0 else ProfileType.C8
     return ProfileType.C9 if roundness >= ROUND else ProfileType.C3
-
-
-def _decide_closed(turn: float, ups: int) -> ProfileType:
-    if ups == 0:
-        return ProfileType.C1 if turn < 0 else ProfileType.C4
-    if ups <= 2:
-        return ProfileType.C6
-    return ProfileType.C5 if ups == FIVE else ProfileType.C10
 
 
 def _nearest_other(measures: BendMeasures, place: int, kind: ProfileType | None) -> tuple[float, ProfileType | None]:
@@ -177,7 +173,7 @@ def _nearest_other(measures: BendMeasures, place: int, kind: ProfileType | None)
     across = ROUND * (0.99 if roundness >= ROUND else 1.01)
     found.append((_relative(abs(skew), SKEW), _decide(measures, bends, float(beyond), roundness)))
     found.append((_relative(roundness, ROUND), _decide(measures, bends, skew, across)))
-    others = [(m, t) for m, t in found if t != kind]
+    others = [(m, t) for m, t in found if t != kind and m < NOTHING_NEAR]
     return min(others, key=lambda f: f[0]) if others else (1.0, None)
 
 
@@ -186,10 +182,10 @@ def _relative(measure: float, limit: float) -> float:
 
 
 def _ordered(measures: BendMeasures, bends: tuple[Bend, ...]) -> tuple[Bend, ...]:
-    """In walking order; on a ring from the place of the least curvature."""
-    if not measures.closed or not bends:
+    """In walking order; on a ring from the bend that holds the least curvature, counted the way the ring turns."""
+    if not measures.closed or len(bends) < 2:
         return bends
     u = np.linspace(0.0, 1.0, 720, endpoint=False)
-    start = float(u[int(np.argmin(np.abs(measures.spline.curvature(u))))])
-    first = int(np.argmin([(0.5 * (b.start + b.end) - start) % 1.0 for b in bends]))
+    at = float(u[int(np.argmin(np.copysign(1.0, measures.turn) * measures.spline.curvature(u)))])
+    first = int(np.argmin([abs((at - 0.5 * (b.start + b.end) + 0.5) % 1.0 - 0.5) for b in bends]))
     return bends[first:] + bends[:first]

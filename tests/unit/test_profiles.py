@@ -59,8 +59,10 @@ def test_equation_three_is_single_up_or_down_with_the_side_of_the_void() -> None
     (polar(1.0), True, "C4"), (polar(1.0)[::-1], True, "C1"),
     (polar(1 + 0.2 * np.cos(3 * T)), True, "C10"), (polar(1 + 0.2 * np.cos(4 * T)), True, "C10"),
     (polar(1 + 0.2 * np.cos(5 * T)), True, "C5"), (polar(1 + 0.2 * np.cos(6 * T)), True, "C10"),
-    (polar(1 + 0.2 * np.cos(5 * T))[::-1], True, "C5"), (polar(1 + 0.2 * np.cos(2 * T)), True, "C6"),
-    ([(0, 0), (0, 30), (50, 30), (50, 0)], True, "C10"), ([(0, 0), (0, 3), (50, 3), (50, 0)], True, "C6"),
+    (polar(1 + 0.2 * np.cos(5 * T))[::-1], True, "C5"), (polar(1 + 0.6 * np.cos(2 * T)), True, "C6"),
+    (polar(1 + 0.6 * np.cos(2 * T))[::-1], True, "C6"), (polar(1.0) * [3, 1], True, "C4"),
+    ([(0, 0), (0, 30), (50, 30), (50, 0)], True, "C1"), ([(50, 0), (50, 30), (0, 30), (0, 0)], True, "C4"),
+    ([(0, 0), (0, 30), (20, 30), (20, 10), (30, 10), (30, 30), (50, 30), (50, 0)], True, "C1"),
 ])
 def test_every_curve_has_its_place_in_the_table(points, closed, kind) -> None:
     assert classify(points, closed).type == kind
@@ -135,12 +137,23 @@ def test_arcs_are_round_and_sines_are_not() -> None:
         assert classify(wave(3, slope)).roundness < ROUND - 0.06
 
 
-def test_bends_of_a_ring_start_behind_its_least_curvature() -> None:
-    """An egg: the flanks are its straightest places; the bend that comes first is the same wherever the list starts."""
-    egg = np.column_stack([2 * np.cos(T), np.sin(T) * (1 + 0.3 * np.cos(T))])
-    first = [classify(np.roll(egg, k, axis=0), True).bends[0] for k in (0, 37, 211)]
-    assert {b.way for b in first} == {first[0].way}
-    assert [b.turn for b in first] == pytest.approx([first[0].turn] * 3, rel=0.02)
+def test_bends_of_a_ring_start_at_its_least_curvature() -> None:
+    """Two lobes of different size: the bends come in the same order wherever the list of points starts."""
+    ring = polar((1 + 0.6 * np.cos(2 * T)) * (1 + 0.2 * np.cos(T)) * (1 + 0.15 * np.sin(T)))
+    lists = [classify(np.roll(ring, k, axis=0), True).bends for k in (0, 37, 211)]
+    for other in lists[1:]:
+        assert [b.way for b in other] == [b.way for b in lists[0]]
+        assert [b.turn for b in other] == pytest.approx([b.turn for b in lists[0]], rel=0.02)
+    assert lists[0][0].way == Way.UP
+    turns = [b.turn * (-1 if b.way == Way.UP else 1) for b in lists[0]]
+    assert sum(turns) == pytest.approx(2 * np.pi, rel=1e-6)
+
+
+def test_a_ring_that_never_turns_back_is_one_bend_of_a_whole_turn() -> None:
+    for points, kind in ((polar(1.0) * [1.5, 1], "C4"), ((polar(1.0) * [1.5, 1])[::-1], "C1")):
+        found = classify(points, True)
+        assert found.type == kind and len(found.bends) == 1
+        assert found.bends[0].turn == pytest.approx(2 * np.pi) and found.margin == 1.0 and found.second is None
 
 
 @pytest.mark.parametrize("points", [[(0, 0)], [(1, 1), (1, 1)], np.zeros((0, 2)), [(0, 0), (np.inf, 1)], [(0, 0, 1)]])
