@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from geometry.errors import SetupError
 from output.linuxcnc import write_linuxcnc
 from output.model import StockBox, Workplan
 from output.stepnc_aim import write_stepnc_aim
@@ -27,7 +28,7 @@ from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
 from service.scoring import Score, score
-from service.sides import Side, file_name, in_first_frame, joined_proofs
+from service.sides import Side, file_name, in_first_frame, in_setup_frame, joined_proofs
 from service.version import VERSION
 from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
@@ -140,23 +141,29 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
     return out
 
 
-def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress) -> dict[str, Any]:
+def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
+                   access: str | None = None) -> dict[str, Any]:
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
-    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding.
+    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
+    frame of one access, the first where ``access`` is None.
 
     Raises
     ------
     CamError
-        As ``plan``; ``ProgramError`` where the program cannot be read.
+        As ``plan``; ``ProgramError`` where the program cannot be read, ``SetupError`` (``no_such_access``).
     """
+    known = [a.id for a in setup.access]
+    if access is not None and access not in known:
+        raise SetupError(f"the setup has no access {access}; it has {', '.join(known)}", code="no_such_access",
+                         subjects=(access,), remedy="name one of them, or leave it out for the first")
     ready = prepare(part_path, setup, progress)
-    view = ready.views[0]
-    dense = score(ready).samples
+    view = ready.view(access or known[0])
+    dense = turned_samples(score(ready).samples, view.rotation @ view.first.T)
     proof = prove([("program", program_text)], view.part, tool_bodies(setup), proof_setup(ready, view),
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f))
     progress("done", 1.0)
-    return reporting.verification_report(ready, proof, dense)
+    return reporting.verification_report(ready, in_setup_frame(view, proof), dense)
 
 
 def cut_table(setup: Setup) -> dict[str, CutData]:

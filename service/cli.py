@@ -1,4 +1,4 @@
-"""``zonemill``: plan, zones, verify, serve, demo, warm, openapi.
+"""``zonemill``: plan, zones, verify, serve, demo, family, warm, openapi.
 
 Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
 stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
@@ -61,6 +61,8 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
 @app.command()
 def verify(part: Part, setup: SetupPath,
            program: Annotated[Path, typer.Option("--program", metavar="FILE.ngc", help="The NC program.")],
+           access: Annotated[str | None, typer.Option(help="Access of the setup the program is for; default the "
+                                                          "first.")] = None,
            as_json: AsJson = False) -> None:
     """Prove any program, also a foreign one; prints the findings."""
 
@@ -68,7 +70,7 @@ def verify(part: Part, setup: SetupPath,
         from service.chain import verify_program
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        result = verify_program(part, given, read_program(program), progress)
+        result = verify_program(part, given, read_program(program), progress, access)
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     _exit(part, setup, run, as_json)
@@ -103,6 +105,29 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
 
 
 @app.command()
+def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.",
+                                             show_default=False)],
+           recipe: Annotated[str, typer.Option(help="What is drawn; docs/family.md lists the recipes.")] = "mixed",
+           seed: Annotated[int, typer.Option(min=0, help="Of the first part; the same seed gives the same part.")] = 0,
+           count: Annotated[int, typer.Option(min=1, help="Parts, with seeds one after the other.")] = 1,
+           walls: Annotated[int | None, typer.Option(help="Walls of each part; drawn when left out.")] = None,
+           connections: Annotated[int | None, typer.Option(help="Connections; drawn when left out.")] = None,
+           reach: Annotated[bool, typer.Option("--reach", help="Compute what the setup can reach as well.")] = False,
+           as_json: AsJson = False) -> None:
+    """Write random test parts with truth: NAME.step, NAME.truth.json, NAME.setup.json; prints the list of files."""
+    with _errors(as_json):
+        from service.console import print_json, say
+
+        make_folder(out)
+        wanted = {k: v for k, v in (("walls", walls), ("connections", connections)) if v is not None}
+        files: list[str] = []
+        for number in range(seed, seed + count):
+            files += [str(path) for path in write_family_part(recipe, number, out, wanted, reach=reach)]
+            say(f"{recipe}-{number} written, {number - seed + 1} of {count}")
+        print_json(files)
+
+
+@app.command()
 def warm(as_json: AsJson = False) -> None:
     """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
     with _errors(as_json):
@@ -120,6 +145,38 @@ def openapi() -> None:
     from service.openapi import as_yaml
 
     sys.stdout.write(as_yaml(create_app().openapi()))
+
+
+def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int], *, reach: bool) -> tuple[Path, ...]:
+    """Write one part of the family; returns its three paths.
+
+    wanted : walls and connections asked for, where the recipe lets one choose
+    reach  : whether the truth says what the suggested setup can reach
+
+    Raises
+    ------
+    InputError
+        There is no such recipe (``unknown_recipe``), it lets one choose nothing of the kind (``not_of_this_recipe``),
+        or no draw kept the rules of the family (``impossible_layout``).
+    """
+    import inspect
+
+    from examples.family import RECIPES, make_part
+    from examples.layout import LayoutError
+    from geometry.errors import InputError
+
+    if recipe not in RECIPES:
+        raise InputError(f"the family has no recipe {recipe!r}", code="unknown_recipe", measured=recipe,
+                         limit=sorted(RECIPES), remedy="take one of the recipes listed")
+    takes = inspect.signature(RECIPES[recipe]).parameters
+    if any(key not in takes for key in wanted):
+        raise InputError(f"recipe {recipe} sets its own number of walls and connections", code="not_of_this_recipe",
+                         subjects=tuple(wanted), remedy="leave --walls and --connections out, or take recipe mixed")
+    try:
+        return make_part(seed, recipe, **wanted).write(out, reach=reach)
+    except LayoutError as error:
+        raise InputError(f"no part for recipe {recipe} and seed {seed}: {error}", code="impossible_layout",
+                         remedy="take another seed, or fewer walls and connections") from None
 
 
 def make_folder(out: Path) -> None:

@@ -32,17 +32,24 @@ def file_name(view: View, stem: str, end: str) -> str:
     return f"{stem}.{end}" if view.is_first else f"{stem}.{view.id}.{end}"
 
 
+def in_setup_frame(view: View, proof: Proof) -> Proof:
+    """The proof with the places of its findings in the setup frame."""
+    if np.array_equal(view.rotation, np.eye(3)):
+        return proof
+    return replace(proof, findings=tuple(
+        f if f.point is None else replace(f, point=tuple(view.back(np.array(f.point)).tolist()))
+        for f in proof.findings))
+
+
 def joined_proofs(sides: Sequence[Side]) -> Proof:
     """One proof of a job of several programs; places of findings in the setup frame.
 
     A sample is proved when some program leaves it inside the budget and none gouges it: what stands on it after
     the others is for that program to take off. Residuals are those of the program that leaves least.
     """
-    proofs = [s.proof for s in sides]
-    findings = [replace(f, point=None if f.point is None else tuple((np.array(f.point) @ s.view.rotation).tolist()))
-                for s in sides for f in s.proof.findings]
+    proofs = [in_setup_frame(s.view, s.proof) for s in sides]
     if len(sides) == 1:
-        return replace(proofs[0], findings=tuple(findings))
+        return proofs[0]
     residual = np.stack([p.residual for p in proofs])
     best = residual.argmin(axis=0)
     rows = np.arange(residual.shape[1])
@@ -55,7 +62,7 @@ def joined_proofs(sides: Sequence[Side]) -> Proof:
         minutes.update(side.proof.minutes)
         own = {p.zone.id for p in side.made.zones}
         zones.update({k: z for k, z in side.proof.zones.items() if k in own or k not in zones})
-    top, _ = ordered(findings)
+    top, _ = ordered([f for p in proofs for f in p.findings])
     return replace(
         proofs[0], findings=top, counts=dict(sorted(counts.items())), residual=residual[best, rows],
         line=np.stack([p.line for p in proofs])[best, rows], program=best.astype(np.int32), proved=proved, zones=zones,
@@ -74,4 +81,4 @@ def in_first_frame(side: Side) -> list[Workingstep]:
             for s in side.made.steps]
 
 
-__all__ = ["Side", "file_name", "in_first_frame", "joined_proofs"]
+__all__ = ["Side", "file_name", "in_first_frame", "in_setup_frame", "joined_proofs"]

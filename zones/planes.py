@@ -80,35 +80,43 @@ def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[Cutti
             b = sights[j]
             if float(a.view.direction @ b.view.direction) > OPPOSITE:
                 continue
-            both = np.any([a.gets(t) for t in a.reach], axis=0) & np.any([b.gets(t) for t in b.reach], axis=0)
-            for base, form, members in a.groups(both & (a.form == Form.STEEP)):
-                z, plane = a.samples.points[members, 2], common_plane(a, b, members, form)
-                if np.isfinite(plane):
-                    planes.append(CuttingPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
-                allowed[i][members[z < plane]] = False
-                allowed[j][members[z >= plane]] = False
+            for base, form, members in a.groups(np.asarray(a.form == Form.STEEP)):
+                through, plane = common_plane(a, b, members, form)
+                if not np.isfinite(plane):
+                    continue
+                planes.append(CuttingPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
+                z = a.samples.points[through, 2]
+                allowed[i][through[z < plane]] = False
+                allowed[j][through[z >= plane]] = False
     return allowed, planes
 
 
-def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> float:
-    """Height in the frame of ``a`` of the plane between two opposite views; -inf where ``a`` needs none.
+def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> tuple[NDArray[np.int64], float]:
+    """What of some samples two opposite views share, and the height in the frame of ``a`` of the plane between them.
 
-    Asked of the stoutest tool whose cutting part touches most of the area, for what its shank and holder forbid.
+    Asked of the stoutest tool whose cutting part touches most of the samples that any touches from both sides. The
+    height is -inf where ``a`` needs no plane.
     """
-    z, area = a.samples.points[members, 2], a.samples.area[members]
-    fits = [t for t in a.order(form)
-            if area[a.can[t][members] & a.reach[t].by_cutter[members]].sum() >= FITS_SHARE * area.sum()]
-    if not fits:
-        return -np.inf
-    mine, other = (s.can[fits[0]][members] & s.reach[fits[0]].by_cutter[members] & ~s.reach[fits[0]].by_tool[members]
-                   for s in (a, b))
+    area = a.samples.area
 
-    def whole(missed: NDArray[np.bool_], rows: NDArray[np.bool_]) -> bool:
-        return bool(area[rows & missed].sum() <= (1.0 - SHARED_SHARE) * area[rows].sum())
+    def by_both(t: str) -> NDArray[np.int64]:
+        return members[(a.can[t] & a.reach[t].by_cutter & b.can[t] & b.reach[t].by_cutter)[members]]
 
-    if whole(mine, np.ones(len(z), np.bool_)):
-        return -np.inf
+    shared = {t: by_both(t) for t in a.order(form)}
+    most = max((float(area[rows].sum()) for rows in shared.values()), default=0.0)
+    if most <= 0.0:
+        return members[:0], -np.inf
+    tool = next(t for t, rows in shared.items() if area[rows].sum() >= FITS_SHARE * most)
+    rows = np.unique(np.concatenate(list(shared.values())))
+    z, by_a, by_b = a.samples.points[shared[tool], 2], *(s.reach[tool].by_tool[shared[tool]] for s in (a, b))
+
+    def whole(got: NDArray[np.bool_], where: NDArray[np.bool_]) -> bool:
+        mine = area[shared[tool]]
+        return bool(mine[where & ~got].sum() <= (1.0 - SHARED_SHARE) * mine[where].sum())
+
+    if whole(by_a, np.ones(len(z), np.bool_)):
+        return rows, -np.inf
     half = 0.5 * float(z.min() + z.max())
-    if whole(mine, z >= half) and whole(other, z < half):
-        return half
-    return float(z[mine].max()) + PLANE_MARGIN
+    if whole(by_a, z >= half) and whole(by_b, z < half):
+        return rows, half
+    return rows, float(z[~by_a].max()) + PLANE_MARGIN

@@ -207,7 +207,11 @@ def _strips_of(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: 
     start, normal = spread(curve.points, curve.closed, PITCH)
     if len(start) < 2:
         return [], []
-    origin = np.column_stack([start, np.full(len(start), curve.z)])
+    inset = start.copy()
+    if not curve.closed:  # a ray from the very end of a side would graze the end of the one it meets
+        inset[0] += CLEAR * np.array([normal[0, 1], -normal[0, 0]])
+        inset[-1] -= CLEAR * np.array([normal[-1, 1], -normal[-1, 0]])
+    origin = np.column_stack([inset, np.full(len(start), curve.z)])
     way = np.column_stack([normal, np.zeros(len(start))])
     far, hit = first_hits(tree, origin, way, max(skin, CLEAR))
     facing = np.einsum("ij,ij->i", mesh.normals[hit], way) < FACING

@@ -8,7 +8,7 @@ import pytest
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
 from zones.machinable import Form, forms_of, machinable_faces
-from zones.model import Channel, Connection, Decomposition, Wall
+from zones.model import Connection, Decomposition
 from zones.regions import Labels, face_bases
 from zones.sight import able, preference
 from zones.zoning import build_zones, is_open
@@ -44,29 +44,6 @@ def test_the_seat_and_what_faces_down_are_not_machinable():
     assert 1 not in faces and faces == set(range(2, int(mesh.face_ids.max()) + 1))
     assert machinable_faces(samples, Decomposition((), (), (), {}, (2,)), None, {3}) == faces - {2, 3}
     assert machinable_faces(samples, NOTHING, {4, 5}, {5}) == {4}
-
-
-def two_walls():
-    """Part of two upright walls, its decomposition written by hand, and the faces of the sides by wall and side."""
-    mesh = walls()
-    left = {s: face_at(mesh, (5 if s < 0 else 7, 7, 6), (s, 0, 0)) for s in (-1, 1)}
-    right = {s: face_at(mesh, (15 if s < 0 else 17, 7, 6), (s, 0, 0)) for s in (-1, 1)}
-    tops = face_at(mesh, (6, 7, 10), (0, 0, 1))
-    floor = face_at(mesh, (11, 7, 3), (0, 0, 1))
-    d = Decomposition((Wall("W1", (*left.values(), tops), tuple(left.values()), 2, 3, 10),
-                       Wall("W2", tuple(right.values()), tuple(right.values()), 2, 3, 10)), (),
-                      (Channel("H1", ("W1", "W2"), 8.0, (7, 7, 6)),), {floor: "floor"})
-    return mesh, d, left, right, tops, floor
-
-
-def test_walls_that_face_each_other_share_a_channel():
-    mesh, d, left, right, tops, floor = two_walls()
-    samples = samples_of(mesh, 5.0).subset(samples_of(mesh, 5.0).area > 0)
-    label = view_of(as_part(mesh), samples, {}, d).labels
-    region = {f: set(label.names[samples.face == f].tolist()) for f in range(1, len(as_part(mesh).faces) + 1)}
-    assert region[left[1]] == region[right[-1]] == {"H1"}
-    assert (region[left[-1]], region[right[1]]) == ({"W1"}, {"W2"})
-    assert (region[tops], region[floor], region[1]) == ({"top"}, {"floor"}, {"free"})
 
 
 def test_faces_of_a_connection_are_its_region():
