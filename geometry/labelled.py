@@ -12,10 +12,14 @@ from geometry.asker import Asker, Label, bisect
 from geometry.bend import bend
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64, I32
-from geometry.sheet import I64, Sheet, sides_of
+from geometry.sheet import BOOL, I64, Sheet, sides_of
 
 # Rounds of cutting sides that hold a third label; then the change nearest to one end is taken.
 SPLIT_ROUNDS = 4
+# Rounds of halving facets in which the border is far from straight, and how far: the middle of the cut misses it by
+# more than this fraction of the cut's length. What is left, ``bend`` takes off. Corners need the many rounds; ragged
+# borders end at so many new nodes for each crossing there was.
+CURVE_ROUNDS, CURVED, BUDGET = 8, 0.05, 8
 
 
 def label_sheet(sheet: Sheet, label: Label, tolerance: float) -> Sheet:
@@ -31,14 +35,16 @@ def label_sheet(sheet: Sheet, label: Label, tolerance: float) -> Sheet:
     at = ask(sheet.nodes, sheet.face)
     at = _probe(sheet, at, ask)
     sheet.first_cut = len(sheet.nodes)
-    pure = (at[sheet.corners] == at[sheet.corners[:, :1]]).all(axis=1)
-    whole = sheet.corners[pure]
-    sheet.corners = sheet.corners[~pure]
-    crossing = _crossings(sheet, at, ask, tolerance)
+    beside = np.zeros(len(at), bool)
+    beside[sheet.corners[(at[sheet.corners] != at[sheet.corners[:, :1]]).any(axis=1)]] = True
+    work = beside[sheet.corners].any(axis=1)
+    rest = sheet.corners[~work]
+    sheet.corners = sheet.corners[work]
+    crossing = _crossings(sheet, at, _shared_sides(sheet.corners, rest), ask, tolerance)
     _cut(sheet, *crossing, ask, tolerance)
     bend(sheet, ask, tolerance)
-    sheet.label = np.concatenate([at[whole[:, 0]], sheet.label])
-    sheet.corners = np.concatenate([whole, sheet.corners])
+    sheet.label = np.concatenate([at[rest[:, 0]], sheet.label])
+    sheet.corners = np.concatenate([rest, sheet.corners])
     return sheet
 
 
@@ -54,36 +60,82 @@ def _probe(sheet: Sheet, at: I64, ask: Asker) -> I64:
     return np.concatenate([at, here[new]])
 
 
-def _crossings(sheet: Sheet, at: I64, ask: Asker, tolerance: float) -> tuple[I64, I64, I64]:
+def _shared_sides(one: I64, two: I64) -> I64:
+    """Keys of the edges that facets of both sets have."""
+    low, high, _ = sides_of(one)
+    low_two, high_two, _ = sides_of(two)
+    return np.intersect1d(low << 32 | high, low_two << 32 | high_two, assume_unique=True)
+
+
+def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) -> tuple[I64, I64, I64]:
     """A node on every edge whose ends differ, at the change of label.
 
     Returns the labels (n,) of the nodes (of no meaning for crossings); (t, 3) edge numbers; (e,) crossing nodes or
-    -1. An edge that holds a third label is split there, with the facets beside it, and asked again.
+    -1. An edge that holds a third label is split there, with the facets beside it, and so are the sides of facets in
+    which the border is far from straight; but never the edges whose keys are ``fixed``, which facets elsewhere have.
     """
-    done_key, done_node = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    for round_ in range(SPLIT_ROUNDS + 1):
+    known = np.zeros((0, 2), np.int64)
+    curves, most = 0, np.inf
+    for round_ in range(SPLIT_ROUNDS + CURVE_ROUNDS + 1):
         low, high, sides = sides_of(sheet.corners)
         key = low << 32 | high
-        open_ = np.flatnonzero((at[low] != at[high]) & ~np.isin(key, done_key))
+        open_ = np.flatnonzero((at[low] != at[high]) & ~np.isin(key, known[:, 0]))
         a, b = low[open_], high[open_]
         share, third, label = bisect(ask, sheet.nodes[a], sheet.nodes[b], sheet.face[a], at[a], at[b], tolerance,
-                                     round_ < SPLIT_ROUNDS)
+                                     round_ - curves < SPLIT_ROUNDS)
         node = sheet.add(sheet.nodes[a] + share[:, None] * (sheet.nodes[b] - sheet.nodes[a]), sheet.face[a])
         at = np.concatenate([at, np.where(third, label, at[a])])
-        done_key = np.concatenate([done_key, key[open_[~third]]])
-        done_node = np.concatenate([done_node, node[~third]])
-        if not third.any():
-            break
+        known = np.concatenate([known, np.stack([key[open_], node], axis=1)[~third]])
+        crossing = _look_up(known, key)
         middle = np.full(len(low), -1)
         middle[open_[third]] = node[third]
+        if not third.any():
+            most = min(most, len(sheet.nodes) + BUDGET * len(known))
+            if curves == CURVE_ROUNDS or len(sheet.nodes) > most:
+                break
+            halved = _curved(sheet, at, sides, crossing, ask, tolerance)
+            halved = np.setdiff1d(halved, np.flatnonzero(np.isin(key, fixed))).astype(np.int64)
+            if not len(halved):
+                break
+            curves += 1
+            a, b = low[halved], high[halved]
+            middle[halved] = sheet.add(0.5 * (sheet.nodes[a] + sheet.nodes[b]), sheet.face[a])
+            at = np.concatenate([at, ask(sheet.nodes[middle[halved]], sheet.face[a])])
         sheet.corners = split(sheet.corners, sides, middle)
-    order = np.argsort(done_key)
-    found = np.minimum(np.searchsorted(done_key[order], key), max(len(order) - 1, 0))
-    crossing = np.full(len(key), -1)
-    if len(order):
-        hit = done_key[order][found] == key
-        crossing[hit] = done_node[order][found[hit]]
     return at, sides, crossing
+
+
+def _look_up(known: I64, key: I64) -> I64:
+    """(e,) the node of each key among the rows (key, node) of ``known``, -1 where there is none."""
+    if not len(known):
+        return np.full(len(key), -1)
+    known = known[np.argsort(known[:, 0])]
+    found = known[np.minimum(np.searchsorted(known[:, 0], key), len(known) - 1)]
+    return np.where(found[:, 0] == key, found[:, 1], -1)
+
+
+def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance: float) -> I64:
+    """Edge numbers of the facets with two labels whose border misses the middle of the cut by far, and of those with
+    three in which no place was found where they meet."""
+    m = crossing[sides]
+    two = np.flatnonzero((m >= 0).sum(axis=1) == 2)
+    turned = ((m[two] < 0).argmax(axis=1)[:, None] + 2 + np.arange(3)) % 3
+    c, x = (np.take_along_axis(v[two], turned, 1) for v in (sheet.corners, m))
+    p, q = sheet.nodes[x[:, 0]], sheet.nodes[x[:, 2]]
+    middle, corner = 0.5 * (p + q), sheet.nodes[c]
+    chord = np.linalg.norm((p - q)[:, :3], axis=1)
+    room = np.maximum(CURVED * chord, tolerance)
+    wrong = np.zeros(len(two), bool)
+    face = sheet.face[c[:, 0]]
+    for far, label in ((corner[:, 0], at[c[:, 0]]), (0.5 * (corner[:, 1] + corner[:, 2]), at[c[:, 1]])):
+        height = np.linalg.norm(np.cross((p - q)[:, :3], (far - q)[:, :3]), axis=1) / np.where(chord > 0, chord, 1.0)
+        share = np.minimum(room / np.where(height > 0, height, np.inf), 1.0)
+        wrong |= ask(middle + share[:, None] * (far - middle), face) != label
+    wrong &= chord > 4.0 * tolerance
+    three = np.flatnonzero((m >= 0).sum(axis=1) == 3)
+    c = sheet.corners[three]
+    _, found = _meeting_points(ask, sheet.nodes[c], sheet.face[c[:, 0]], at[c], tolerance)
+    return np.unique(sides[np.concatenate([two[wrong], three[~found]])])
 
 
 def split(corners: I64, sides: I64, middle: I64) -> I64:
@@ -116,15 +168,16 @@ def _cut(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance
     turned = ((m < 0).argmax(axis=1)[:, None] + 2 + np.arange(3)) % 3
     two = count == 2
     c, x, t = (np.take_along_axis(v, turned, 1)[two] for v in (sheet.corners, m, at))
-    # corner 0 is alone: sides 0 and 2 are crossed
-    for facet, owner in ((c[:, 0], x[:, 0], x[:, 2]), 0), ((x[:, 0], c[:, 1], c[:, 2]), 1), \
-            ((x[:, 0], c[:, 2], x[:, 2]), 1):
-        pieces.append(np.stack(facet, axis=1))
-        labels.append(t[:, owner])
+    # corner 0 is alone: sides 0 and 2 are crossed; of the diagonals the one that leaves the cut at the wider angle
+    first = _cosine(sheet.nodes, x[:, 0], x[:, 2], c[:, 2]) < _cosine(sheet.nodes, x[:, 2], x[:, 0], c[:, 1])
+    near = np.stack([x[:, 0], c[:, 1], np.where(first, c[:, 2], x[:, 2])], axis=1)
+    other = np.stack([np.where(first, x[:, 0], c[:, 1]), c[:, 2], x[:, 2]], axis=1)
+    pieces += [np.stack([c[:, 0], x[:, 0], x[:, 2]], axis=1), near, other]
+    labels += [t[:, 0], t[:, 1], t[:, 1]]
     three = count == 3
     c, x, t = sheet.corners[three], m[three], at[three]
     face = sheet.face[c[:, 0]]
-    star = sheet.add(_meeting_points(ask, sheet.nodes[c], face, t, tolerance), face)
+    star = sheet.add(_meeting_points(ask, sheet.nodes[c], face, t, tolerance)[0], face)
     for k in range(3):
         after = (k + 1) % 3
         pieces += [np.stack([c[:, k], x[:, k], star], axis=1), np.stack([x[:, k], c[:, after], star], axis=1)]
@@ -132,21 +185,29 @@ def _cut(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance
     sheet.corners, sheet.label = np.concatenate(pieces), np.concatenate(labels)
 
 
-def _meeting_points(ask: Asker, corners: F64, face: I32, at: I64, tolerance: float) -> F64:
+def _cosine(nodes: F64, at: I64, one: I64, two: I64) -> F64:
+    """Cosine of the angle at a node between the directions to two others."""
+    a, b = nodes[one, :3] - nodes[at, :3], nodes[two, :3] - nodes[at, :3]
+    size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    return np.asarray(np.einsum("ij,ij->i", a, b) / np.where(size > 0, size, 1.0))
+
+
+def _meeting_points(ask: Asker, corners: F64, face: I32, at: I64, tolerance: float) -> tuple[F64, BOOL]:
     """Where three labels meet in facets whose corners have three: by halving, one of four parts has three again.
 
     corners : (k, 3, 8) node rows; face : (k,); at : (k, 3) labels
 
-    Returns (k, 8) node rows, inside the facets. By Sperner's lemma a part with three labels exists while no side holds
-    a label that its ends do not have; where none is found the halving ends.
+    Returns (k, 8) node rows, inside the facets, and (k,) whether the place was found. By Sperner's lemma a part with
+    three labels exists while no side holds a label that its ends do not have; where none is found the halving ends.
     """
     outer, live = corners.mean(axis=1), np.arange(len(corners))
     corners, at = corners.copy(), at.copy()
+    found = np.ones(len(corners), bool)
     while True:
         p = corners[live, :, :3]
         live = live[np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1) > tolerance]
         if not len(live):
-            return 0.999 * corners.mean(axis=1) + 0.001 * outer
+            return 0.999 * corners.mean(axis=1) + 0.001 * outer, found
         c, t = corners[live], at[live]
         m = 0.5 * (c + np.roll(c, -1, axis=1))
         a = ask(m.reshape(-1, COLUMNS), np.repeat(face[live], 3)).reshape(-1, 3)
@@ -158,4 +219,5 @@ def _meeting_points(ask: Asker, corners: F64, face: I32, at: I64, tolerance: flo
         good = (name[..., 0] != name[..., 1]) & (name[..., 1] != name[..., 2]) & (name[..., 2] != name[..., 0])
         has, pick, row = good.any(axis=1), good.argmax(axis=1), np.arange(len(live))
         corners[live[has]], at[live[has]] = part[row, pick][has], name[row, pick][has]
+        found[live[~has]] = False
         live = live[has]
