@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
-from geometry.mesh import F64, TriangleMesh
+from geometry.mesh import F64
 from geometry.part import Part
 from geometry.rays import first_hits
 from zones.model import Decomposition, Wall
@@ -136,7 +135,7 @@ class _Section:
         length = np.linalg.norm(cut.end - cut.start, axis=1)
         mine = self.seg_kind == MINE
         pitch = max(PIECE * self.thick, float(length[mine].sum()) / PIECES)
-        loops = [w for w in cut.loops() if mine[w].any()]
+        loops = [w for w in cut.loops if mine[w].any()]
         walk = np.concatenate(loops) if loops else np.zeros(0, np.int64)
         loop = np.repeat(np.arange(len(loops)), [len(w) for w in loops])
         keep = length[walk] > 1e-9 * max(self.thick, 1.0)
@@ -180,10 +179,9 @@ class _Section:
         """(p,) int: the piece on the other side of the material, -2 when that is not a piece here, -1 when unbacked."""
         out = np.full(len(self.a), -1)
         mine = np.flatnonzero(self.kind == MINE)
-        part = TriangleMesh(self.mesh.vertices, self.mesh.faces[self.cut.triangle])
         inward = np.column_stack([self.way[mine, 1], -self.way[mine, 0], np.zeros(len(mine))])
         middle = np.column_stack([0.5 * (self.a + self.b)[mine], np.full(len(mine), self.z)])
-        t, seg = first_hits(TriangleTree(part), middle, inward, t_min=1e-4 * self.thick)
+        t, seg = first_hits(self.cut.tree, middle, inward, t_min=1e-4 * self.thick)
         seg = seg.astype(np.int64)
         across = self.cut.end[seg] - self.cut.start[seg]
         size = np.maximum(np.linalg.norm(across, axis=1), 1e-30)

@@ -9,9 +9,11 @@ A vertex in the plane counts as above it, so every triangle that is cut has one 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 
 
@@ -21,7 +23,7 @@ class Slice:
 
     height    : mm
     start,end : (n, 2) float64, mm, in plan; the void is on the left of start -> end
-    triangle  : (n,) int, rows of the mesh
+    triangle  : (n, 3, 3) float64, mm, the triangles that were cut
     face      : (n,) int, B-rep face numbers
     following : (n,) int, the segment that starts where this one ends; -1 where the mesh is open
     """
@@ -29,10 +31,17 @@ class Slice:
     height: float
     start: F64
     end: F64
-    triangle: np.ndarray
+    triangle: F64
     face: np.ndarray
     following: np.ndarray
 
+    @cached_property
+    def tree(self) -> TriangleTree:
+        """The triangles that were cut, for rays in the plane; a triangle there has the row of its segment here."""
+        rows = np.arange(3 * len(self.face), dtype=np.int32).reshape(-1, 3)
+        return TriangleTree(TriangleMesh(self.triangle.reshape(-1, 3), rows))
+
+    @cached_property
     def loops(self) -> list[np.ndarray]:
         """Segments in walking order, one array of rows for each loop; open strings of a torn mesh come first."""
         following = self.following.tolist()
@@ -63,7 +72,7 @@ class Slice:
 
 
 class Slicer:
-    """A mesh made ready to be cut at many heights.
+    """A mesh made ready to be cut at many heights; what was cut is kept.
 
     mesh : TriangleMesh, mm, closed and outward
     """
@@ -74,12 +83,18 @@ class Slicer:
         corners = [z[mesh.faces[:, k]] for k in range(3)]
         self.low = np.minimum(np.minimum(corners[0], corners[1]), corners[2])
         self.high = np.maximum(np.maximum(corners[0], corners[1]), corners[2])
+        self.done: dict[float, Slice] = {}
 
     def cut(self, height: float) -> Slice:
         """Cut with the plane z = height (mm).
 
         Returns Slice, exact but for rounding; segments without length are kept, since they link their neighbours.
         """
+        if height not in self.done:
+            self.done[height] = self._cut(height)
+        return self.done[height]
+
+    def _cut(self, height: float) -> Slice:
         rows = np.flatnonzero((self.low < height) & (self.high >= height))
         vertices, nodes = self.mesh.vertices, self.mesh.faces[rows].astype(np.int64)
         corner = vertices[nodes, 2] >= height
@@ -92,7 +107,8 @@ class Slicer:
         place = np.minimum(np.searchsorted(up_key[order], down_key), max(len(rows) - 1, 0))
         linked = order[place] if len(rows) else np.zeros(0, np.int64)
         linked = np.where(up_key[linked] == down_key, linked, -1)
-        return Slice(height, start, end, rows, self.mesh.face_ids[rows].astype(np.int64), linked)
+        face = self.mesh.face_ids[rows].astype(np.int64)
+        return Slice(height, start, end, vertices[nodes], face, linked)
 
 
 def _edge(nodes: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -149,7 +149,7 @@ def test_cutting_through_vertices_links_every_segment() -> None:
         (k + i, k + (i + 1) % 4, k + 4 + i), (k + (i + 1) % 4, k + 4 + (i + 1) % 4, k + 4 + i))]
     f += [(0, 2, 1), (0, 3, 2), (8, 9, 10), (8, 10, 11)]
     cut = Slicer(TriangleMesh(v, np.array(f))).cut(1.0)
-    walk = cut.loops()
+    walk = cut.loops
     assert len(walk) == 1 and (cut.following >= 0).all()
     area = 0.5 * (cut.start[:, 0] * cut.end[:, 1] - cut.start[:, 1] * cut.end[:, 0]).sum()
     assert area == pytest.approx(-16.0) and cut.holds(np.array([2.0, 2.0])) and not cut.holds(np.array([5.0, 2.0]))
