@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
+import re
+
 import numpy as np
 import pytest
 
 from geometry.bspline import SplineCurve
 from geometry.errors import GeometryError
 from tests.profile_curves import DRAW, draw
+from tests.source_tree import ROOT
 from zones.bends import Way, _pivots, measure_bends
 from zones.profiles import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
 
@@ -174,3 +178,20 @@ def test_turning_points_leave_no_ripple_and_lose_no_turn() -> None:
         for i, j in zip(pivots[:-1], pivots[1:], strict=True):
             way = theta[i:j + 1] * (1 if theta[j] >= theta[i] else -1)
             assert (np.maximum.accumulate(way) - way).max() <= 0.5
+
+
+def test_the_pictures_are_those_the_script_draws(tmp_path) -> None:
+    """Every example is of its type, and the committed pictures show it: same text, numbers within half a pixel."""
+    spec = importlib.util.spec_from_file_location("profile_types", ROOT / "docs" / "figures" / "profile_types.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    drawn = script.draw_all(tmp_path)
+    assert [p.name for p in drawn] == [f"profile-{k.lower()}.svg" for k in ("C1", "C2", "C3", "C4", "C5", "C6", "C7",
+                                                                           "C8", "C9", "C10")]
+    for new in drawn:
+        old = (ROOT / "docs" / "images" / new.name).read_text(encoding="utf-8")
+        text = new.read_text(encoding="utf-8")
+        numbers = re.compile(r"-?\d+\.\d")
+        assert numbers.sub("", old) == numbers.sub("", text)
+        was, now = ([float(n) for n in numbers.findall(t)] for t in (old, text))
+        assert now == pytest.approx(was, abs=0.5)

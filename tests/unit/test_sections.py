@@ -72,7 +72,13 @@ def bridges(name: str, wall: str) -> list[int]:
     return sorted(int((c.face == 0).sum()) for c in curves(name, wall))
 
 
-@pytest.mark.parametrize("name", [n for n in SHAPES if SHAPES[n][1][0]] + list(OWN))
+EVERYDAY = ("T", "cross", "tray with a rib", "ring with a strut", "wall with a window", "bar through a wall",
+            "walls flush with the plate ends", "walls flush with the plate sides", "web on the floor",
+            "fillets at a bar", "wavy walls", "wavy walls in strips", "fork", "two walls", "tray", "square bar", *OWN)
+REST = [pytest.param(n, marks=pytest.mark.slow) for n in SHAPES if SHAPES[n][1][0] and n not in EVERYDAY]
+
+
+@pytest.mark.parametrize("name", [*EVERYDAY, *REST])
 def test_every_wall_has_two_sides_with_the_void_on_the_left(name: str) -> None:
     part, found = made(name)
     sections = wall_sections(part, found)
