@@ -74,7 +74,7 @@ def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) 
     -1. An edge that holds a third label is split there, with the facets beside it, and so are the sides of facets in
     which the border is far from straight; but never the edges whose keys are ``fixed``, which facets elsewhere have.
     """
-    known = np.zeros((0, 2), np.int64)
+    known, settled = np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
     curves, most = 0, np.inf
     for round_ in range(SPLIT_ROUNDS + CURVE_ROUNDS + 1):
         low, high, sides = sides_of(sheet.corners)
@@ -93,7 +93,8 @@ def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) 
             most = min(most, len(sheet.nodes) + BUDGET * len(known))
             if curves == CURVE_ROUNDS or len(sheet.nodes) > most:
                 break
-            halved = _curved(sheet, at, sides, crossing, ask, tolerance)
+            halved, fine = _curved(sheet, at, sides, crossing, settled, ask, tolerance)
+            settled = np.concatenate([settled, fine])
             halved = np.setdiff1d(halved, np.flatnonzero(np.isin(key, fixed))).astype(np.int64)
             if not len(halved):
                 break
@@ -114,10 +115,14 @@ def _look_up(known: I64, key: I64) -> I64:
     return np.where(found[:, 0] == key, found[:, 1], -1)
 
 
-def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance: float) -> I64:
+def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, settled: I64, ask: Asker,
+            tolerance: float) -> tuple[I64, I64]:
     """Edge numbers of the facets with two labels whose border misses the middle of the cut by far, and of those with
-    three in which no place was found where they meet."""
+    three in which no place was found where they meet; and keys of the facets that are fine, passed over next time."""
     m = crossing[sides]
+    m.sort(axis=1)
+    name = m[:, 1] << 32 | m[:, 2]
+    m = np.where(np.isin(name, settled)[:, None], -1, crossing[sides])
     two = np.flatnonzero((m >= 0).sum(axis=1) == 2)
     turned = ((m[two] < 0).argmax(axis=1)[:, None] + 2 + np.arange(3)) % 3
     c, x = (np.take_along_axis(v[two], turned, 1) for v in (sheet.corners, m))
@@ -135,7 +140,8 @@ def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolera
     three = np.flatnonzero((m >= 0).sum(axis=1) == 3)
     c = sheet.corners[three]
     _, found = _meeting_points(ask, sheet.nodes[c], sheet.face[c[:, 0]], at[c], tolerance)
-    return np.unique(sides[np.concatenate([two[wrong], three[~found]])])
+    bad, good = np.concatenate([two[wrong], three[~found]]), np.concatenate([two[~wrong], three[found]])
+    return np.unique(sides[bad]), name[good]
 
 
 def split(corners: I64, sides: I64, middle: I64) -> I64:

@@ -23,7 +23,7 @@ COLUMNS = 8
 
 
 @njit(**KERNEL)
-def apex_of(length: F64, sides: I64, t: int) -> int:
+def _apex_of(length: F64, sides: I64, t: int) -> int:
     """Corner opposite the shortest side of facet t: sides (t, 3) edge numbers, side k from corner k to k + 1."""
     best, corner = np.inf, 0
     for k in range(3):
@@ -33,7 +33,7 @@ def apex_of(length: F64, sides: I64, t: int) -> int:
 
 
 @njit(**KERNEL)
-def side_node(corners: I64, sides: I64, parts: I64, first: I64, t: int, k: int, i: int) -> int:
+def _side_node(corners: I64, sides: I64, parts: I64, first: I64, t: int, k: int, i: int) -> int:
     """Node number of point i on side k of facet t, walked from corner k to corner k + 1."""
     a, b = corners[t, k], corners[t, (k + 1) % 3]
     e = sides[t, k]
@@ -45,19 +45,19 @@ def side_node(corners: I64, sides: I64, parts: I64, first: I64, t: int, k: int, 
 
 
 @njit(**KERNEL)
-def row_ends(corners: I64, sides: I64, parts: I64, first: I64, t: int, apex: int, j: int) -> tuple[int, int, int]:
+def _row_ends(corners: I64, sides: I64, parts: I64, first: I64, t: int, apex: int, j: int) -> tuple[int, int, int]:
     """Number of rows of facet t, and the node numbers at the left and right end of row j."""
     left, right = apex, (apex + 2) % 3
     nl, nr = parts[sides[t, left]], parts[sides[t, right]]
     rows = min(nl, nr)
     i = (2 * j * nl + rows) // (2 * rows)
     k = (2 * j * nr + rows) // (2 * rows)
-    return (rows, side_node(corners, sides, parts, first, t, left, i),
-            side_node(corners, sides, parts, first, t, right, nr - k))
+    return (rows, _side_node(corners, sides, parts, first, t, left, i),
+            _side_node(corners, sides, parts, first, t, right, nr - k))
 
 
 @njit(**KERNEL)
-def row_parts(data: F64, a: int, b: int, pitch: float) -> int:
+def _row_parts(data: F64, a: int, b: int, pitch: float) -> int:
     """Parts that a row between nodes a and b is cut into so that none is longer than ``pitch`` (mm)."""
     d = 0.0
     for c in range(3):
@@ -78,15 +78,15 @@ def count_division(corners: I64, sides: I64, parts: I64, length: F64, first: I64
     m = len(corners)
     inner, small = np.zeros(m, np.int64), np.zeros(m, np.int64)
     for t in range(m):
-        apex = apex_of(length, sides, t)
+        apex = _apex_of(length, sides, t)
         base = parts[sides[t, (apex + 1) % 3]]
-        rows, _, _ = row_ends(corners, sides, parts, first, t, apex, 0)
+        rows, _, _ = _row_ends(corners, sides, parts, first, t, apex, 0)
         before = 0
         for j in range(1, rows + 1):
             here = base
             if j < rows:
-                _, a, b = row_ends(corners, sides, parts, first, t, apex, j)
-                here = row_parts(data, a, b, pitch)
+                _, a, b = _row_ends(corners, sides, parts, first, t, apex, j)
+                here = _row_parts(data, a, b, pitch)
                 inner[t] += here - 1
             small[t] += before + here
             before = here
@@ -103,20 +103,20 @@ def divide(corners: I64, sides: I64, parts: I64, length: F64, first: I64, data: 
     for the nodes of a side depend on the side alone.
     """
     for t in range(len(corners)):
-        apex = apex_of(length, sides, t)
+        apex = _apex_of(length, sides, t)
         left, right, bottom = apex, (apex + 2) % 3, (apex + 1) % 3
         node, facet = node_at[t], facet_at[t]
-        rows, a, b = row_ends(corners, sides, parts, first, t, apex, 0)
+        rows, a, b = _row_ends(corners, sides, parts, first, t, apex, 0)
         upper = np.array([a])
         for j in range(1, rows + 1):
-            _, a, b = row_ends(corners, sides, parts, first, t, apex, j)
+            _, a, b = _row_ends(corners, sides, parts, first, t, apex, j)
             if j == rows:
                 k = parts[sides[t, bottom]]
                 lower = np.empty(k + 1, np.int64)
                 for i in range(k + 1):
-                    lower[i] = side_node(corners, sides, parts, first, t, bottom, i)
+                    lower[i] = _side_node(corners, sides, parts, first, t, bottom, i)
             else:
-                k = row_parts(data, a, b, pitch)
+                k = _row_parts(data, a, b, pitch)
                 lower = np.empty(k + 1, np.int64)
                 lower[0], lower[k] = a, b
                 for i in range(1, k):
@@ -156,14 +156,14 @@ def _side_extras(corners: I64, sides: I64, parts: I64, first: I64, t: int, side:
     hi = (2 * j * n + rows) // (2 * rows)
     for i in range(lo + 1, hi):
         if is_left:
-            above = side_node(corners, sides, parts, first, t, side, i - 1)
-            middle = side_node(corners, sides, parts, first, t, side, i)
-            below = side_node(corners, sides, parts, first, t, side, hi)
+            above = _side_node(corners, sides, parts, first, t, side, i - 1)
+            middle = _side_node(corners, sides, parts, first, t, side, i)
+            below = _side_node(corners, sides, parts, first, t, side, hi)
             a, b = above, below
         else:
-            above = side_node(corners, sides, parts, first, t, side, n - i + 1)
-            middle = side_node(corners, sides, parts, first, t, side, n - i)
-            below = side_node(corners, sides, parts, first, t, side, n - hi)
+            above = _side_node(corners, sides, parts, first, t, side, n - i + 1)
+            middle = _side_node(corners, sides, parts, first, t, side, n - i)
+            below = _side_node(corners, sides, parts, first, t, side, n - hi)
             a, b = below, above
         for q in range(facet - 1, start - 1, -1):
             found = -1
