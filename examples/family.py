@@ -15,13 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shapely.geometry import Point
 
 from examples import linear
 from examples.connections import TRUTH_KIND, ConnectionSpec
+from examples.fillets import filleted
 from examples.freewall import FreeWall
 from examples.gaps import Gap
 from examples.impeller import impeller
-from examples.joins import ForkSpec
+from examples.joins import ForkSpec, takes_fillets
 from examples.layout import Layout, LayoutError, check
 from examples.mixed import mixed, mixed_linear, mixed_radial
 from examples.setups import suggest_setup
@@ -45,6 +47,8 @@ NUMBERS = {"demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4
            "mixed": 7, "mixed_linear": 8, "mixed_radial": 9}
 """What each recipe adds to its seeds; a number stays with its recipe, so that new recipes change no part."""
 DRAWS, BUILDS = 60, 6
+SEAM = 0.03
+"""mm; an edge this near to both a connection and a wall is where they meet."""
 
 STEP_TIME = "1970-01-01T00:00:00"
 
@@ -66,16 +70,22 @@ class FamilyPart:
     setup: dict[str, Any]
     layout: Layout
 
-    def write(self, directory: str | Path) -> tuple[Path, Path, Path]:
+    def write(self, directory: str | Path, *, reach: bool = False) -> tuple[Path, Path, Path]:
         """Write NAME.step, NAME.truth.json and NAME.setup.json; the same part gives the same bytes.
 
+        reach : whether the truth also says what the setup can reach, see ``examples.reach`` (some seconds)
         Returns the three paths.
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
         step, truth, setup = (folder / f"{self.name}.{end}" for end in ("step", "truth.json", "setup.json"))
         step.write_bytes(step_bytes(self.shape, self.name))
-        truth.write_text(json.dumps(self.truth, indent=1) + "\n")
+        facts = dict(self.truth)
+        if reach:
+            from examples.reach import reach_of
+
+            facts["reach"] = reach_of(step, self.setup)
+        truth.write_text(json.dumps(facts, indent=1) + "\n")
         setup.write_text(json.dumps(self.setup, indent=1) + "\n")
         return step, truth, setup
 
@@ -94,7 +104,7 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
         layout = _draw(rng, seed, recipe, overrides)
         layout = replace(layout, fillet=fillet) if fillet else layout
         try:
-            shape = build_solid(layout)
+            layout, shape = _built(layout)
             break
         except LayoutError:
             if attempt == BUILDS - 1:
@@ -102,6 +112,16 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     name = f"{recipe}-{seed}"
     truth = truth_of(layout, name)
     return FamilyPart(name, shape, truth, suggest_setup(layout, truth), layout)
+
+
+def _built(layout: Layout) -> tuple[Layout, Any]:
+    """The layout and its solid; without fillets at the connections where the kernel cannot make them."""
+    if layout.rounded > 0:
+        try:
+            return layout, build_solid(layout)
+        except LayoutError:
+            layout = replace(layout, rounded=0.0)
+    return layout, build_solid(layout)
 
 
 def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
@@ -140,7 +160,38 @@ def build_solid(layout: Layout) -> Any:
     if len(solids) != 1 or not solids[0].isValid() or _volume(solids[0]) <= 0:
         raise LayoutError(f"the union of {layout.name} is no single valid solid")
     solid = solids[0]
+    if layout.rounded > 0:
+        seams = _seams(solid, layout)
+        solid = filleted(solid, layout.rounded, seams) if seams else None
+        if solid is None or _volume(solid) <= 0:
+            raise LayoutError(f"fillets of {layout.rounded} mm do not fit")
     return _filleted(solid, layout) if layout.fillet > 0 else solid
+
+
+def _seams(solid: Any, layout: Layout) -> list[int]:
+    """Places among the edges of a solid where its first connection that takes fillets leaves its walls."""
+    outlines = [(c.footprint().buffer(SEAM), c) for c in layout.connections if takes_fillets(c)][:1]
+    out = []
+    for number, edge in enumerate(solid.Edges()):
+        at = edge.positionAt(0.5)
+        p = Point(at.x, at.y)
+        for outline, c in outlines:
+            if c.z_range[0] - SEAM <= at.z <= c.z_range[1] + SEAM and outline.contains(p) and any(
+                layout.walls[k].section(at.z).boundary.distance(p) < SEAM for k in set(c.indices)
+            ):
+                out.append(number)
+                break
+    return out
+
+
+def _with_fillets(solid: Any, radius: float, edges: list[Any]) -> Any:
+    try:
+        solids = solid.fillet(radius, edges).Solids() if edges else []
+    except Exception as error:  # the kernel's own classes, and what it raises through them
+        raise LayoutError(f"fillets of {radius} mm do not fit: {error}") from None
+    if len(solids) != 1 or not solids[0].isValid() or _volume(solids[0]) <= 0:
+        raise LayoutError(f"fillets of {radius} mm do not fit")
+    return solids[0]
 
 
 def _volume(solid: Any) -> float:
@@ -159,13 +210,7 @@ def _filleted(solid: Any, layout: Layout) -> Any:
     feet = [e for e in solid.Edges() if all(abs(c - z) < 1e-6 for c in (e.BoundingBox().zmin, e.BoundingBox().zmax))]
     base = layout.base.solid()
     rims = [e for e in feet if not _on_rim(e, base)]
-    try:
-        solids = solid.fillet(layout.fillet, rims).Solids()
-    except Exception as error:  # the kernel's own classes, and what it raises through them
-        raise LayoutError(f"fillets of {layout.fillet} mm do not fit: {error}") from None
-    if len(solids) != 1 or not solids[0].isValid():
-        raise LayoutError(f"fillets of {layout.fillet} mm do not fit")
-    return solids[0]
+    return _with_fillets(solid, layout.fillet, rims)
 
 
 def _on_rim(edge: Any, base: Any) -> bool:

@@ -27,8 +27,10 @@ ZOOMS = 3
 """Times the grid is drawn again, eight times finer, round the shortest ray."""
 FARTHEST = 40.0
 """mm; rays from and to free walls are not followed beyond."""
-STARTS = 6
-"""Places along a free wall where the search for the shortest ray begins."""
+ROUNDS = 40
+"""Windows that the search for the shortest ray of a free wall looks through at most."""
+STARTS = 10
+"""Places on a free wall where the search for the shortest ray begins; one at each height, for it may end at a hub."""
 SKIN = 1e-3
 """mm; a ray does not meet its own wall nearer than that."""
 
@@ -111,7 +113,7 @@ def _starts(wall: WallSpec, reach: F64, mine: np.ndarray, n_v: int) -> list[int]
         return [int(order[0])]
     chosen: list[int] = []
     for k in order[reach[order] <= 1.15 * reach[order[0]] + 0.1].tolist():
-        if len(chosen) < STARTS and all(abs(k // n_v - c // n_v) > 3 for c in chosen):
+        if len(chosen) < STARTS and all(abs(k // n_v - c // n_v) > 3 or k % n_v != c % n_v for c in chosen):
             chosen.append(k)
     return chosen
 
@@ -124,6 +126,8 @@ def _zoom(
     centre, pitch = np.array(start), np.array([1.0, 1.0]) / (np.array(counts) - 1)
     at = walls[i].side_point(side, centre[:1], centre[1:])[0]
     border = _on_border(walls[i], start[0], start[1], low)
+    if walls[i].sees_itself and zooms:
+        return _search(walls, i, side, blocked, j, centre, pitch, low, gap, near)
     for _ in range(zooms):
         fine = [np.unique(np.clip(c + np.linspace(-h, h, 17), b, 1))
                 for c, h, b in zip(centre, pitch, (0.0, low), strict=True)]
@@ -135,6 +139,32 @@ def _zoom(
             gap, at, border = float(far[k]), points[k], _on_border(walls[i], fu[k], fv[k], low)
             centre = np.array([fu[k], fv[k]])
         pitch = pitch / 8.0
+    return gap, at, border
+
+
+def _search(
+    walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, centre: F64, pitch: F64, low: float,
+    gap: float, near: set[int] | None,
+) -> tuple[float, F64, bool]:
+    """As ``_zoom``, but the window follows the shortest ray along a slanting border before it shrinks."""
+    at = walls[i].side_point(side, centre[:1], centre[1:])[0]
+    border, scale = _on_border(walls[i], centre[0], centre[1], low), 1.0
+    for _ in range(ROUNDS):
+        spread = np.linspace(-scale, scale, 9)
+        u, v = centre[0] + pitch[0] * spread, np.clip(centre[1] + pitch[1] * spread, low, 1.0)
+        u = np.mod(u, 1.0) if walls[i].closed else np.clip(u, 0.0, 1.0)
+        fu, fv = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
+        points, seen, far = _cast(walls, i, side, fu, fv, blocked, 1.2 * gap + 1.0, near)
+        far = np.where(seen == j, far, np.inf)
+        k = int(np.argmin(far))
+        better = far[k] < gap - 1e-9
+        if far[k] <= gap:
+            gap, at, border = float(far[k]), points[k], _on_border(walls[i], fu[k], fv[k], low)
+            centre = np.array([fu[k], fv[k]])
+        if not better or {k // 9, k % 9}.isdisjoint({0, 8}):
+            scale *= 0.25
+        if scale < 1e-3:
+            break
     return gap, at, border
 
 

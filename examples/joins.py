@@ -15,6 +15,7 @@ from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from examples.connections import ConnectionSpec
+from examples.freewall import FreeWall
 from examples.gaps import Gap
 from examples.layout import LayoutError, clear_of
 from examples.splines import F64
@@ -286,6 +287,13 @@ def draw_joins(
             out.append(spec)
             starts.append(start)
     return out
+
+
+def takes_fillets(c: Any) -> bool:
+    """Whether a connection may have fillets; on bent walls the kernel cannot make them."""
+    return c.kind in ("bar", "web", "round_bar") and all(
+        isinstance(w, FreeWall) and w.profile.type is None and w.lean[0] == w.lean[1] for w in c.walls
+    )
 
 
 def _covers(spec: Any, gaps: list[Gap]) -> bool:

@@ -167,7 +167,7 @@ class Layout:
     def gaps(self, **sampling: Any) -> list[Gap]:
         """True channels between the walls, see ``examples.gaps.channels``."""
         if any(w.sees_itself for w in self.walls):
-            return channels(self.walls, self.base.blocked, foot=self.fillet, **{"n_u": 241, "n_v": 5, **sampling})
+            return channels(self.walls, self.base.blocked, foot=self.fillet, **{"n_u": 241, "n_v": 7, **sampling})
         return channels(self.walls, self.base.blocked, **sampling)
 
 

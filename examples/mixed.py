@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -12,7 +11,7 @@ from shapely.ops import unary_union
 
 from examples.freewall import FreeWall
 from examples.gaps import Gap
-from examples.joins import draw_joins
+from examples.joins import draw_joins, takes_fillets
 from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
 from examples.profiles import CLOSED_TYPES, OPEN_TYPES, Profile, clear, draw_closed, draw_hairpin, draw_open
 from examples.walls import LEFT, RIGHT
@@ -72,18 +71,23 @@ def mixed(
     layout = _rounded_feet(rng, layout)
     check(layout)
     gaps = layout.gaps(n_u=121, n_v=3, exact=False)
-    layout = replace(layout, connections=draw_joins(rng, layout.walls, gaps, wanted, KINDS))
-    return _windows(rng, layout, gaps) if rng.random() < 0.15 else layout
+    drawn = draw_joins(rng, layout.walls, gaps, wanted, KINDS)
+    layout = replace(layout, connections=drawn)
+    layout = _windows(rng, layout, gaps) if rng.random() < 0.15 else layout
+    rounded = round(float(rng.uniform(0.25, 0.4)), 2) if rng.random() < 0.4 else 0.0
+    return replace(layout, rounded=rounded) if any(takes_fillets(c) for c in drawn) else layout
 
 
-def mixed_linear(rng: Generator, **overrides: Any) -> Layout:
+def mixed_linear(
+    rng: Generator, walls: int | None = None, connections: int | None = None, gap: tuple[float, float] = (0.3, 12.0)
+) -> Layout:
     """``mixed`` with its walls side by side on a plate."""
-    return mixed(rng, arrangement="linear", **overrides)
+    return mixed(rng, walls, connections, gap, "linear")
 
 
-def mixed_radial(rng: Generator, **overrides: Any) -> Layout:
-    """``mixed`` with blades, and splitters between them, round a hub."""
-    return mixed(rng, arrangement="radial", **overrides)
+def mixed_radial(rng: Generator, walls: int | None = None, connections: int | None = None) -> Layout:
+    """``mixed`` with blades, and splitters between them, round a hub; at least three."""
+    return mixed(rng, walls, connections, arrangement="radial")
 
 
 def _shows(hub: HubDisc | None, wall: FreeWall) -> bool:
