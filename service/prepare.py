@@ -148,7 +148,7 @@ def stock_box(setup: Setup, part: Part) -> F64 | None:
 
 
 def turned_box(box: F64, rotation: F64) -> F64:
-    """(2, 3) float64: the smallest box along the turned axes that holds a box (2, 3)."""
+    """(2, 3) float64, mm: the smallest box along the turned axes that holds a box (2, 3); rotation (3, 3)."""
     corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
     return np.array([corners.min(axis=0), corners.max(axis=0)])
 
@@ -207,6 +207,8 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
 
     Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
     every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them.
+
+    directions : (d, 3) float64, unit, of the accesses, in the frame of the part
     """
     triangles = machinable_triangles(part, decomposition, setup, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
@@ -224,7 +226,7 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
 def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> np.ndarray:
     """Indices of the mesh triangles of the machinable area Ma.
 
-    directions : (d, 3) float64, of the accesses, in the frame of the part
+    directions : (d, 3) float64, unit, of the accesses, in the frame of the part
 
     Raises
     ------

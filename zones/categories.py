@@ -16,11 +16,11 @@ from geometry.mesh import F64
 from zones.planview import ChannelPlan
 from zones.profiles import Level, Profile, classify
 from zones.sections import SideCurve
+from zones.strips import FACING_SHARE
 
 RANK = {Level.SIMPLE: 0, Level.MEDIUM: 1, Level.HIGH: 2}
 NEAR = 0.05  # mm round a footprint within which a side counts as touched
 LEAST_POINTS = 4
-FACING_SHARE = 0.5  # of a side that faces channels, below which it is an outside
 
 
 @dataclass(frozen=True, eq=False)

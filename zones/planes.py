@@ -53,7 +53,10 @@ def snapped(plane: float, bands: Sequence[tuple[float, float]]) -> float:
 
 
 def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> dict[int, float]:
-    """Cutting plane of a tool by cell: the neck rule, snapped to connections of the channel."""
+    """Cutting plane of a tool by cell, mm: the neck rule, snapped to connections of the channel.
+
+    left : (k,) int64, samples that are not taken yet
+    """
     r, code = sight.reach[tid], sight.view.labels.code
     stopped = left[sight.can[tid][left] & r.by_cutter[left] & ~r.by_tool[left]]
     out: dict[int, float] = {}
@@ -93,6 +96,9 @@ def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[Cutti
 
 def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> tuple[NDArray[np.int64], float]:
     """What of some samples two opposite views share, and the height in the frame of ``a`` of the plane between them.
+
+    members : (k,) int64, samples of one region and form
+    Returns (m,) int64 samples and the height, mm.
 
     Asked of the stoutest tool whose cutting part touches most of the samples that any touches from both sides. The
     height is -inf where ``a`` needs no plane.

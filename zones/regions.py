@@ -19,7 +19,8 @@ from geometry.part import Part
 from geometry.rays import first_hits
 from zones.model import Decomposition
 from zones.planmap import PlanMap
-from zones.planview import CLEAR, ChannelPlan, footprints
+from zones.planview import ChannelPlan, footprints
+from zones.strips import CLEAR
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def access_rotation(direction: ArrayLike) -> F64:
 
 
 def turned(part: Part, rotation: F64) -> Part:
-    """The part in another frame with the same origin: points p become ``rotation @ p``."""
+    """The part in another frame with the same origin: points p (mm) become ``rotation @ p``; rotation (3, 3)."""
     if np.array_equal(rotation, np.eye(3)):
         return part
     matrix = np.eye(4)
@@ -48,7 +48,7 @@ def turned(part: Part, rotation: F64) -> Part:
 
 
 def turned_samples(samples: SurfaceSamples, rotation: F64) -> SurfaceSamples:
-    """The samples in another frame with the same origin."""
+    """The samples (mm) in another frame with the same origin; rotation (3, 3)."""
     if np.array_equal(rotation, np.eye(3)):
         return samples
     return replace(samples, points=np.ascontiguousarray(samples.points @ rotation.T),
@@ -96,9 +96,9 @@ class View:
         return bool(np.array_equal(self.rotation, self.first))
 
     def into(self, vectors: F64) -> F64:
-        """Points or directions (n, 3) of the setup frame in the access frame."""
+        """Points (mm) or directions, (n, 3), of the setup frame in the access frame."""
         return np.asarray(vectors @ self.rotation.T)
 
     def back(self, vectors: F64) -> F64:
-        """Points or directions (n, 3) of the access frame in the setup frame."""
+        """Points (mm) or directions, (n, 3), of the access frame in the setup frame."""
         return np.asarray(vectors @ self.rotation)

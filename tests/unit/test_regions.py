@@ -15,8 +15,9 @@ from tests.decomposition_shapes import SHAPES, to_part
 from zones.categories import Categories
 from zones.decompose import decompose
 from zones.model import Decomposition
-from zones.planview import ChannelPlan, Strip, spread
+from zones.planview import ChannelPlan
 from zones.regions import Labels, Regioner
+from zones.strips import Strip, spread
 
 pytest.importorskip("cadquery")
 

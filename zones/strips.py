@@ -1,0 +1,208 @@
+"""Channels in plan: strips that rays sweep from one wall to the next.
+
+From points along each side of a wall, cut at mid height, level rays go out; connections, fillets and slivers let them
+through. A run of neighbouring rays that meet one other wall is a strip of a channel; its first and last ray are its
+ends, the middles of its rays the centre line. Where a connection, or a hole no longer than the channel is wide, takes a
+wall away, the strip goes on straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
+from geometry.part import Part
+from geometry.rays import first_hits
+from zones.model import Channel, Decomposition
+from zones.sections import SideCurve
+
+CLEAR = 0.02  # mm off the surface where a ray or a look-up starts, so that it does not fall on the border itself
+PITCH = 0.4  # mm between rays along a trace
+FACING = -0.3  # n1·n2 below: two sides face each other
+FACING_SHARE = 0.2  # of a side that faces channels, below which it is an outside
+NEIGHBOURS = 12  # rays that are asked for the side a point lies on
+SAME_SIDE = 0.5  # n1·n2 above: a point and a ray are on one side
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A run of rays from one wall to another: starts and feet, (k, 2) float64, mm, k >= 2."""
+
+    channel: str
+    start: F64
+    foot: F64
+
+    @property
+    def centre_line(self) -> F64:
+        """(k, 2) float64, mm."""
+        return np.asarray(0.5 * (self.start + self.foot))
+
+    @property
+    def area(self) -> shapely.Geometry:
+        """What the rays sweep, as quadrilaterals between neighbours; crossed ones count as the two triangles."""
+        a, b, c, d = self.start[:-1], self.start[1:], self.foot[1:], self.foot[:-1]
+        ring = np.stack([a, b, c, d, a], axis=1)
+        return shapely.union_all(shapely.make_valid(shapely.polygons(ring)))
+
+
+@dataclass(frozen=True, eq=False)
+class SideRays:
+    """One side of a wall as its rays saw it: their starts and normals, (k, 2), the channel of each ('' for none)."""
+
+    start: F64
+    normal: F64
+    named: list[str]
+    strips: list[Strip]
+
+    @property
+    def faced(self) -> dict[str, float]:
+        """Share of the side that faces each channel."""
+        return {n: self.named.count(n) / len(self.named) for n in sorted({s.channel for s in self.strips})}
+
+    def spread_names(self, closed: bool) -> list[str]:
+        """Channel of each ray, of those without the nearest along the side; all '' on a side that is an outside."""
+        if sum(self.faced.values()) < FACING_SHARE:
+            return [""] * len(self.named)
+        known = np.array([k for k, n in enumerate(self.named) if n])
+        away = np.abs(np.arange(len(self.named))[:, None] - known)
+        if closed:
+            away = np.minimum(away, len(self.named) - away)
+        return [self.named[k] for k in known[away.argmin(axis=1)]]
+
+
+@dataclass(frozen=True, eq=False)
+class RayIndex:
+    """Starts (k, 2) and normals (k, 2) of the rays of all sides, their wall and channel (rows, -1 for none)."""
+
+    start: F64
+    normal: F64
+    wall: NDArray[np.int64]
+    channel: NDArray[np.int64]
+
+    @staticmethod
+    def of(decomposition: Decomposition, curves: Sequence[SideCurve], sides: Sequence[SideRays],
+           names: Sequence[str]) -> RayIndex:
+        walls = [w.id for w in decomposition.walls]
+        named = [n for c, s in zip(curves, sides, strict=True) for n in s.spread_names(c.closed)]
+        return RayIndex(np.concatenate([np.zeros((0, 2)), *(s.start for s in sides)]),
+                     np.concatenate([np.zeros((0, 2)), *(s.normal for s in sides)]),
+                     np.array([walls.index(c.wall) for c, s in zip(curves, sides, strict=True) for _ in s.named],
+                              dtype=np.int64),
+                     np.array([names.index(n) if n else -1 for n in named], dtype=np.int64))
+
+    def nearest(self, at: F64, side: F64, wall: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n,) channel of the nearest ray of the same wall that leaves to the same side, -1 for none.
+
+        at, side : (n, 2) float64, mm and unit; wall : (n,) rows
+        """
+        out = np.full(len(at), -1, np.int64)
+        for k in np.unique(wall):
+            rows, own = np.flatnonzero(wall == k), np.flatnonzero(self.wall == k)
+            if not len(own):
+                continue
+            near = own[cKDTree(self.start[own]).query(at[rows], k=min(NEIGHBOURS, len(own)))[1].reshape(len(rows), -1)]
+            same = np.einsum("nkj,nj->nk", self.normal[near], side[rows]) > SAME_SIDE
+            pick = near[np.arange(len(rows)), same.argmax(axis=1)]
+            out[rows] = np.where(same.any(axis=1), self.channel[pick], -1)
+        return out
+
+
+def side_rays(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve],
+            shadows: Sequence[shapely.Geometry]) -> list[SideRays]:
+    """What the rays of every side saw."""
+    d = decomposition
+    through = {f for c in d.connections for f in c.faces} | {f.number for f in part.faces if f.sliver}
+    through |= {f for f, role in d.face_role.items() if role == "fillet"}
+    keep = ~np.isin(part.mesh.face_ids, sorted(through))
+    mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[keep], part.mesh.face_ids[keep])
+    tree = TriangleTree(mesh)
+    owner = {f: w.id for w in d.walls for f in w.sides}
+    channel = {frozenset(c.walls): c for c in d.channels}
+    skin = 1e-6 * float(np.linalg.norm(part.bounds[1] - part.bounds[0]))
+    holes = shapely.union_all(list(shadows)).buffer(CLEAR)
+    return [_side(curve, mesh, tree, owner, channel, holes, skin) for curve in curves]
+
+
+def _side(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: dict[int, str],
+          channel: dict[frozenset[str], Channel], holes: shapely.Geometry, skin: float) -> SideRays:
+    start, normal = spread(curve.points, curve.closed, PITCH)
+    if len(start) < 2:
+        return SideRays(start, normal, [""] * len(start), [])
+    inset = start.copy()
+    if not curve.closed:  # a ray from the very end of a side would graze the end of the one it meets
+        inset[0] += CLEAR * np.array([normal[0, 1], -normal[0, 0]])
+        inset[-1] -= CLEAR * np.array([normal[-1, 1], -normal[-1, 0]])
+    origin = np.column_stack([inset, np.full(len(start), curve.z)])
+    way = np.column_stack([normal, np.zeros(len(start))])
+    far, hit = first_hits(tree, origin, way, max(skin, CLEAR))
+    facing = np.einsum("ij,ij->i", mesh.normals[hit], way) < FACING
+    met = ["" if h < 0 or not ok else owner.get(int(mesh.face_ids[h]), "")
+           for h, ok in zip(np.asarray(hit).tolist(), facing.tolist(), strict=True)]
+    named = [channel[pair].id if m and (pair := frozenset((curve.wall, m))) in channel else "" for m in met]
+    length = np.where(np.isfinite(far), far, 0.0)
+    _bridge(named, length, shapely.contains_xy(holes, start[:, 0], start[:, 1]), curve.closed)
+    foot = start + length[:, None] * normal
+    runs = [run for run in _runs(named, curve.closed) if len(run) > 1]
+    return SideRays(start, normal, named, [Strip(named[run[0]], start[run], foot[run]) for run in runs])
+
+
+def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool) -> None:
+    """Name rays that no wall stopped after the strip on both sides of them, in place; lengths go on straight.
+
+    names, length (mm) : of the rays in order; hole : (n,) bool, rays that leave a wall where a connection ends at it
+    """
+    n = len(names)
+    hits = [k for k in range(n) if names[k]]
+    pairs = list(pairwise(hits)) + ([(hits[-1], hits[0] + n)] if closed and len(hits) > 1 else [])
+    for a, b in pairs:
+        between = [k % n for k in range(a + 1, b)]
+        ends = length[a], length[b % n]
+        if between and names[a] == names[b % n] and (hole[between].all() or len(between) * PITCH <= max(ends)):
+            for j, k in enumerate(between, start=1):
+                names[k] = names[a]
+                length[k] = ends[0] + (ends[1] - ends[0]) * j / (len(between) + 1)
+
+
+def _runs(names: Sequence[str], closed: bool) -> list[list[int]]:
+    """Runs of equal names that are not empty, in order; round the end where the curve is closed."""
+    runs: list[list[int]] = []
+    for k, name in enumerate(names):
+        if name and runs and runs[-1][-1] == k - 1 and names[runs[-1][-1]] == name:
+            runs[-1].append(k)
+        elif name:
+            runs.append([k])
+    if closed and runs and names[0] and names[0] == names[-1]:
+        if len(runs) == 1:
+            runs[0] = [*runs[0], 0]
+        else:
+            runs[0] = [*runs.pop(), *runs[0]]
+    return runs
+
+
+def spread(points: F64, closed: bool, pitch: float) -> tuple[F64, F64]:
+    """Evenly spaced points along a polyline and the unit normals to its left, (k, 2) float64 each.
+
+    points : (n, 2) float64, mm; the last joins the first where ``closed``
+    """
+    line = np.vstack([points, points[:1]]) if closed else points
+    step = np.diff(line, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    keep = length > 0
+    line, step, length = line[np.append(keep, True)], step[keep], length[keep]
+    if not len(length):
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    at = np.concatenate([[0.0], np.cumsum(length)])
+    count = max(2, int(np.ceil(at[-1] / pitch)) + 1)
+    s = np.linspace(0.0, at[-1], count, endpoint=not closed)
+    k = np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(length) - 1)
+    tangent = step[k] / length[k, None]
+    return (np.asarray(line[k] + (s - at[k])[:, None] * tangent),
+            np.column_stack([-tangent[:, 1], tangent[:, 0]]))
