@@ -3,7 +3,7 @@
     the whole part cut at mid height -> loops -> pieces of this wall that have its other side behind them
     -> stretches -> joined round corners and behind junctions, bridged over what interrupts them -> sides
 
-A piece is *backed* where the material across it ends on an opposed surface within ``BACKED_REACH`` thicknesses. Runs of
+A piece is *backed* where the material across it ends on an opposed surface within three thicknesses. Runs of
 backed pieces are stretches. Two stretches that follow each other on a loop and look at each other through the
 material have an end cap between them; if they do not, they are one side that goes on (round a corner of a tray,
 behind a rib). Where another wall, a connection or an opening interrupts a side, the stretches before and after are
@@ -18,26 +18,22 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.rays import first_hits
 from zones.model import Decomposition, Wall
-from zones.slices import Slice, Slicer
+from zones.pieces import FREE, MINE, OTHER, Pieces, turn_between
+from zones.slices import Slicer
 
-# Lengths below are multiples of the thickness of the wall.
-BACKED_REACH = 3.0
-BACKED_DOT = -0.8
-PIECE = 0.5
-PIECES = 400
-LEAST_STRETCH = 0.2
-TAIL = 2.0
+# Lengths are multiples of the thickness of the wall.
+# Two thicknesses from its end decide what a stretch has behind it.
+TAIL, TAIL_SHARE = 2.0, 0.25
+# Faces that belong to no wall, such as fillets, are walked round up to this length.
 AROUND = 6.0
 # The path round a fillet is at most this many times its chord.
 DETOUR = 1.25
 # The end of a side is rounded where it turns by this much (rad) within this length of it.
 CURL_LENGTH, CURL_WINDOW, CURL_TURN = 1.5, 0.25, 0.25
-CORNER = np.radians(45.0)
 # Behind the end of a slanting cap a side goes on unbacked, in line within this angle (rad), up to this length.
 GROW_TURN, GROW_LENGTH = 0.1, 3.0
-TAIL_SHARE = 0.25
+# Least cosine between a chord and the sides it joins.
 IN_LINE = 0.8
 # Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged.
 HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
@@ -46,7 +42,6 @@ BRIDGED_SHARE = 0.25
 SIDE_SHARE, SIDE_LENGTH = 0.25, 2.0
 
 BRIDGE = 0
-FREE, MINE, OTHER = 0, 1, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,52 +114,21 @@ class _Chain:
     closed: bool = False
 
 
-class _Section:
-    """One wall cut at one height: pieces in walking order, ends ``a``, ``b``, ``kind``, ``face``, ``loop``."""
-
-    def __init__(self, slicer: Slicer, owner: np.ndarray, index: int, wall: Wall, z: float) -> None:
-        self.mesh, self.wall, self.z = slicer.mesh, wall, z
-        self.thick = max(wall.thickness, 1e-9)
-        self.cut: Slice = slicer.cut(z)
-        own = owner[self.cut.face]
-        self.seg_kind = np.where(own == index, MINE, np.where(own == -1, FREE, OTHER))
-        self._make_pieces()
-
-    def _make_pieces(self) -> None:
-        cut = self.cut
-        length = np.linalg.norm(cut.end - cut.start, axis=1)
-        mine = self.seg_kind == MINE
-        pitch = max(PIECE * self.thick, float(length[mine].sum()) / PIECES)
-        loops = [w for w in cut.loops if mine[w].any()]
-        walk = np.concatenate(loops) if loops else np.zeros(0, np.int64)
-        loop = np.repeat(np.arange(len(loops)), [len(w) for w in loops])
-        keep = length[walk] > 1e-9 * max(self.thick, 1.0)
-        walk, loop = walk[keep], loop[keep]
-        count = np.where(mine[walk], np.maximum(np.ceil(length[walk] / pitch), 1), 1).astype(int)
-        row = np.repeat(walk, count)
-        first = np.cumsum(count) - count
-        k = np.arange(len(row)) - np.repeat(first, count)
-        n = np.repeat(count, count)
-        step = (cut.end - cut.start)[row]
-        self.a, self.b = cut.start[row] + step * (k / n)[:, None], cut.start[row] + step * ((k + 1) / n)[:, None]
-        self.inner = k > 0
-        self.kind, self.face, self.loop = self.seg_kind[row], cut.face[row], np.repeat(loop, count)
-        self.length = np.linalg.norm(self.b - self.a, axis=1)
-        self.way = (self.b - self.a) / np.maximum(self.length, 1e-30)[:, None]
-        self.first, self.count = np.full(len(cut.face), -1), np.ones(len(cut.face), int)
-        self.first[walk], self.count[walk] = first, count
+class _Section(Pieces):
+    """One wall cut at one height, and its stretches put together."""
 
     def sides(self) -> tuple[list[SideCurve], float]:
         """Curves, and the share of their length that bridges."""
         if not (self.kind == MINE).any():
             return [], 0.0
-        self.hit = self._behind()
-        chains = self._joined(self._stretches())
+        chains = self._joined(self.stretches())
         used = {r for c in chains for r in c.rows}
         chains = self._bridge([self._trimmed(self._grown(c, used)) for c in chains])
         curves, bridged = [], []
+        # Rings within an open wall are bores, upright holes in its material, and no side.
+        bored = any(not c.closed for c in chains)
         for chain in chains:
-            curve = self._curve(chain)
+            curve = None if bored and chain.closed else self._curve(chain)
             if curve is not None:
                 curves.append(curve)
                 bridged.append(_lengths(curve)[curve.face[:len(_lengths(curve))] == BRIDGE].sum())
@@ -174,47 +138,6 @@ class _Section:
         kept.sort(key=lambda i: tuple(np.round(curves[i].points.mean(axis=0) / (1e-3 * self.thick))))
         share = sum(bridged[i] for i in kept) / max(sum(total[i] for i in kept), 1e-30)
         return [curves[i] for i in kept], float(share)
-
-    def _behind(self) -> np.ndarray:
-        """(p,) int: the piece on the other side of the material, -2 when that is not a piece here, -1 when unbacked."""
-        out = np.full(len(self.a), -1)
-        mine = np.flatnonzero(self.kind == MINE)
-        inward = np.column_stack([self.way[mine, 1], -self.way[mine, 0], np.zeros(len(mine))])
-        middle = np.column_stack([0.5 * (self.a + self.b)[mine], np.full(len(mine), self.z)])
-        t, seg = first_hits(self.cut.tree, middle, inward, t_min=1e-4 * self.thick)
-        seg = seg.astype(np.int64)
-        across = self.cut.end[seg] - self.cut.start[seg]
-        size = np.maximum(np.linalg.norm(across, axis=1), 1e-30)
-        outward = np.column_stack([-across[:, 1], across[:, 0]]) / size[:, None]
-        own = np.column_stack([-self.way[mine, 1], self.way[mine, 0]])
-        dot = np.einsum("ij,ij->i", outward, own)
-        backed = (seg >= 0) & (t <= BACKED_REACH * self.thick) & (dot < BACKED_DOT)
-        at = middle[:, :2] + np.where(np.isfinite(t), t, 0.0)[:, None] * inward[:, :2]
-        share = np.einsum("ij,ij->i", at - self.cut.start[seg], across) / size**2
-        piece = self.first[seg] + np.clip((share * self.count[seg]).astype(int), 0, self.count[seg] - 1)
-        out[mine] = np.where(backed, np.where(self.first[seg] >= 0, piece, -2), -1)
-        return out
-
-    def _stretches(self) -> list[list[int]]:
-        """Maximal runs of backed pieces, cut at convex corners, in walking order; a whole loop may be one."""
-        out = []
-        backed = self.hit != -1
-        for loop in np.unique(self.loop[self.kind == MINE]):
-            rows = np.flatnonzero(self.loop == loop)
-            before = np.roll(rows, 1)
-            turn = _turn(self.way[before], self.way[rows])
-            opens = backed[rows] & (~backed[before] | (turn < -CORNER))
-            if not opens.any():
-                if backed[rows].all():
-                    out.append(rows.tolist())
-                continue
-            rows = np.roll(rows, -int(np.argmax(opens)))
-            opens = np.roll(opens, -int(np.argmax(opens)))
-            for run in np.split(rows, np.flatnonzero(opens)[1:]):
-                held = run[:int(np.argmin(backed[run]))] if not backed[run].all() else run
-                if self.length[held].sum() >= LEAST_STRETCH * self.thick:
-                    out.append(held.tolist())
-        return out
 
     def _joined(self, stretches: list[list[int]]) -> list[_Chain]:
         """Stretches that go on round a corner or behind a junction, joined along the loop."""
@@ -278,7 +201,7 @@ class _Section:
         way = self.way[row]
         while float(self.length[out].sum()) < GROW_LENGTH * self.thick:
             row = int(rows[(row - rows[0] + step) % len(rows)])
-            straight = abs(float(_turn(way[None], self.way[row][None])[0])) < GROW_TURN
+            straight = abs(float(turn_between(way[None], self.way[row][None])[0])) < GROW_TURN
             if row in used or self.kind[row] != MINE or self.hit[row] != -1 or not straight:
                 break
             out.append(row)
@@ -298,7 +221,7 @@ class _Section:
         near = int(np.searchsorted(reach, CURL_LENGTH * self.thick)) + 2
         if near < 3 or near > len(rows):
             return 0
-        turn = np.abs(_turn(self.way[rows[:near - 1]], self.way[rows[1:near]]))
+        turn = np.abs(turn_between(self.way[rows[:near - 1]], self.way[rows[1:near]]))
         at = reach[:near - 1]
         window = CURL_WINDOW * self.thick
         last = 0
@@ -402,7 +325,3 @@ def _lengths(curve: SideCurve) -> F64:
     p = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
     return np.asarray(np.linalg.norm(np.diff(p, axis=0), axis=1))
 
-
-def _turn(a: F64, b: F64) -> F64:
-    """Signed angle from unit directions a to b, (n,) rad, positive to the left."""
-    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))

@@ -40,6 +40,14 @@ def _lens():
     return plate(80, 60).union(wall.extrude(14).translate((0, 5, 3))).union(box(50, 2, 14, 0, 30, 3))
 
 
+def _bored():
+    """A wall 6 mm thick with two upright holes in it."""
+    import cadquery as cq
+
+    wall = box(50, 6, 22, 0, -10, 3).cut(cq.Workplane().pushPoints([(12, -7), (38, -7)]).circle(2).extrude(40))
+    return plate().union(wall).union(box(50, 2, 14, 0, 10, 3))
+
+
 OWN = {
     "slot": _slot,
     "lens": _lens,
@@ -49,6 +57,7 @@ OWN = {
     "oblique ends": lambda: _prism([(0, 0), (50, 0), (51.6, 2), (1.6, 2)]),
     "wedge": lambda: _prism([(0, -1), (50, 0), (0, 1)]),
     "slit ring": lambda: ring().cut(box(30, 3, 20, 0, -1.5, 4)),
+    "bored wall": _bored,
     "slab at mid height": lambda: pair().union(box(45, 9, 2, 2, -9, 9.5)),
 }
 
@@ -102,7 +111,8 @@ def test_every_wall_has_two_sides_with_the_void_on_the_left(name: str) -> None:
     ("cross", "W1", (50, 50)), ("cross", "W2", (50, 50)), ("wall with a window", "W2", (50, 50)),
     ("walls flush with the plate ends", "W1", (50, 50)), ("walls flush with the plate sides", "W1", (50, 50)),
     ("tray", "W1", (160, 144)), ("tray with a rib", "W2", (26, 26)), ("web on the floor", "W1", (8, 8)),
-    ("fillets at a bar", "W1", (50, 50)), ("bar through a wall", "W3", (50, 50)), ("wedge", "W1", (50.01, 50.01)),
+    ("fillets at a bar", "W1", (50, 50)), ("bored wall", "W1", (50, 50)),
+    ("bar through a wall", "W3", (50, 50)), ("wedge", "W1", (50.01, 50.01)),
 ])
 def test_lengths_are_those_of_the_sides_without_their_ends(name, wall, expected) -> None:
     assert sorted(length(c) for c in curves(name, wall)) == pytest.approx(sorted(expected), abs=0.02)
