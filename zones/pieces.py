@@ -16,7 +16,7 @@ BACKED_REACH = 3.0
 BACKED_DOT = -0.8
 PIECE = 0.5
 PIECES = 400
-LEAST_STRETCH = 0.2
+LEAST_STRETCH = 1.0
 CORNER = np.radians(45.0)
 
 FREE, MINE, OTHER = 0, 1, 2
@@ -80,7 +80,8 @@ class Pieces:
         outward = np.column_stack([-across[:, 1], across[:, 0]]) / size[:, None]
         own = np.column_stack([-self.way[mine, 1], self.way[mine, 0]])
         dot = np.einsum("ij,ij->i", outward, own)
-        backed = (seg >= 0) & (t <= BACKED_REACH * self.thick) & (dot < BACKED_DOT)
+        # Flanks of a connection may lie on a face of the wall; behind them is the connection.
+        backed = (seg >= 0) & (t <= BACKED_REACH * self.thick) & (dot < BACKED_DOT) & (self.seg_kind[seg] != OTHER)
         at = middle[:, :2] + np.where(np.isfinite(t), t, 0.0)[:, None] * inward[:, :2]
         share = np.einsum("ij,ij->i", at - self.cut.start[seg], across) / size**2
         piece = self.first[seg] + np.clip((share * self.count[seg]).astype(int), 0, self.count[seg] - 1)
