@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from examples.demo import write_demo
-from examples.family import RECIPES, FamilyPart, draw_layout, make_part
+from examples.family import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
+from examples.freewall import FreeWall
 from examples.gaps import channels
+from examples.joins import fork, join
 from examples.layout import Layout, LayoutError, Plate, check
+from examples.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
 from examples.walls import LEFT, RIGHT, WallSpec
 
 cq = pytest.importorskip("cadquery")
@@ -171,7 +174,7 @@ def test_every_recipe_is_drawn_for_several_seeds():
         for seed in range(2):
             layout = draw_layout(seed, name)
             assert len(layout.walls) >= 2
-            if name != "random":
+            if name != "random" and not name.startswith("mixed"):
                 assert layout.connections, f"{name}-{seed} has no connection"
 
 
@@ -180,3 +183,144 @@ def test_every_recipe_is_drawn_for_several_seeds():
 def test_random_parts_are_valid(seed):
     part = make_part(seed)
     assert part.shape.isValid() and 2 <= len(part.truth["walls"]) <= 6
+
+
+MIXED = [(7, {}), (3, {"walls": 2, "connections": 3}), (5, {"walls": 3, "connections": 2, "arrangement": "radial"})]
+
+
+@pytest.fixture(scope="module")
+def mixed() -> list[FamilyPart]:
+    return [make_part(seed, "mixed", **overrides) for seed, overrides in MIXED]
+
+
+def test_a_new_recipe_changes_no_part_of_an_old_one():
+    assert {k: NUMBERS[k] for k in ("demo", "impeller", "leaning_pair", "narrow", "random", "three_walls", "wavy")} == {
+        "demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4, "three_walls": 5, "wavy": 6}
+    assert set(NUMBERS) == set(RECIPES) and len(set(NUMBERS.values())) == len(NUMBERS)
+
+
+def test_the_paper_s_curve_has_its_knots_and_ends():
+    control = np.array([(100, 0), (196, 34), (281, 102), (346, 199), (383, 321), (385, 459), (350, 606), (274, 751),
+                        (156, 886), (0, 1000)], float)
+    curve = spline(control)
+    assert curve.k == 4 and len(curve.t) == 15 and np.allclose(np.diff(curve.t[4:11]), 1 / 6)
+    assert np.allclose(curve([0.0, 1.0]), control[[0, -1]])
+
+
+@pytest.mark.parametrize("kind", OPEN_TYPES)
+def test_open_profiles_show_the_bends_they_are_drawn_with(kind):
+    for seed in range(20):
+        profile = draw_open(np.random.default_rng(seed), kind, 60.0)
+        left, right = profile.labels
+        curve = profile.curve(np.linspace(0, 1, 3001))
+        turns = [turn for turn, _ in bends(curve) if abs(turn) > 8]
+        assert [int(np.sign(t)) for t in turns] == list(BENDS[kind])
+        assert all(abs(t) >= 35 for t in turns)
+        assert clear(left, curve, False) and clear(right, curve[::-1], False)
+        assert np.allclose(curve[[0, -1], 1], 0.0, atol=1e-9)
+
+
+def test_skewed_profiles_mirror_each_other_and_level_ones_are_level():
+    for seed in range(10):
+        lean = {k: skew(draw_open(np.random.default_rng(seed), k, 50.0).curve(np.linspace(0, 1, 2001)))
+                for k in ("C3", "C7", "C8", "C9")}
+        assert lean["C7"] < -0.155 and lean["C8"] > 0.155 and abs(lean["C3"]) < 0.04 and abs(lean["C9"]) < 0.04
+
+
+@pytest.mark.parametrize(("kind", "ups"), [("C5", 5), ("C6", 2), ("oval", 0)])
+def test_closed_profiles_run_round_once(kind, ups):
+    for seed in range(10):
+        curve = draw_closed(np.random.default_rng(seed), kind, 12.0).curve(np.linspace(0, 1, 3001))[:-1]
+        inside = [turn for turn, _ in bends(curve, closed=True)]
+        assert sum(inside) == pytest.approx(-360.0, abs=0.5)
+        assert sum(turn > 30 for turn in inside) == ups
+
+
+def test_mixed_parts_are_one_solid_and_their_truth_is_on_it(mixed):
+    for part in mixed:
+        solid, truth = part.shape, part.truth
+        assert solid.isValid() and len(solid.Solids()) == 1 and all(s.wrapped.Closed() for s in solid.Shells())
+        for wall in truth["walls"]:
+            assert len(wall["profiles"]) == 2 and np.array(wall["control_points"]).shape == (10, 2)
+            for point in wall["side_points"]:
+                assert cq.Vertex.makeVertex(*point).distance(solid) < 1e-3
+        for connection in truth["connections"]:
+            assert solid.isInside(cq.Vector(*connection["point"]))
+            assert 2 <= len(connection["walls"]) <= 3
+        assert truth["features"] == sorted(truth["features"])
+
+
+def test_mixed_gaps_are_distances_of_the_wall_solids(mixed):
+    for part in mixed:
+        for channel in part.truth["channels"]:
+            i, j = channel["walls"]
+            if channel["primary"] and i != j and part.layout.fillet == 0:
+                distance = part.layout.walls[i].solid().distance(part.layout.walls[j].solid())
+                assert distance <= channel["gap_min"] * 1.001
+                if "radial" not in part.truth["features"]:
+                    assert distance == pytest.approx(channel["gap_min"], rel=0.02)
+
+
+def ring(radius: float) -> FreeWall:
+    angle = np.arange(10) * 2 * np.pi / 10
+    profile = Profile("oval", radius * np.column_stack([np.cos(angle), np.sin(angle)]), closed=True)
+    return FreeWall("closed", profile.control, 4.0, 10.0, (2.0, 2.0), profile=profile)
+
+
+def test_gap_of_nested_rings_and_of_a_ring_with_itself():
+    outer, inner = ring(20.0), ring(12.0)
+    far = np.hypot(*outer.side_curve(LEFT).T).min() - np.hypot(*inner.side_curve(RIGHT).T).max()
+    found = {g.walls: g.gap_min for g in channels([outer, inner], n_u=121, n_v=3)}
+    assert found[0, 1] == pytest.approx(far, abs=1e-3)
+    assert found[1, 1] == pytest.approx(2 * np.hypot(*inner.side_curve(LEFT).T).min(), abs=1e-2)
+
+
+@pytest.mark.parametrize("options", [{}, {"strips": 4}, {"merged": True}])
+def test_free_walls_are_valid_whatever_their_faces(options):
+    profile = draw_open(np.random.default_rng(1), "C2", 45.0)
+    wall = FreeWall("curved", profile.control, 4.0, 12.0, (2.0, 1.6), (0.08, -0.05), profile=profile, **options)
+    solid = wall.solid()
+    assert solid.isValid() and solid.Closed()
+    u, v = np.linspace(0.1, 0.9, 5), np.full(5, 0.5)
+    for side, label in zip((LEFT, RIGHT), profile.labels, strict=True):
+        assert clear(label, wall.side_curve(side), False)
+        for q, m in zip(wall.side_point(side, u, v), wall.side_normal(side, u, v), strict=True):
+            assert not solid.isInside(cq.Vector(*(q + 1e-2 * m))) and solid.isInside(cq.Vector(*(q - 1e-2 * m)))
+
+
+def test_a_fork_ends_in_every_wall_it_names():
+    x = np.linspace(-25, 25, 10)[:, None]
+    lines = [Profile(None, np.column_stack([x, np.full_like(x, y)])) for y in (0.0, 10.0)]
+    walls = [FreeWall("straight", p.control, 4.0, 12.0, (2.0, 2.0), profile=p) for p in lines]
+    spec = fork(walls, 0, LEFT, 0.5, 10.0, spread=0.5, width=1.4, depth=1.6)
+    assert spec.indices == (0, 1) and spec.visible.geom_type == "Polygon"
+    solid = spec.solid()
+    assert solid.isValid() and solid.BoundingBox().zmin == pytest.approx(9.2)
+    assert all(solid.intersect(w.solid()).Volume() > 0.5 for w in walls)
+
+
+def test_joins_find_the_other_stretch_of_the_same_wall():
+    wall = ring(12.0)
+    with pytest.raises(LayoutError, match="too far"):
+        join([wall], 0, LEFT, 0.3, "bar", (9.0, 9.0), width=1.5, depth=1.5)
+    small = ring(6.0)
+    spec = join([small], 0, LEFT, 0.3, "bar", (9.0, 9.0), width=1.5, depth=1.5)
+    assert spec.indices == (0, 0)
+
+
+def test_reach_of_a_part_is_a_share_with_its_error(tmp_path):
+    part = make_part(7, "mixed")
+    _, truth, _ = part.write(tmp_path, reach=True)
+    reach = json.loads(truth.read_text())["reach"]
+    assert 0.3 < reach["share"] < 1.0 and reach["error"] < 0.03
+    assert max(reach["by_tool"].values()) <= reach["share"] + reach["error"]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", range(20))
+def test_mixed_layouts_keep_the_numbers_of_the_family(seed):
+    layout = draw_layout(seed, "mixed")
+    assert 2 <= len(layout.walls) <= 12 and 0 <= len(layout.connections) <= 16
+    gaps = [g.gap_min for g in layout.gaps(n_u=121, n_v=3)]
+    assert not gaps or min(gaps) > 0.25
