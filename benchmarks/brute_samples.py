@@ -24,8 +24,8 @@ they are grown by that too. What play and look-up cost is measured apart, agains
 be gained if contacts whose normal leans from n, but whose profile still passes p within the lift, were tried.
 
 A grown solid stands farther from the wall it touches by as much as it is grown, so on its own wall it sees no better
-than the solid itself: where facets of a steep wall ripple by thousandths of a millimetre, some samples count as wrong that
-reach is right about. That was at most 0.03 % of area on the parts tried.
+than the solid itself: where facets of a steep wall ripple by thousandths of a millimetre, some samples count as wrong
+that reach is right about. That was at most 0.03 % of area on the parts tried.
 """
 
 from __future__ import annotations
