@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from geometry.keyed import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface
 from service.prepare import Prepared, machinable_triangles
 from toolpath.plan import Checks, Plan
@@ -107,20 +107,9 @@ def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, lab
 
     owner : (m,) zone of the planning samples, 0 for none; dense, labels : in the frame of the view
     """
-    zone = np.zeros(len(dense), np.int32)
     codes = {"level": 0, "shallow": 1, "steep": 2}
     key = view.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(view.samples.normals)])
     wanted = dense.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(dense.normals)])
-    order, dense_order = np.argsort(key, kind="stable"), np.argsort(wanted, kind="stable")
-    for value in np.unique(wanted):
-        rows = dense_order[slice(*np.searchsorted(wanted[dense_order], [value, value + 1]))]
-        pool = order[slice(*np.searchsorted(key[order], [value, value + 1]))]
-        if not len(pool):
-            continue
-        k = min(NEIGHBOURS, len(pool))
-        _, near = cKDTree(view.samples.points[pool]).query(dense.points[rows], k=k, workers=2)
-        near = pool[near.reshape(len(rows), k)]
-        owners = owner[near]
-        first = np.argmax(owners > 0, axis=1)
-        zone[rows] = owners[np.arange(len(rows)), first]
-    return zone
+    near = KeyedPoints(key, view.samples.points).nearest(wanted, dense.points, NEIGHBOURS)
+    owners = np.where(near >= 0, owner[near], 0)
+    return np.asarray(owners[np.arange(len(dense)), np.argmax(owners > 0, axis=1)], np.int32)

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from geometry.keyed import KeyedPoints
 from geometry.mesh import F64, I32
 from geometry.sampling import SurfaceSamples
 from geometry.trim import FacePatch, trim_faces
@@ -19,9 +19,9 @@ from zones.machinable import LEVEL, STEEP
 from zones.view import View
 from zones.zoning import ZoneArea
 
-PITCH = 0.35  # mm between the points a face is asked at first; wider where that would be more than MOST of them
+PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them
 MOST = 4e5
-TOLERANCE = 0.01  # mm, how near a border is to the change of zone
+TOLERANCE = 0.02  # mm, how near a border is to the change of zone
 REST = 0  # label of what no zone holds
 MOST_CELLS = 1 << 20
 
@@ -60,44 +60,21 @@ class Nearest:
         s = view.samples.subset(inner)
         self.view, self.owner = view, owner[inner]
         self.names = {r: k for k, r in enumerate(view.labels.regions)}
-        self.cells = _trees(_key(s, view.labels.code[inner]), s.points)
-        self.faces = _trees(s.face.astype(np.int64), s.points)
+        self.cells = KeyedPoints(_key(s, view.labels.code[inner]), s.points)
+        self.faces = KeyedPoints(s.face.astype(np.int64), s.points)
 
     def __call__(self, points: F64, normals: F64, face: I32) -> NDArray[np.int64]:
         """Labels (k,) of points (k, 3) mm with unit normals on faces (k,)."""
         here = SurfaceSamples(points, normals, np.zeros(len(points)), face, np.zeros(len(points), np.int32))
         labels = self.view.label(here)
         code = np.array([self.names.get(r, -1) for r in labels.regions], dtype=np.int64)[labels.code]
-        found = _nearest(self.cells, np.where(code >= 0, _key(here, code), -1), points)
+        found = self.cells.nearest(np.where(code >= 0, _key(here, code), -1), points)[:, 0]
         lone = np.flatnonzero(found < 0)
-        found[lone] = _nearest(self.faces, face[lone].astype(np.int64), points[lone])
+        found[lone] = self.faces.nearest(face[lone].astype(np.int64), points[lone])[:, 0]
         return np.where(found >= 0, self.owner[found], REST)
-
-
-Trees = dict[int, tuple[NDArray[np.int64], cKDTree]]
 
 
 def _key(samples: SurfaceSamples, code: NDArray[np.int64]) -> NDArray[np.int64]:
     nz = samples.normals[:, 2]
     form = np.where(nz > LEVEL, 0, np.where(nz < STEEP, 2, 1))
     return np.asarray((samples.face.astype(np.int64) * 3 + form) * MOST_CELLS + code)
-
-
-def _groups(key: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
-    order = np.argsort(key, kind="stable")
-    cuts = np.flatnonzero(np.diff(key[order])) + 1
-    return [(int(key[rows[0]]), rows) for rows in np.split(order, cuts) if len(rows)]
-
-
-def _trees(key: NDArray[np.int64], points: F64) -> Trees:
-    return {k: (rows, cKDTree(points[rows])) for k, rows in _groups(key)}
-
-
-def _nearest(trees: Trees, key: NDArray[np.int64], points: F64) -> NDArray[np.int64]:
-    """(k,) row of the nearest sample with the same key, -1 where none has it."""
-    out = np.full(len(points), -1, np.int64)
-    for value, rows in _groups(key):
-        if value in trees:
-            pool, tree = trees[value]
-            out[rows] = pool[tree.query(points[rows], workers=2)[1]]
-    return out

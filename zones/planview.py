@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -114,7 +115,7 @@ class ChannelPlan:
         out[rows[todo]] = self.rays.nearest(foot[todo], side[todo], wall[rows[todo]])
         return out
 
-    @property
+    @cached_property
     def by_size(self) -> NDArray[np.int64]:
         """Rows of the channels that are drawn, the largest in plan first: where two overlap, it has the cell."""
         size = {n: float(self.plan.faces.areas[self.plan.over[:, k]].sum()) for k, n in enumerate(self.plan.names)}

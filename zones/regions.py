@@ -110,6 +110,11 @@ class Regioner:
         self.connections = decomposition.connections
         self.plan = channels.plan if first else PlanMap.of(footprints(part, decomposition))
         self.column = [self.plan.names.index(c.id) if c.id in self.plan.names else -1 for c in self.connections]
+        self.bases = sorted({*self.base.values(), *channels.names})
+        place = {b: k for k, b in enumerate(self.bases)}
+        self.table = np.full(max(self.base, default=0) + 1, -1, np.int64)
+        self.table[list(self.base)] = [place[b] for b in self.base.values()]
+        self.of_channel = np.array([place[c] for c in channels.names], dtype=np.int64)
         self.trees = {c.id: TriangleTree(_only(part, c.faces)) for c in decomposition.connections}
 
     def of(self, points: F64, normals: F64, face: NDArray[np.int32], first: tuple[F64, F64] | None = None) -> Labels:
@@ -120,15 +125,9 @@ class Regioner:
         first           : the same points and normals in the frame of the first access; None where that is this one
         """
         there = (points, normals) if first is None else first
-        bases = sorted({*self.base.values(), *self.channels.names})
-        place = {b: k for k, b in enumerate(bases)}
-        table = np.full(max(self.base, default=0) + 1, -1, np.int64)
-        for number, name in self.base.items():
-            table[number] = place[name]
-        base = table[face]
+        bases, base = self.bases, self.table[face]
         channel = self.channels.channel_of(*there, face)
-        to_base = np.array([place[c] for c in self.channels.names], dtype=np.int64)
-        base = np.where(channel >= 0, to_base[channel] if len(to_base) else base, base)
+        base = np.where(channel >= 0, self.of_channel[channel] if len(self.of_channel) else base, base)
         over, under = self._stack(points, normals, base, bases)
         code, example = _distinct(base, over, under)
         ids = [c.id for c in self.connections]

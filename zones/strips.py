@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
+from geometry.keyed import KeyedPoints
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.rays import first_hits
@@ -92,31 +93,32 @@ class RayIndex:
            names: Sequence[str]) -> RayIndex:
         walls = [w.id for w in decomposition.walls]
         named = [n for c, s in zip(curves, sides, strict=True) for n in s.spread_names(c.closed)]
+        wall = [walls.index(c.wall) for c, s in zip(curves, sides, strict=True) for _ in s.named]
         return RayIndex(np.concatenate([np.zeros((0, 2)), *(s.start for s in sides)]),
-                     np.concatenate([np.zeros((0, 2)), *(s.normal for s in sides)]),
-                     np.array([walls.index(c.wall) for c, s in zip(curves, sides, strict=True) for _ in s.named],
-                              dtype=np.int64),
-                     np.array([names.index(n) if n else -1 for n in named], dtype=np.int64))
+                        np.concatenate([np.zeros((0, 2)), *(s.normal for s in sides)]),
+                        np.array(wall, dtype=np.int64),
+                        np.array([names.index(n) if n else -1 for n in named], dtype=np.int64))
 
     def nearest(self, at: F64, side: F64, wall: NDArray[np.int64]) -> NDArray[np.int64]:
         """(n,) channel of the nearest ray of the same wall that leaves to the same side, -1 for none.
 
         at, side : (n, 2) float64, mm and unit; wall : (n,) rows
         """
-        out = np.full(len(at), -1, np.int64)
-        for k in np.unique(wall):
-            rows, own = np.flatnonzero(wall == k), np.flatnonzero(self.wall == k)
-            if not len(own):
-                continue
-            near = own[cKDTree(self.start[own]).query(at[rows], k=min(NEIGHBOURS, len(own)))[1].reshape(len(rows), -1)]
-            same = np.einsum("nkj,nj->nk", self.normal[near], side[rows]) > SAME_SIDE
-            pick = near[np.arange(len(rows)), same.argmax(axis=1)]
-            out[rows] = np.where(same.any(axis=1), self.channel[pick], -1)
-        return out
+        if not len(self.wall):
+            return np.full(len(at), -1, np.int64)
+        near = self.index.nearest(wall, at, NEIGHBOURS)
+        same = (np.einsum("nkj,nj->nk", self.normal[near], side) > SAME_SIDE) & (near >= 0)
+        pick = near[np.arange(len(at)), same.argmax(axis=1)]
+        return np.where(same.any(axis=1), self.channel[pick], -1)
+
+    @cached_property
+    def index(self) -> KeyedPoints:
+        """The starts by wall."""
+        return KeyedPoints(self.wall, self.start)
 
 
 def side_rays(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve],
-            shadows: Sequence[shapely.Geometry]) -> list[SideRays]:
+              shadows: Sequence[shapely.Geometry]) -> list[SideRays]:
     """What the rays of every side saw."""
     d = decomposition
     through = {f for c in d.connections for f in c.faces} | {f.number for f in part.faces if f.sliver}

@@ -1,0 +1,44 @@
+"""Nearest points among those of the same key."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64
+
+APART = 4.0  # times the extent of the points: how far one key is from the next along the added axis
+
+
+class KeyedPoints:
+    """A hierarchy over points with one axis more, along which different keys lie out of each other's reach.
+
+    key    : (n,) int64, any values
+    points : (n, d) float64, mm
+    """
+
+    def __init__(self, key: NDArray[np.int64], points: F64) -> None:
+        self.keys, place = np.unique(key, return_inverse=True)
+        self.low = points.min(axis=0) if len(points) else np.zeros(points.shape[1])
+        span = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+        self.step = APART * span + 1.0
+        self.reach = 0.5 * self.step
+        self.tree = cKDTree(np.column_stack([points, self.step * place.reshape(-1)]))
+
+    def nearest(self, key: NDArray[np.int64], points: F64, k: int = 1) -> NDArray[np.int64]:
+        """Rows of the nearest points of the same key.
+
+        key    : (m,) int64
+        points : (m, d) float64, mm, not farther from the indexed ones than twice their extent
+        Returns (m, k) int64, nearest first; -1 where the key has fewer.
+        """
+        out = np.full((len(points), k), -1, np.int64)
+        if not len(self.keys) or not len(points):
+            return out
+        place = np.minimum(np.searchsorted(self.keys, key), len(self.keys) - 1)
+        known = np.flatnonzero(self.keys[place] == key)
+        at = np.column_stack([points[known], self.step * place[known]])
+        _, row = self.tree.query(at, k=list(range(1, k + 1)), distance_upper_bound=self.reach, workers=2)
+        out[known] = np.where(row < self.tree.n, row, -1)
+        return out
