@@ -24,7 +24,7 @@ from examples.freewall import FreeWall
 from examples.gaps import Gap
 from examples.impeller import impeller
 from examples.joins import ForkSpec, takes_fillets
-from examples.layout import Layout, LayoutError, check
+from examples.layout import Layout, LayoutError, WindowSpec, check
 from examples.mixed import mixed, mixed_linear, mixed_radial
 from examples.setups import suggest_setup
 from examples.walls import WallSpec
@@ -235,8 +235,9 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
         "seat_z": 0.0,
         "fillet": layout.fillet,
         **({"features": features_of(layout, gaps)} if free else {}),
-        "walls": [_wall_truth(k, w) for k, w in enumerate(layout.walls)],
+        "walls": [_wall_truth(layout, k, w) for k, w in enumerate(layout.walls)],
         "connections": [_connection_truth(k, c) for k, c in enumerate(layout.connections)],
+        **({"windows": [_window_truth(w) for w in layout.windows]} if free else {}),
         "channels": [
             {"walls": list(g.walls), "gap_min": round(g.gap_min, 6), "at": [round(c, 4) for c in g.at],
              "border": g.border, "facing_area": round(g.area, 3), "primary": _primary(layout, g)}
@@ -275,8 +276,24 @@ def _primary(layout: Layout, gap: Gap) -> bool:
     return bool(gap.area >= 2 * 0.25 * smaller)
 
 
-def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:
-    middle = np.array([0.5])
+def _side_point(layout: Layout, wall: WallSpec, side: int) -> Any:
+    """A point of a side, (3,) float64, mm: in the middle, on a free wall where the solid has the side there."""
+    tries = [(u, v) for v in (0.5, 0.65, 0.35, 0.8) for u in (0.5, 0.42, 0.58, 0.66, 0.34, 0.74, 0.26, 0.82, 0.18)]
+    others = [w for w in layout.walls if w is not wall]
+    for u, v in tries if isinstance(wall, FreeWall) else ():
+        p = wall.side_point(side, np.array([u]), np.array([v]))[0]
+        at = Point(p[:2])
+        mine = [c for c in layout.connections if any(layout.walls[k] is wall for k in c.indices)]
+        covers = [(c.footprint(), c.z_range) for c in mine]
+        covers += [(w.footprint(), w.z) for w in layout.windows if w.wall is wall]
+        free = not any(z[0] - 0.5 < p[2] < z[1] + 0.5 and outline.distance(at) < 0.5 for outline, z in covers)
+        free &= not layout.meets or all(w.section(p[2]).distance(at) > 0.2 for w in others)
+        if free and not layout.base.blocked(p[None], p[None] * [1.05, 1.05, 1.0])[0]:
+            return p
+    return wall.side_point(side, np.array([0.5]), np.array([0.5]))[0]
+
+
+def _wall_truth(layout: Layout, index: int, wall: WallSpec) -> dict[str, Any]:
     shape: dict[str, Any] = {}
     if isinstance(wall, FreeWall):
         p = wall.profile
@@ -292,9 +309,15 @@ def _wall_truth(index: int, wall: WallSpec) -> dict[str, Any]:
         "thickness_floor_top": list(wall.thickness),
         "lean": list(wall.lean),
         "z": [wall.z_floor, wall.z_top],
-        "side_points": [[round(float(c), 4) for c in wall.side_point(s, middle, middle)[0]] for s in (1, -1)],
+        "side_points": [[round(float(c), 4) for c in _side_point(layout, wall, s)] for s in (1, -1)],
         **shape,
     }
+
+
+def _window_truth(window: WindowSpec) -> dict[str, Any]:
+    middle = window.wall.axis_point(window.u, 0.5 * sum(window.z))
+    return {"wall": window.index, "width": round(window.width, 3), "z": [round(v, 3) for v in window.z],
+            "at": [round(float(c), 3) for c in middle]}
 
 
 def _connection_truth(index: int, c: ConnectionSpec | ForkSpec) -> dict[str, Any]:

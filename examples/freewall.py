@@ -26,7 +26,7 @@ class FreeWall(WallSpec):
     """A wall whose centre line is a drawn profile.
 
     profile : Profile in plan, mm; its curve is the middle of an open wall and the inner side of a closed one
-    strips  : faces that each side is cut into along the wall
+    strips  : faces that each side is cut into along the wall; a closed side of one face has a seam
     merged  : whether both sides and both ends are one face (ends rounded)
     Thickness, lean and height are those of WallSpec; lean differs between start and end where the wall is twisted.
     """
@@ -55,7 +55,8 @@ class FreeWall(WallSpec):
     def features(self) -> set[str]:
         """Words for what is special about the wall."""
         words = {"closed"} if self.closed else set()
-        words |= {"strips"} if self.strips > 1 else set()
+        words |= {"seam"} if self.closed and self.strips == 1 else set()
+        words |= {"strips"} if self.strips > (2 if self.closed else 1) else set()
         words |= {"merged_face"} if self.merged else set()
         words |= {"taper"} if self.thickness[0] != self.thickness[1] else set()
         if any(self.lean):
@@ -165,17 +166,21 @@ class FreeWall(WallSpec):
         """The wall as a cadquery Solid, reaching ``BURIED`` mm below its floor."""
         bottom = -BURIED / self.height
         if self.closed:
-            outer, inner = ([self._edge(self._rail(s, v)) for v in (bottom, 1.0)] for s in (RIGHT, LEFT))
+            outer, inner = ([self._edge(self._rail(s, v), self.strips) for v in (bottom, 1.0)] for s in (RIGHT, LEFT))
             return _loft(outer).cut(_loft(inner)).Solids()[0]
         if self.merged:
             return _loft([self._edge(self.loop(v)) for v in (bottom, 1.0)])
         return _loft([self._outline(v) for v in (bottom, 1.0)])
 
     @staticmethod
-    def _edge(curve: BSpline) -> Any:
+    def _edge(curve: BSpline, pieces: int = 1) -> Any:
         import cadquery as cq
 
-        return cq.Wire.assembleEdges([to_edge(curve)])
+        if pieces == 1:
+            return cq.Wire.assembleEdges([to_edge(curve)])
+        at = np.linspace(curve.t[0], curve.t[-1], pieces + 1)
+        spans = zip(at[:-1], at[1:], strict=True)
+        return cq.Wire.assembleEdges([to_edge(curve, (float(a), float(b))) for a, b in spans])
 
     def _outline(self, v: float) -> Any:
         if self.strips == 1:

@@ -126,6 +126,8 @@ def _draw_wall(rng: Generator, style: Style, profile: Profile, thickest: float, 
     faces = rng.random()
     bent = profile.type is not None and not profile.closed
     strips = int(rng.integers(3, 9)) if bent and faces < 0.12 else 1
+    if profile.closed:
+        strips = 1 if faces < 0.15 else 2 if faces < 0.75 else 4
     return FreeWall(kind, profile.control, style.z, height, (foot, top), (float(lean[0]), float(lean[1])),
                     profile=profile, strips=strips, merged=bool(bent and faces > 0.95))
 
