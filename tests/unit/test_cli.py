@@ -35,7 +35,7 @@ class FakeChain(types.ModuleType):
     def zones_only(self, part_path, setup, progress):
         return self._say(progress)
 
-    def verify_program(self, part_path, setup, program_text, progress):
+    def verify_program(self, part_path, setup, program_text, progress, access=None):
         assert program_text.strip()
         return self._say(progress)
 
@@ -131,3 +131,45 @@ def test_help_imports_nothing_heavy():
     text = ("import sys, service.cli; "
             "print([m for m in ('numpy', 'numba', 'fastapi', 'pydantic', 'OCP', 'dask') if m in sys.modules])")
     assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The family with a maker that builds nothing."""
+    from pathlib import Path
+
+    from examples import family
+    from examples.layout import LayoutError
+
+    class Part:
+        def __init__(self, name):
+            self.name = name
+
+        def write(self, folder, *, reach=False):
+            paths = [Path(folder, f"{self.name}.{end}") for end in ("step", "truth.json", "setup.json")]
+            for path in paths:
+                path.write_text(str(reach))
+            return tuple(paths)
+
+    def make(seed, recipe, **wanted):
+        if wanted.get("walls", 2) > 12:
+            raise LayoutError("the family has 2 to 12 walls and 0 to 16 connections")
+        return Part(f"{recipe}-{seed}")
+
+    monkeypatch.setattr(family, "make_part", make)
+
+
+def test_family_writes_three_files_a_part_and_lists_them(drawn, tmp_path):
+    got = call("family", "--seed", 7, "--count", 2, "--out", tmp_path / "parts")
+    files = json.loads(got.stdout)
+    assert got.exit_code == 0 and len(files) == 6
+    assert [f.rsplit("/", 1)[1] for f in files[:3]] == ["mixed-7.step", "mixed-7.truth.json", "mixed-7.setup.json"]
+    assert all((tmp_path / "parts" / f.rsplit("/", 1)[1]).exists() for f in files)
+
+
+@pytest.mark.parametrize(("args", "code"), [
+    (("--recipe", "teapot"), "unknown_recipe"), (("--walls", "40"), "impossible_layout"),
+    (("--recipe", "demo", "--walls", "3"), "not_of_this_recipe")])
+def test_family_says_what_it_cannot_draw(drawn, tmp_path, args, code):
+    got = call("family", *args, "--out", tmp_path / "parts")
+    assert got.exit_code == 2 and code in got.stderr and got.stdout == ""
