@@ -40,6 +40,17 @@ def compare(recipe: str, seed: int, folder: Path, fillet: float = 0.0) -> None:
             assert gaps[pair] == pytest.approx(channel["gap_min"], rel=0.02), pair
 
 
+def compare_mixed(seed: int, folder: Path, **overrides: object) -> None:
+    """Walls, connections, primary gaps and, where there is a classifier, profile types of a mixed part all right."""
+    from benchmarks.family_score import compare as hold_against
+    from examples.family import make_part
+
+    made = make_part(seed, "mixed", **overrides)
+    part = read_part(made.write(folder)[0], chord=0.004)
+    found = hold_against(part, decompose(part), made.truth)
+    assert found["right"], found["causes"]
+
+
 def nearest_wall(part: Part, sides: tuple[int, ...], walls: list[dict]) -> int:
     """Index of the true wall whose side points lie on a found wall."""
     from trimesh.triangles import closest_point
@@ -59,6 +70,17 @@ def channel_gaps(d: Decomposition, place: dict[str, int]) -> dict[tuple[int, int
 @pytest.mark.parametrize(("recipe", "seed"), EVERYDAY)
 def test_named_parts(recipe: str, seed: int, tmp_path: Path) -> None:
     compare(recipe, seed, tmp_path)
+
+
+def test_two_mixed_walls(tmp_path: Path) -> None:
+    compare_mixed(7, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_mixed(seed: int, tmp_path: Path) -> None:
+    compare_mixed(seed, tmp_path)
 
 
 @pytest.mark.slow
