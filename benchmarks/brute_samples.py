@@ -39,7 +39,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -375,8 +374,7 @@ def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, norm
     field = reach.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, reach.lattice_step(tool), allowance,
                            cusp)
     played = reach.touchable(field, points, normals, lift)[1]
-    with patch.object(reach, "PLAY_STEPS", 0.0):
-        by_cutter, by_tool, _ = reach.touchable(field, points, normals, lift)
+    by_cutter, by_tool, _ = reach.touchable(field, points, normals, lift, play=0.0)
     return {"cutter": by_cutter, "tool": by_tool, "played": played}
 
 

@@ -209,7 +209,7 @@ class _Shop:
             bare = replace(body, shank_diameter=body.diameter, holder=())
             near = TipField(self.tree, bare, self.clear, self.part.bounds, body.radius, lattice_step(body),
                             self.allowance, self.cusp)
-            _, fits, tips = touchable(near, points[ready], normals[ready], self.lift)
+            _, fits, tips = touchable(near, points[ready], normals[ready], self.lift, aim=False)
             rows = ready[fits]
             if not len(rows):
                 continue

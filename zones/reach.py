@@ -257,12 +257,34 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
     return np.ascontiguousarray(out)
 
 
-def touchable(field: TipField, points: F64, normals: F64,
-              lift: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
+    """Tips (n, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards the nearest free node.
+
+    One direction for each, so one step of the lattice is what can be missed where any place under the flat is free.
+    """
+    lat, out = field.lattice, np.column_stack([points[:, :2], tip_z])
+    level = np.round(tip_z, 6)  # a plane that was turned is level but for rounding
+    for z in np.unique(level):
+        mine = np.flatnonzero(level == z)
+        free = field.cut_height <= z
+        if not free.any():
+            continue
+        near = distance_transform_edt(~free, return_distances=False, return_indices=True)
+        i, j = near[:, *lat.cells(points[mine, :2])]
+        way = np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i]) - points[mine, :2]
+        far = np.linalg.norm(way, axis=1)
+        out[mine, :2] += way * np.minimum(1.0, (flat - 1e-3) / np.maximum(far, 1e-12))[:, None]
+    return out
+
+
+def touchable(field: TipField, points: F64, normals: F64, lift: float, play: float = PLAY_STEPS,
+              aim: bool = True) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
     """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
 
-    Beside a wall the tool must also have room to move away from it by ``PLAY_STEPS`` lattice steps: a channel that
-    fits it like a gauge is for the next thinner tool.
+    play : lattice steps of room to move away from a wall beside it: a channel that fits the tool like a gauge is for
+           the next thinner one
+    aim  : whether a flat bottom is also tried over a level place from the nearest free node of the lattice, which has
+           to be laid out for that
 
     Returns
     -------
@@ -278,7 +300,7 @@ def touchable(field: TipField, points: F64, normals: F64,
     upright = np.flatnonzero(cutter & (np.abs(normals[:, 2]) < 0.5))
     aside = tips[upright]
     side = normals[upright, :2] / np.linalg.norm(normals[upright, :2], axis=1, keepdims=True)
-    aside[:, :2] += PLAY_STEPS * field.lattice.step * side
+    aside[:, :2] += play * field.lattice.step * side
     cutter[upright] = ~field.blocked_by_cutter(aside)
     whole = cutter & ~field.blocked_by_body(tips)
     flat = tool.radius - tool.corner_radius
@@ -297,6 +319,15 @@ def touchable(field: TipField, points: F64, normals: F64,
                 cutter[todo] |= free
                 whole[todo[ok]] = True
                 tips[todo[better]] = trial[better]
+        todo = np.flatnonzero(level & ~whole)
+        if aim and len(todo):
+            trial = _aimed(field, points[todo], tips[todo, 2], flat)
+            free = ~field.blocked_by_cutter(trial)
+            ok = free & ~field.blocked_by_body(trial)
+            better = ok | (free & ~cutter[todo])
+            cutter[todo] |= free
+            whole[todo[ok]] = True
+            tips[todo[better]] = trial[better]
     tips[:, 2] -= LEVEL_TOLERANCE
     seen = normals[:, 2] > -0.02
     return cutter & seen, whole & seen, tips

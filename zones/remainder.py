@@ -203,7 +203,7 @@ def _too_thick(thinnest: ToolBody, few: SurfaceSamples, tree: TriangleTree, part
             ahead, _ = first_hits(tree, few.points, few.normals, 1e-3, 1e6)
         body = replace(thinnest, diameter=d, corner_radius=corner, shank_diameter=d, neck_diameter=d, holder=())
         field = TipField(tree, body, Clearances(), part.bounds, d, lattice_step(body))
-        fits, _, tips = touchable(field, few.points[left], few.normals[left], lift)
+        fits, _, tips = touchable(field, few.points[left], few.normals[left], lift, aim=False)
         for k in np.flatnonzero(fits & (_upright(few.normals[left]) | (kind == "ball"))):
             i = int(left[k])
             reason[i] = "gap" if float(ahead[i]) < thinnest.diameter * 1.5 else "corner"

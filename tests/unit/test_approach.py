@@ -11,7 +11,6 @@ from geometry.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool
-from zones import reach
 from zones.approach import approach, directions_over_hemisphere, resolution_of, zone_cone
 from zones.reach import Clearances, touchable
 
@@ -131,13 +130,12 @@ def test_top_of_a_dome_has_a_cone_near_the_half_space():
 @pytest.mark.parametrize("body", [
     ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=(HolderSegment(8, 14, 5), HolderSegment(14, 14, 20))),
     tool(2.0, 0.0, neck=3.0, shank=4.0), tool(2.4, 0.4)], ids=["ball", "flat", "bull"])
-def test_upright_it_is_what_reach_says_without_play(body, monkeypatch):
-    monkeypatch.setattr(reach, "PLAY_STEPS", 0.0)
+def test_upright_it_is_what_reach_says_without_play(body):
     mesh = low_walls()
     s = sample_surface(mesh, 4.0, seed=2)
     for allowance in (0.0, 0.1):
         field = field_of(mesh, body, allowance, CLEAR)
-        by_cutter, by_tool, _ = touchable(field, s.points, s.normals, LIFT)
+        by_cutter, by_tool, _ = touchable(field, s.points, s.normals, LIFT, play=0.0, aim=False)
         got = approach(field.tree, body, CLEAR, s.points, s.normals, [UP], LIFT, allowance)[:, 0]
         assert not (by_tool & ~got).any() and not (got & ~by_cutter).any()
         # shank and holder are looked up there with half a cell to spare, here they are exact
