@@ -6,7 +6,7 @@ cells and forms are exact, and those where a tool ends its reach are right to th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from zones.zoning import ZoneArea
 
 PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them
 MOST = 4e5
+WIDE = 1e3  # mm, the same on faces of one zone, where nothing is to be found
 TOLERANCE = 0.02  # mm, how near a border is to the change of zone
 REST = 0  # label of what no zone holds
 MOST_CELLS = 1 << 20
@@ -43,9 +44,36 @@ def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FaceP
     owner = np.full(len(samples), REST, np.int64)
     for k, z in enumerate(zones, start=1):
         owner[z.samples] = k
-    found = trim_faces(view.part, faces, Nearest(view, owner), max(PITCH, float(np.sqrt(2.0 * area / MOST))), TOLERANCE)
+    inner = samples.area > 0
+    owners = _owners(samples.face[inner], owner[inner])
+    mixed = [f for f in faces if owners.get(f) is None]
+    pitch = max(PITCH, float(np.sqrt(2.0 * area / MOST)))
+    found = [trim_faces(view.part, mixed, Nearest(view, owner), pitch, TOLERANCE)] if mixed else []
+    for label in sorted({one for one in owners.values() if one is not None}):
+        found.append(trim_faces(view.part, [f for f in faces if owners.get(f) == label], _constant(label), WIDE))
     names = {REST: "", **{k: z.id for k, z in enumerate(zones, start=1)}}
-    return {names[label]: patches for label, patches in found.items()}
+    out: dict[str, tuple[FacePatch, ...]] = {}
+    for some in found:
+        for label, patches in some.items():
+            out[names[label]] = tuple(sorted((*out.get(names[label], ()), *patches), key=lambda q: (q.face, -q.area)))
+    return out
+
+
+def _owners(face: I32, owner: NDArray[np.int64]) -> dict[int, int | None]:
+    """The owner of all samples of each face, None where there are several."""
+    low, high = (np.full(int(face.max()) + 1, fill, np.int64) for fill in (np.iinfo(np.int64).max, -1))
+    np.minimum.at(low, face, owner)
+    np.maximum.at(high, face, owner)
+    return {int(f): int(low[f]) if low[f] == high[f] else None for f in np.unique(face)}
+
+
+def _constant(label: int) -> Callable[[F64, F64, I32], NDArray[np.int64]]:
+    """The label function of faces that are one label throughout."""
+
+    def everywhere(points: F64, _normals: F64, _face: I32) -> NDArray[np.int64]:
+        return np.full(len(points), label, np.int64)
+
+    return everywhere
 
 
 class Nearest:
