@@ -37,6 +37,7 @@ GROW_TURN, GROW_LENGTH = 0.1, 3.0
 IN_LINE = 0.8
 # Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged.
 HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
+NODE_ROOM = 0.01  # of its height: how far from such a height a wall may be cut to keep clear of the nodes of the mesh
 BRIDGED_SHARE = 0.25
 # Curves shorter than this share of the longest, or than two thicknesses, are no sides.
 SIDE_SHARE, SIDE_LENGTH = 0.25, 2.0
@@ -96,6 +97,8 @@ def _best_height(slicer: Slicer, owner: np.ndarray, index: int, wall: Wall,
     span = wall.z_top - wall.z_bottom
     heights = [wall.z_bottom + s * span for s in HEIGHTS] if height is None else [height]
     best: tuple[float, list[SideCurve]] = (np.inf, [])
+    if height is None and span > 0:
+        heights = [slicer.clear_of_nodes(z, NODE_ROOM * span) for z in heights]
     for z in heights:
         curves, bridged = _Section(slicer, owner, index, wall, z).sides()
         poor = bridged if len(curves) >= 2 else 2.0 - 0.5 * len(curves)

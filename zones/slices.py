@@ -84,6 +84,17 @@ class Slicer:
         self.low = np.minimum(np.minimum(corners[0], corners[1]), corners[2])
         self.high = np.maximum(np.maximum(corners[0], corners[1]), corners[2])
         self.done: dict[float, Slice] = {}
+        self.rows = np.sort(z)
+
+    def clear_of_nodes(self, height: float, room: float) -> float:
+        """The height within ``room`` (mm) of one asked for that lies farthest from any node of the mesh, mm.
+
+        Nodes of one row differ in height by rounding; a plane through them would run to and fro between its neighbours.
+        """
+        low, high = np.searchsorted(self.rows, [height - room, height + room])
+        marks = np.concatenate([[height - room], self.rows[low:high], [height + room]])
+        widest = int(np.argmax(np.round(np.diff(marks) / room, 6)))
+        return float(0.5 * (marks[widest] + marks[widest + 1]))
 
     def cut(self, height: float) -> Slice:
         """Cut with the plane z = height (mm).

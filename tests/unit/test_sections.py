@@ -169,3 +169,19 @@ def test_cutting_through_vertices_links_every_segment() -> None:
     assert len(walk) == 1 and (cut.following >= 0).all()
     area = 0.5 * (cut.start[:, 0] * cut.end[:, 1] - cut.start[:, 1] * cut.end[:, 0]).sum()
     assert area == pytest.approx(-16.0) and cut.holds(np.array([2.0, 2.0])) and not cut.holds(np.array([5.0, 2.0]))
+
+
+def test_a_cut_keeps_clear_of_rows_of_nodes() -> None:
+    # three rows of nodes, those of the middle one off by rounding: the plane must not run to and fro between them
+    rng = np.random.default_rng(1)
+    x = np.linspace(0, 10, 21)
+    rows = [np.column_stack([x, 0 * x, z + noise]) for z, noise in ((0.0, 0 * x), (5.0, rng.normal(0, 1e-13, 21)),
+                                                                  (10.0, 0 * x))]
+    quads = [(r * 21 + i, r * 21 + i + 1, (r + 1) * 21 + i + 1, (r + 1) * 21 + i) for r in (0, 1) for i in range(20)]
+    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
+    slicer = Slicer(TriangleMesh(np.concatenate(rows), faces, np.ones(len(faces), np.int32)))
+    z = slicer.clear_of_nodes(5.0, 0.1)
+    assert abs(z - 5.0) == pytest.approx(0.05, abs=1e-6)
+    assert slicer.clear_of_nodes(3.0, 0.1) == pytest.approx(3.0)
+    cut = slicer.cut(z)
+    assert (np.linalg.norm(cut.end - cut.start, axis=1) > 1e-3).all()
