@@ -131,6 +131,16 @@ def _web(z: float, height: float) -> Shape:
 
 FORK = [(10, -9), (13, -9), (13, -6), (18, 0.5), (15, 0.5), (11.5, -4), (8, 0.5), (5, 0.5), (10, -6)]
 
+SLENDER_FORK = [(10, -9), (11, -9), (11, -5), (16, 0.5), (14.8, 0.5), (10.5, -4.4), (6.2, 0.5), (5, 0.5), (10, -5)]
+
+
+def aslant() -> Shape:
+    """Two walls 3 apart and a steep bar that meets both slantwise: rays across the bar leave by the back of a wall."""
+    bar = outline("XZ", [(-2, 3), (-2, -1), (2, 1), (2, 5)], -1.2, (0, -0.6, 8))
+    return plate().union(box(50, 2, 14, 0, -5, 3)).union(box(50, 2, 14, 0, 0, 3)).union(
+        bar.rotate((0, 0, 0), (0, 0, 1), 60).translate((20, -1.5, 0)))
+
+
 SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "two walls": (pair, (2, 0, 1)),
     "square bar": (_bar, (2, 1, 1)),
@@ -145,6 +155,8 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "fork": (lambda: pair().union(outline("XY", FORK, 3, (0, 0, 9))), (2, 1, 1)),
     "fork of rods": (lambda: pair().union(rod((10, -9, 10), (10, -4.5, 10), 1.5)).union(
         rod((10, -4.6, 10), (16, 0.5, 12), 1.2)).union(rod((10, -4.6, 10), (4, 0.5, 9), 1.2)), (2, 1, 1)),
+    "slender fork": (lambda: pair().union(outline("XY", SLENDER_FORK, 2.2, (0, 0, 9))), (2, 1, 1)),
+    "short bar aslant between walls": (aslant, (2, 1, 1)),
     "slab": (lambda: pair().union(box(30, 9, 1.5, 10, -9, 8)), (2, 1, 1)),
     "web above the floor": (lambda: _web(7, 9), (2, 1, 1)),
     "web above the floor, level with the tops": (lambda: _web(7, 10), (2, 1, 1)),

@@ -3,7 +3,8 @@
 From samples of every side a ray leaves along the outward normal; connections, fillets and slivers are left out of
 the mesh it meets. The first hit decides what the side faces. A pair of walls (or one wall with itself) has a
 channel when the side area that faces the other adds up to ``FACING_SHARE`` of half the smaller one's side area.
-The shortest ray is then refined on the triangles around it.
+The shortest ray is then refined on the triangles around it. Rays start and end on the exact surface with its normal
+there, as patches through the mesh nodes give it (``zones.smooth``): facets alone are half a facet wrong at borders.
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.sampling import sample_surface
 from zones.facegraph import FaceGraph, cast
+from zones.smooth import SmoothFaces
 
 FACING_DOT = -0.3
 FACING_SHARE = 0.02
 SAMPLES_PER_WALL = 3000
-# Local refinement: starts, points a round, rounds, and how much the neighbourhood shrinks each round.
-STARTS, POINTS, ROUNDS, SHRINK = 4, 160, 7, 0.5
-NEAREST, RIM_SAMPLES, FIT_FACETS, TRIANGLES = 200, 600, 16, 300
-# Points stay this share of a triangle away from its corners, so that rays do not leave through a border.
-INSET = 1e-3
+# Local refinement: starts, random points a round, rounds, and how much the neighbourhood shrinks when the best is well
+# inside it (nearer than INNER of its radius); otherwise it only moves, along a slanting border for example.
+STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 10, 0.4, 0.7
+NEAREST, RIM_SAMPLES, TRIANGLES = 200, 600, 300
+# Points stay these shares of a triangle away from its corners and edges, so that rays do not leave through a border.
+INSETS = (1e-3, 1e-5)
+ALONG_RIM = np.array([-1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0])
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ class _Field:
 
     def __init__(self, graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> None:
         keep = ~left_out[graph.face_of]
-        full = graph.mesh
+        full, uv = graph.mesh, graph.part.uv
         self.mesh = TriangleMesh(full.vertices, full.faces[keep], full.face_ids[keep])
         self.tree = TriangleTree(self.mesh)
         self.skin = graph.skin
@@ -84,17 +88,38 @@ class _Field:
         for wall, faces in enumerate(sides):
             owner[faces] = wall
         self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
-        self.rim = [_rim_nodes(graph, f) for f in sides]
+        self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
+                                  max(graph.part.chord, graph.part.deviation))
+        self.on_rim = np.zeros(len(full.vertices), bool)
+        for faces in sides:
+            self.on_rim[_rim_nodes(graph, faces)] = True
         self.side_area = np.array([graph.area[f].sum() for f in sides])
         self.count = len(sides)
-        self.patches: dict[int, tuple[F64, F64, F64, np.ndarray]] = {}
+        self.patches: dict[int, tuple[F64, F64, np.ndarray]] = {}
 
-    def look(self, points: F64, normals: F64) -> tuple[F64, np.ndarray]:
-        """Outward ray length from points of sides, and the wall whose side is met (inf and -1: none)."""
-        distance, hit = cast(self.tree, points, normals, self.skin)
-        dot = np.einsum("ij,ij->i", self.mesh.normals[hit], normals)
-        wall = np.where((hit >= 0) & (dot < FACING_DOT), self.owner[hit], -1)
-        return np.where(wall >= 0, distance, np.inf), wall
+    def look(self, points: F64, triangles: np.ndarray) -> tuple[F64, np.ndarray, F64]:
+        """Outward rays from points of sides on the triangles they lie on.
+
+        Returns their lengths between the exact surfaces (inf: none), the walls whose sides they meet (-1: none) and
+        the feet, (n, 3).
+        """
+        start, normal = self.smooth.at(points, triangles)
+        distance, hit = cast(self.tree, points, normal, self.skin)
+        rows = np.flatnonzero(hit >= 0)
+        rows = rows[self.owner[hit[rows]] >= 0]
+        met = points[rows] + distance[rows, None] * normal[rows]
+        foot, back = self.smooth.at(met, hit[rows])
+        dot = np.einsum("ij,ij->i", back, normal[rows])
+        facing = dot < FACING_DOT
+        rows, dot, back = rows[facing], dot[facing], back[facing]
+        # The planes that touch the exact surface at both ends, instead of the facets.
+        off = (foot - met)[facing] - (start - points)[rows]
+        length, wall = np.full(len(points), np.inf), np.full(len(points), -1)
+        length[rows] = distance[rows] + np.einsum("ij,ij->i", off, back) / dot
+        wall[rows] = self.owner[hit[rows]]
+        feet = points.copy()
+        feet[rows] = start[rows] + length[rows, None] * normal[rows]
+        return length, wall, feet
 
     def starts(self, wall: int, area: float) -> tuple[F64, np.ndarray, F64]:
         """Points to look from: evenly spread samples, and points just inside the borders of the sides.
@@ -103,10 +128,10 @@ class _Field:
         """
         triangles = np.flatnonzero(self.owner == wall)
         s = sample_surface(self.mesh, SAMPLES_PER_WALL / area, seed=29, triangles=triangles)
-        rim = triangles[np.isin(self.mesh.faces[triangles], self.rim[wall]).any(axis=1)]
+        rim = triangles[self.on_rim[self.mesh.faces[triangles]].any(axis=1)]
         rim = rim[np.unique(np.linspace(0, max(len(rim) - 1, 0), RIM_SAMPLES).astype(int))] if len(rim) else rim
         t = self.mesh.triangles[rim]
-        corners = (t + INSET * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
+        corners = (t + INSETS[0] * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
         points, owner = np.concatenate([s.points, corners]), np.concatenate([s.triangle, np.repeat(rim, 3)])
         return points, owner, np.concatenate([s.area, np.zeros(len(corners))])
 
@@ -117,7 +142,7 @@ class _Field:
             if self.side_area[wall] <= 0:
                 continue
             points, triangle, weight = self.starts(wall, self.side_area[wall])
-            distance, met = self.look(points, self.mesh.normals[triangle])
+            distance, met, _ = self.look(points, triangle)
             for other in np.unique(met[met >= 0]).tolist():
                 rows = np.flatnonzero(met == other)
                 pair = (min(wall, other), max(wall, other))
@@ -150,32 +175,39 @@ class _Field:
         return float(result[0]), (x, y, z)
 
     def _descend(self, start: Start, radius: float) -> tuple[float, F64, F64]:
-        """Search ever smaller neighbourhoods of a start on its own B-rep face: least length, point, foot."""
-        low, high, middle, face = self._patch(int(self.mesh.face_ids[start.triangle]))
-        best = (np.inf, start.point, start.point)
+        """Search ever smaller neighbourhoods of a start on the sides of its wall: least length, point, foot."""
+        low, high, side = self._patch(start.wall)
+        front = self.mesh.normals[start.triangle]
+        best = (start.distance, start.point, start.point)
+        points, triangles = start.point[None], np.array([start.triangle])
         for turn in range(ROUNDS):
             centre = best[1]
             close = np.flatnonzero(((low <= centre + radius) & (high >= centre - radius)).all(axis=1))
+            close = side[close]
+            close = close[self.mesh.normals[close] @ front > 0]
             # a regular choice where there are many; later rounds see them all
             close = close[np.unique(np.linspace(0, len(close) - 1, min(len(close), TRIANGLES)).astype(int))]
-            points = np.concatenate([centre[None], _points_near(self.mesh, face[close], centre, radius, turn)])
-            normals = _smooth_normals(self.mesh, face, middle, centre, points)
-            distance, met = self.look(points, normals)
+            near = _points_near(self.mesh, close, self.on_rim, centre, radius, turn)
+            points, triangles = np.concatenate([points[:1], near[0]]), np.concatenate([triangles[:1], near[1]])
+            distance, met, feet = self.look(points, triangles)
             distance = np.where(met == start.other, distance, np.inf)
             k = int(distance.argmin())
-            if distance[k] < best[0]:
-                best = (float(distance[k]), points[k], points[k] + distance[k] * normals[k])
-            radius *= SHRINK
-        return best if np.isfinite(best[0]) else (start.distance, start.point, start.point)
+            moved = 0.0
+            if distance[k] <= best[0]:
+                moved = float(np.linalg.norm(points[k] - centre))
+                best = (float(distance[k]), points[k], feet[k])
+                points, triangles = points[k:k + 1], triangles[k:k + 1]
+            if moved < INNER * radius:
+                radius *= SHRINK
+        return best
 
-    def _patch(self, number: int) -> tuple[F64, F64, F64, np.ndarray]:
-        """Boxes, centres and indices of the triangles of a B-rep face."""
-        if number not in self.patches:
-            face = np.flatnonzero(self.mesh.face_ids == number)
-            t = self.mesh.triangles[face]
-            middle = (t[:, 0] + t[:, 1] + t[:, 2]) / 3.0
-            self.patches[number] = (t.min(axis=1), t.max(axis=1), middle, face)
-        return self.patches[number]
+    def _patch(self, wall: int) -> tuple[F64, F64, np.ndarray]:
+        """Boxes and indices of the triangles of the sides of a wall."""
+        if wall not in self.patches:
+            side = np.flatnonzero(self.owner == wall)
+            t = self.mesh.triangles[side]
+            self.patches[wall] = (t.min(axis=1), t.max(axis=1), side)
+        return self.patches[wall]
 
 
 def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
@@ -184,45 +216,51 @@ def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
     return np.unique(np.concatenate(nodes)) if nodes else np.zeros(0, np.int64)
 
 
-def _smooth_normals(mesh: TriangleMesh, face: np.ndarray, middle: F64, centre: F64, points: F64) -> F64:
-    """Normals that vary linearly, fitted to the facets of one B-rep face round a centre.
+def _points_near(mesh: TriangleMesh, triangles: np.ndarray, on_rim: np.ndarray, centre: F64, radius: float,
+                 seed: int) -> tuple[F64, np.ndarray]:
+    """Points on triangles within about a radius of a centre: corners, places along the rim, a random spread.
 
-    Facet normals are right in the middle of a facet only; at the border of a bent face they are half a facet off.
-    Returns (n, 3) float64, unit, at points (n, 3).
+    Returns (k, 3) points and (k,) triangles.
     """
-    square = ((middle - centre) ** 2).sum(axis=1)
-    order = np.argpartition(square, FIT_FACETS)[:FIT_FACETS] if len(face) > FIT_FACETS else np.arange(len(face))
-    near, weight = face[order], np.sqrt(mesh.areas[face[order]])
-    offset = middle[order] - centre
-    scale = max(float(np.abs(offset).max()), 1e-12)
-    design = np.column_stack([np.ones(len(near)), offset / scale])
-    fit = np.linalg.lstsq(design * weight[:, None], mesh.normals[near] * weight[:, None], rcond=1e-3)[0]
-    out = np.column_stack([np.ones(len(points)), (points - centre) / scale]) @ fit
-    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None])
-
-
-def _points_near(mesh: TriangleMesh, triangles: np.ndarray, centre: F64, radius: float, seed: int) -> F64:
-    """Points on triangles within about a radius of a centre: corners (slightly inset) and a random spread."""
     if len(triangles) == 0:
-        return np.zeros((0, 3))
+        return np.zeros((0, 3)), np.zeros(0, np.int64)
     t = mesh.triangles[triangles]
-    corner = (t + INSET * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
+    corner = (t + INSETS[0] * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
     rng = np.random.default_rng(seed)
     pick = np.unique(np.linspace(0, len(t) - 1, min(len(t), 64)).astype(int))
-    spread = _onto_triangles(t[pick], centre + radius * rng.uniform(-1.0, 1.0, (POINTS, 3)))
-    points = np.concatenate([corner, spread])
-    return np.asarray(points[np.linalg.norm(points - centre, axis=1) <= 1.8 * radius])
+    spread, owner = _onto_triangles(t[pick], centre + radius * rng.uniform(-1.0, 1.0, (POINTS, 3)))
+    rim, beside = _along_rim(t, on_rim[mesh.faces[triangles]], centre, radius)
+    points = np.concatenate([corner, rim, spread])
+    of = np.concatenate([np.repeat(triangles, 3), triangles[beside], triangles[pick][owner]])
+    near = np.linalg.norm(points - centre, axis=1) <= 1.8 * radius
+    return points[near], of[near]
 
 
-def _onto_triangles(t: F64, points: F64) -> F64:
-    """Points projected into the plane of each triangle, kept where they fall inside it: (k, 3) float64."""
+def _along_rim(t: F64, rim: np.ndarray, centre: F64, radius: float) -> tuple[F64, np.ndarray]:
+    """Points beside edges with both ends on the rim ((n, 3) bool), round the place nearest to a centre, and rows."""
+    out, rows = [], []
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        row = np.flatnonzero(rim[:, a] & rim[:, b])
+        p, e = t[row, a], t[row, b] - t[row, a]
+        length = np.maximum(np.linalg.norm(e, axis=1), 1e-30)
+        at = np.clip(np.einsum("ij,ij->i", centre - p, e) / length**2, 0.0, 1.0)
+        share = np.clip(at[:, None] + ALONG_RIM * (radius / length)[:, None], 0.0, 1.0)
+        points = p[:, None] + share[..., None] * e[:, None]
+        middle = t[row].mean(axis=1)[:, None]
+        for inset in INSETS:
+            out.append((points + inset * (middle - points)).reshape(-1, 3))
+            rows.append(np.repeat(row, len(ALONG_RIM)))
+    return np.concatenate(out), np.concatenate(rows)
+
+
+def _onto_triangles(t: F64, points: F64) -> tuple[F64, np.ndarray]:
+    """Points projected into the plane of each triangle, kept where they fall inside it: (k, 3), rows of t."""
     e1, e2 = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
     n = np.cross(e1, e2)
     square = np.einsum("ij,ij->i", n, n)
-    good = square > 0
-    t, e1, e2, n, square = t[good], e1[good], e2[good], n[good], square[good]
+    square = np.maximum(square, 1e-300)
     w = points[None] - t[:, 0][:, None]
     b1 = np.einsum("ijk,ik->ij", np.cross(w, e2[:, None]), n) / square[:, None]
     b2 = np.einsum("ijk,ik->ij", np.cross(e1[:, None], w), n) / square[:, None]
-    i, j = np.nonzero((b1 > INSET) & (b2 > INSET) & (b1 + b2 < 1 - INSET))
-    return np.asarray(t[i, 0] + b1[i, j, None] * e1[i] + b2[i, j, None] * e2[i])
+    i, j = np.nonzero((b1 > INSETS[0]) & (b2 > INSETS[0]) & (b1 + b2 < 1 - INSETS[0]))
+    return np.asarray(t[i, 0] + b1[i, j, None] * e1[i] + b2[i, j, None] * e2[i]), i

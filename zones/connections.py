@@ -91,7 +91,8 @@ def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
         ends = _ends(graph, [x], borders, thin - {x})
         if len(ends) >= 2 and _open_below(graph, {x}, ends, borders, void[x], floating - thin):
             bridging.add(x)
-    groups = _groups(floating, thin, bridging, borders, void)
+    loose = {x for x in floating - thin if len(void[x])} | _hanging(graph, sheets, body, borders, base, floating & thin)
+    groups = _groups(bridging | loose, borders)
     out, out_ends = [], []
     walls = thin - bridging
     for group in groups:
@@ -189,15 +190,20 @@ def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
     return out - set(sheets.labels)
 
 
-def _void_points(graph: FaceGraph, body: np.ndarray, x: int) -> F64:
-    """Points of the downward faces of a body with void below them, (k, 3) float64, mm."""
+def _void_rows(graph: FaceGraph, body: np.ndarray, x: int) -> np.ndarray:
+    """Samples of the downward faces of a body with void below them, (k,) int."""
     s = graph.samples
     low = graph.part.bounds[0, 2] + VOID_SHARE * graph.height
     rows = np.flatnonzero((body[graph.face] == x) & (s.normals[:, 2] < DOWN_NZ) & (s.points[:, 2] > low))
     down = np.broadcast_to([0.0, 0.0, -1.0], (len(rows), 3))
     distance, hit = cast(graph.tree, s.points[rows], down, graph.skin)
     own = (hit >= 0) & (body[graph.face_of[hit]] == x)
-    return np.asarray(s.points[rows[(distance > VOID_SHARE * graph.height) & ~own]])
+    return np.asarray(rows[(distance > VOID_SHARE * graph.height) & ~own])
+
+
+def _void_points(graph: FaceGraph, body: np.ndarray, x: int) -> F64:
+    """The places of ``_void_rows``, (k, 3) float64, mm."""
+    return np.asarray(graph.samples.points[_void_rows(graph, body, x)])
 
 
 def _looks_up(graph: FaceGraph, faces: np.ndarray) -> bool:
@@ -235,10 +241,29 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
     return bool((~under).sum() >= max(1, 0.02 * len(u)))
 
 
-def _groups(floating: set[int], thin: set[int], bridging: set[int], borders: list[Border],
-            void: dict[int, F64]) -> list[list[int]]:
-    """Bodies that are one connection: bridging ones, with the floating pieces that meet them (forks)."""
-    piece = {x for x in floating if x in bridging or (x not in thin and len(void[x]))}
+def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[Border], base: set[int],
+             among: set[int]) -> set[int]:
+    """Sheets that meet no base along any edge or fillet and have void below.
+
+    The arms of a slender fork are three such sheets, none of which bridges alone; their common underside has the label
+    of one of them, so a sheet also counts that goes on round an edge into an underside of another.
+    """
+    pairs = [(b.a, b.b) for b in borders] + [(int(body[k.a]), int(body[k.b])) for k in graph.links]
+    standing = {x for a, b in pairs for x, y in ((a, b), (b, a)) if y in base}
+    free = among - standing
+    under = np.zeros(graph.n, bool)
+    for x in free:
+        under[graph.face[_void_rows(graph, body, x)]] = True
+    out = {int(x) for x in np.unique(body[under])}
+    for k in graph.links:
+        for f, g in ((k.a, k.b), (k.b, k.a)):
+            if k.joins and under[g] and sheets.thin[f]:
+                out.add(int(body[f]))
+    return out & free
+
+
+def _groups(piece: set[int], borders: list[Border]) -> list[list[int]]:
+    """Bodies that may be one connection: pieces that meet each other (forks)."""
     order = sorted(piece)
     place = {x: i for i, x in enumerate(order)}
     sets = UnionFind(len(order))

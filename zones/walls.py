@@ -138,16 +138,45 @@ def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray)
     rows = rows[(graph.back[rows] >= 0) & (graph.back_dot[rows] < OPPOSED_DOT)]
     rows = rows[thin[graph.back[rows]]]
     mine, other = body[graph.face[rows]], body[graph.back[rows]]
-    sets = UnionFind(graph.n)
+    found: list[tuple[float, int, int, bool]] = []
     for label in np.unique(mine):
         of = rows[mine == label]
         near = of[graph.inward[of] <= BACKED_REACH * np.median(graph.inward[of])]
         total = graph.samples.area[graph.face_rows(body == label)].sum()
-        for facing in np.unique(other[mine == label]):
-            seen = graph.samples.area[near[body[graph.back[near]] == facing]].sum()
-            if facing != label and seen >= BACKED_SHARE * total:
-                sets.union(int(label), int(facing))
-    return sets.labels()[body]
+        seen = {int(facing): float(graph.samples.area[near[body[graph.back[near]] == facing]].sum())
+                for facing in np.unique(other[mine == label]) if facing != label}
+        best = max(seen.values(), default=0.0)
+        found += [(a, int(label), facing, a == best) for facing, a in seen.items() if a >= BACKED_SHARE * total]
+    return _join_backed(graph.n, found, _touching_bodies(graph, thin, body))[body]
+
+
+def _join_backed(n: int, found: list[tuple[float, int, int, bool]], touching: set[tuple[int, int]]) -> np.ndarray:
+    """Labels after joining bodies to what backs them: what backs most of a body first, the rest by area.
+
+    A short bar that meets a wall slantwise is seen through its end: some of its rays leave by the far side of the wall.
+    So a body does not join what backs less of it than another, where it meets that in a concave edge.
+
+    found    : area seen (mm²), body, body behind it, whether none backs more
+    touching : pairs of bodies with a concave edge or a fillet between them
+    """
+    sets = UnionFind(n)
+    near: dict[int, set[int]] = {}
+    for a, b in touching:
+        near.setdefault(a, set()).add(b)
+    for _, a, b, most in sorted(found, key=lambda f: (not f[3], -f[0], f[1], f[2])):
+        if most or all(sets.find(x) != sets.find(b) for x in near.get(a, ())):
+            sets.union(a, b)
+    return sets.labels()
+
+
+def _touching_bodies(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> set[tuple[int, int]]:
+    """Pairs of thin bodies, both ways round, that meet in a concave edge or through a fillet."""
+    near = _concave_neighbours(graph, thin, body)
+    out = {(int(body[f]), g) for f in np.flatnonzero(thin) for g in near[f]}
+    for fillet in np.flatnonzero(graph.fillet):
+        bodies = {int(body[k.other(int(fillet))]) for k in graph.at[fillet] if thin[k.other(int(fillet))]}
+        out |= {(a, b) for a in bodies for b in bodies if a != b}
+    return out | {(b, a) for a, b in out}
 
 
 def _continue_across_junctions(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:

@@ -48,8 +48,10 @@ def shuffled(part: Part, seed: int) -> tuple[Part, dict[int, int]]:
     order = rng.permutation(len(part.mesh.faces))
     ids = np.array([new_of_old[i] for i in part.mesh.face_ids.tolist()], np.int32)
     mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[order], ids[order])
+    uv = None if part.uv is None else part.uv[order]
     edges = [edges[i] for i in rng.permutation(len(edges))]
-    return replace(part, faces=tuple(faces), edges=tuple(edges), mesh=mesh), {n: o for o, n in new_of_old.items()}
+    other = replace(part, faces=tuple(faces), edges=tuple(edges), mesh=mesh, uv=uv)
+    return other, {n: o for o, n in new_of_old.items()}
 
 
 def parts_of(d: Decomposition, back: dict[int, int] | None = None) -> tuple[list[frozenset[int]], ...]:

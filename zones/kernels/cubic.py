@@ -1,0 +1,141 @@
+"""Cubic patches through the nodes of a triangulated parametric surface.
+
+Notation: node i has the place ``place[i]`` (3,) mm and the surface parameters ``par[i]`` (2,). Its patch is
+    X_i(u, v) = place[i] + c0 du + c1 dv + c2 du^2 + c3 du dv + c4 dv^2 + c5 du^3 + c6 du^2 dv + c7 du dv^2 + c8 dv^3
+with (du, dv) = (u, v) - par[i], ``coef[i]`` (9, 3). The nodes that share a triangle with node i are
+``ring[start[i]:start[i + 1]]``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+ENOUGH, RINGS = 16, 4
+RIDGE = np.array([1e-14, 1e-14, 1e-10, 1e-10, 1e-10, 1e-6, 1e-6, 1e-6, 1e-6])
+"""What each term costs. Where few rows of nodes cannot tell v from v^2, or u^2 from u^3, the lower order is taken."""
+
+
+@njit(cache=True, nogil=True)
+def _neighbours(i, start, ring, out):
+    """Nodes round node i, without it, each once: two rings, and up to ``RINGS`` until there are ``ENOUGH``."""
+    n, done = 0, 0
+    for turn in range(RINGS):
+        if turn >= 2 and n >= ENOUGH:
+            break
+        end = n
+        for m in range(-1 if turn == 0 else done, end):
+            j = i if m < 0 else out[m]
+            for b in range(start[j], start[j + 1]):
+                k = ring[b]
+                known = k == i
+                for q in range(n):
+                    if out[q] == k:
+                        known = True
+                        break
+                if not known and n < len(out):
+                    out[n] = k
+                    n += 1
+        done = end
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _solve(a, b):
+    """a x = b for a (m, m) symmetric and positive definite, b (m, 3) is overwritten by x (Cholesky)."""
+    m = len(a)
+    for j in range(m):
+        for i in range(j, m):
+            s = a[i, j]
+            for k in range(j):
+                s -= a[i, k] * a[j, k]
+            a[i, j] = np.sqrt(max(s, 1e-300)) if i == j else s / a[j, j]
+    for c in range(3):
+        for i in range(m):
+            for k in range(i):
+                b[i, c] -= a[i, k] * b[k, c]
+            b[i, c] /= a[i, i]
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                b[i, c] -= a[k, i] * b[k, c]
+            b[i, c] /= a[i, i]
+
+
+@njit(cache=True, nogil=True)
+def _terms(s, t, out):
+    """The nine terms of a patch."""
+    out[0], out[1], out[2], out[3], out[4] = s, t, s * s, s * t, t * t
+    out[5], out[6], out[7], out[8] = s * s * s, s * s * t, s * t * t, t * t * t
+
+
+@njit(cache=True, nogil=True)
+def fit_patches(place, par, start, ring):
+    """Least-squares patch of every node, (n, 9, 3) float64, weighted by one over the squared scaled distance."""
+    coef = np.zeros((len(place), 9, 3))
+    near = np.empty(96, np.int64)
+    phi, a, b = np.empty(9), np.empty((9, 9)), np.empty((9, 3))
+    for i in range(len(place)):
+        n = _neighbours(i, start, ring, near)
+        su, sv = 0.0, 0.0
+        for m in range(n):
+            su = max(su, abs(par[near[m], 0] - par[i, 0]))
+            sv = max(sv, abs(par[near[m], 1] - par[i, 1]))
+        if su <= 0.0 or sv <= 0.0:
+            continue
+        a[:], b[:] = 0.0, 0.0
+        total = 0.0
+        for m in range(n):
+            s, t = (par[near[m], 0] - par[i, 0]) / su, (par[near[m], 1] - par[i, 1]) / sv
+            w = 1.0 / (s * s + t * t + 1e-6)
+            total += w
+            _terms(s, t, phi)
+            for p in range(9):
+                f = w * phi[p]
+                for q in range(p + 1):
+                    a[p, q] += f * phi[q]
+                for c in range(3):
+                    b[p, c] += f * (place[near[m], c] - place[i, c])
+        for p in range(9):
+            a[p, p] += total * RIDGE[p]
+        _solve(a, b)
+        _terms(su, sv, phi)
+        for p in range(9):
+            for c in range(3):
+                coef[i, p, c] = b[p, c] / phi[p]
+    return coef
+
+
+@njit(cache=True, nogil=True)
+def blend_patches(corner, share, place, par, coef):
+    """Places (k, 3) and unit normals (k, 3) of points given by three nodes each and their barycentric shares.
+
+    The three patches, taken at the point's own parameters, are blended by the shares. NaN normals where the
+    parameters are singular; the sign follows u x v.
+    """
+    where, normal = np.zeros((len(corner), 3)), np.empty((len(corner), 3))
+    xu, xv = np.empty(3), np.empty(3)
+    for k in range(len(corner)):
+        u, v = 0.0, 0.0
+        for m in range(3):
+            u += share[k, m] * par[corner[k, m], 0]
+            v += share[k, m] * par[corner[k, m], 1]
+        xu[:], xv[:] = 0.0, 0.0
+        for m in range(3):
+            i, w = corner[k, m], share[k, m]
+            s, t = u - par[i, 0], v - par[i, 1]
+            for c in range(3):
+                x = coef[i, :, c]
+                where[k, c] += w * (place[i, c] + s * (x[0] + s * (x[2] + s * x[5] + t * x[6]))
+                                    + t * (x[1] + s * x[3] + t * (x[4] + s * x[7] + t * x[8])))
+                xu[c] += w * (x[0] + 2.0 * s * x[2] + t * x[3] + 3.0 * s * s * x[5] + 2.0 * s * t * x[6]
+                              + t * t * x[7])
+                xv[c] += w * (x[1] + s * x[3] + 2.0 * t * x[4] + s * s * x[6] + 2.0 * s * t * x[7]
+                              + 3.0 * t * t * x[8])
+        nx, ny, nz = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        limit = 1e-9 * np.sqrt((xu @ xu) * (xv @ xv))
+        if length > limit and length > 0.0:
+            normal[k, 0], normal[k, 1], normal[k, 2] = nx / length, ny / length, nz / length
+        else:
+            normal[k, :] = np.nan
+    return where, normal
