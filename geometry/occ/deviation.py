@@ -16,7 +16,7 @@ from geometry.mesh import F64
 from geometry.occ.topology import Shape
 
 if TYPE_CHECKING:
-    from geometry.occ.meshing import FaceMesh
+    from geometry.occ.triangulating import FaceMesh
 
 MAX_SAMPLES = 20_000
 NEWTON_STEPS = 4
@@ -38,18 +38,23 @@ def largest_deviation(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord:
             So the value is never too small for a measured triangle. Centres are where a chord errs most on a smooth
             surface; the trim of the face is not looked at.
     """
+    return float(face_deviations(shapes, faces, chord).max(initial=0.0))
+
+
+def face_deviations(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord: float) -> F64:
+    """Largest distance per face, see ``largest_deviation``; arguments as there. Returns (len(faces),) float64, mm."""
     total = sum(len(f.triangles) for f in faces)
-    worst = 0.0
+    out = []
     for shape, face in zip(shapes, faces, strict=True):
         surface = BRepAdaptor_Surface(shape, True)
         exact = _formula(surface, face.nodes[face.triangles].mean(axis=1))
         if exact is not None:
-            worst = max(worst, exact)
+            out.append(exact)
             continue
         count = len(face.triangles)
         share = max(10, int(MAX_SAMPLES * count / max(total, 1)))
-        worst = max(worst, _face_deviation(shape, surface, face, _sample(face, min(share, count)), chord))
-    return worst
+        out.append(_face_deviation(shape, surface, face, _sample(face, min(share, count)), chord))
+    return np.array(out)
 
 
 def _formula(surface: BRepAdaptor_Surface, points: F64) -> float | None:
@@ -89,7 +94,7 @@ def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, 
                     chord: float) -> float:
     corners = face.triangles[rows]
     centres, uv = face.nodes[corners].mean(axis=1), face.uv[corners].mean(axis=1)
-    bounds = np.array([_distance(surface, c, q) for c, q in zip(centres.tolist(), uv, strict=True)])
+    bounds = np.array([distance_near(surface, c, q) for c, q in zip(centres.tolist(), uv, strict=True)])
     order = np.argsort(-bounds)
     worst = 0.0
     projector = ShapeAnalysis_Surface(BRep_Tool.Surface_s(shape))
@@ -103,7 +108,16 @@ def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, 
     return max(worst, float(bounds[rest].max()) if len(rest) else 0.0)
 
 
-def _distance(surface: BRepAdaptor_Surface, centre: list[float], uv: F64) -> float:
+def distance_near(surface: BRepAdaptor_Surface, centre: list[float], uv: F64, enough: float = 0.0) -> float:
+    """Upper bound of the distance of a point to a surface.
+
+    surface : kernel surface
+    centre  : 3 numbers, mm
+    uv      : (2,) float64, parameters near the foot point
+    enough  : float, mm; a bound below this is not brought further down
+
+    Returns float, mm: distance to the nearest surface point that a few Gauss-Newton steps from ``uv`` come by.
+    """
     point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
     u, v = float(uv[0]), float(uv[1])
     best = float("inf")
@@ -114,6 +128,8 @@ def _distance(surface: BRepAdaptor_Surface, centre: list[float], uv: F64) -> flo
         here = (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) ** 0.5
         if here >= best:
             break
+        if here < enough:
+            return here
         better = best - here > 0.01 * here
         best = here
         aa, ab, bb = _dot(a, a), _dot(a, b), _dot(b, b)

@@ -7,12 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt, gp_Pnt2d
-from OCP.IMeshTools import IMeshTools_Parameters
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED, TopAbs_VERTEX
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_VERTEX
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
@@ -20,32 +17,24 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.errors import GeometryError
-from geometry.mesh import F64, I32, TriangleMesh
-from geometry.occ.deviation import largest_deviation
+from geometry.mesh import F64, TriangleMesh
+from geometry.occ.deviation import face_deviations
 from geometry.occ.holes import extend_parameters, fill_slivers
+from geometry.occ.mending import mend_faces
 from geometry.occ.topology import Shape, faces_of
+from geometry.occ.triangulating import FaceMesh, triangulate
+
+__all__ = ["FaceMesh", "SolidMesh", "count_open_edges", "mesh_solid"]
 
 MAX_REMESH = 2
-MAX_TRIANGLES = 4_000_000
+# A mesh larger than half of this is not made once more with a smaller chord.
+MAX_TRIANGLES = 1_000_000
+# A smaller chord for the whole solid that leaves more than this share of the deviation is not made smaller still.
+WORTH = 0.8
 # A mesh counts as good while its measured deviation stays below this multiple of the chord asked for.
 DEVIATION_ROOM = 1.5
 # Nodes nearer than this on one edge of a triangle are one point (the kernel's own confusion distance).
 WELD = 1e-7
-
-
-@dataclass
-class FaceMesh:
-    """Triangles of one face as the kernel made them.
-
-    nodes     : (n, 3) float64, mm
-    uv        : (n, 2) float64, surface parameters of the nodes
-    triangles : (m, 3) int32, outward, indices into ``nodes``
-    """
-
-    nodes: F64
-    uv: F64
-    triangles: I32
 
 
 @dataclass
@@ -71,7 +60,7 @@ class SolidMesh:
 
 
 def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
-    """Mesh a solid until its measured deviation is within 1.5 times the chord, or the mesh grows too large.
+    """Mesh a solid until its measured deviation is within 1.5 times the chord, or nothing helps any more.
 
     solid : kernel solid, mm
     chord : float, mm, absolute deflection
@@ -79,16 +68,27 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
 
     Returns SolidMesh.
     Raises GeometryError (``mesh_failed``) when faces stay without triangles.
+    Notes   faces that deviate too far are refined one by one between the nodes of their edges; only where that does
+            not do is the whole solid meshed again with a smaller chord, at most twice, as long as it helps and the
+            mesh stays below half a million triangles.
     """
-    asked = chord
+    asked, before = chord, np.inf
+    limit = DEVIATION_ROOM * asked
+    shapes = faces_of(solid)
     for attempt in range(MAX_REMESH + 1):
-        faces = _triangulate(solid, chord, angle)
-        deviation = largest_deviation(faces_of(solid), faces, asked)
+        faces = triangulate(solid, chord, angle)
+        off = face_deviations(shapes, faces, asked)
+        if off.max(initial=0.0) > limit:
+            faces = mend_faces(solid, faces, np.flatnonzero(off > limit), asked, chord, angle)
+            off = face_deviations(shapes, faces, asked)
+        deviation = float(off.max(initial=0.0))
         count = sum(len(f.triangles) for f in faces)
-        if deviation <= DEVIATION_ROOM * asked or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES:
+        if (deviation <= limit or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES
+                or deviation > WORTH * before):
             break
+        before = deviation
         # the deviation falls about in proportion to the chord, so aim a little below the limit at once
-        chord *= float(np.clip(0.9 * DEVIATION_ROOM * asked / deviation, 0.3, 0.8))
+        chord *= float(np.clip(0.9 * limit / deviation, 0.3, 0.8))
     mesh, uv, edge_nodes = _join(solid, faces)
     warnings = []
     if deviation > DEVIATION_ROOM * asked:
@@ -116,53 +116,6 @@ def count_open_edges(mesh: TriangleMesh) -> int:
     inside = np.minimum(partner, len(keys) - 1)
     matched = (keys[inside] == (keys % n) * n + keys // n) & (counts == counts[inside])
     return int(counts[~matched].sum())
-
-
-def _triangulate(solid: Shape, chord: float, angle: float) -> list[FaceMesh]:
-    # A mesh left from an earlier, coarser run would be kept silently, hence the clean-up.
-    BRepTools.Clean_s(solid)
-    BRepMesh_IncrementalMesh(solid, _parameters(chord, angle))
-    out, bare = [], []
-    for number, face in enumerate(faces_of(solid), 1):
-        location = TopLoc_Location()
-        triangulation = BRep_Tool.Triangulation_s(face, location)
-        if triangulation is None or triangulation.NbTriangles() == 0:
-            bare.append(f"F{number}")
-            continue
-        out.append(_face_mesh(face, triangulation, location))
-    if bare:
-        raise GeometryError(f"{len(bare)} faces could not be meshed: {', '.join(bare[:10])}", code="mesh_failed",
-                            subjects=tuple(bare), measured=len(bare), limit=0,
-                            remedy="rebuild these faces in the CAD system; they are probably degenerate")
-    return out
-
-
-def _parameters(chord: float, angle: float) -> IMeshTools_Parameters:
-    out = IMeshTools_Parameters()
-    out.Relative = False
-    out.Deflection = out.DeflectionInterior = chord
-    # the kernel's usual rule: inside a face the chord governs, along edges the angle too
-    out.Angle, out.AngleInterior = angle, 2.0 * angle
-    # Else one edge whose ends miss their vertices loosens the whole face: 0.07 mm where 0.01 mm was asked.
-    out.ForceFaceDeflection = True
-    out.InParallel = True
-    return out
-
-
-def _face_mesh(face: Shape, triangulation: Shape, location: TopLoc_Location) -> FaceMesh:
-    count = triangulation.NbNodes()
-    node, uv_node = triangulation.Node, triangulation.UVNode
-    nodes = np.array([node(i).Coord() for i in range(1, count + 1)])
-    uv = np.array([uv_node(i).Coord() for i in range(1, count + 1)])
-    triangle = triangulation.Triangle
-    triangles = np.array([triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)], np.int32) - 1
-    if not location.IsIdentity():
-        move = location.Transformation()
-        matrix = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-        nodes = nodes @ matrix[:, :3].T + matrix[:, 3]
-    if face.Orientation() == TopAbs_REVERSED:
-        triangles = triangles[:, ::-1]
-    return FaceMesh(nodes, uv, np.ascontiguousarray(triangles))
 
 
 def _projector(faces: list[Shape]) -> Callable[[int, F64, F64], F64]:
