@@ -108,6 +108,15 @@ def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, 
     return max(worst, float(bounds[rest].max()) if len(rest) else 0.0)
 
 
+def node_gaps(surface: BRepAdaptor_Surface, nodes: F64, uv: F64) -> F64:
+    """(n,) float64, mm, distance of nodes (n, 3) to the surface point at their parameters (n, 2): what the edges of
+    the file miss their face by, no mesh can be nearer there."""
+    if not len(nodes):
+        return np.zeros(0)
+    exact = np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()])
+    return np.asarray(np.linalg.norm(nodes - exact, axis=1))
+
+
 def distance_near(surface: BRepAdaptor_Surface, centre: list[float], uv: F64, enough: float = 0.0) -> float:
     """Upper bound of the distance of a point to a surface.
 

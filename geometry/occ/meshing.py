@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_VERTEX
@@ -18,7 +19,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.occ.deviation import face_deviations
+from geometry.occ.deviation import face_deviations, node_gaps
 from geometry.occ.holes import extend_parameters, fill_slivers
 from geometry.occ.mending import mend_faces
 from geometry.occ.topology import Shape, faces_of
@@ -69,8 +70,8 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
     Returns SolidMesh.
     Raises GeometryError (``mesh_failed``) when faces stay without triangles.
     Notes   faces that deviate too far are refined one by one between the nodes of their edges; only where that does
-            not do is the whole solid meshed again with a smaller chord, at most twice, as long as it helps and the
-            mesh stays below half a million triangles.
+            not do, and not because edges miss their faces, is the whole solid meshed again with a smaller chord, at
+            most twice, as long as it helps and the mesh stays below half a million triangles.
     """
     asked, before = chord, np.inf
     limit = DEVIATION_ROOM * asked
@@ -83,7 +84,7 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
             off = face_deviations(shapes, faces, asked)
         deviation = float(off.max(initial=0.0))
         count = sum(len(f.triangles) for f in faces)
-        if (deviation <= limit or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES
+        if (not _curable(shapes, faces, off, limit) or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES
                 or deviation > WORTH * before):
             break
         before = deviation
@@ -104,6 +105,16 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
     if open_edges:
         warnings.append(f"{open_edges} edges of the mesh are not shared by exactly two triangles")
     return SolidMesh(mesh, uv, faces, edge_nodes, deviation, chord, warnings)
+
+
+def _curable(shapes: list[Shape], faces: list[FaceMesh], off: F64, limit: float) -> bool:
+    """Whether some face deviates by more than the gaps between it and its own edges explain."""
+    for k in np.flatnonzero(off > limit):
+        used = np.unique(faces[k].triangles)
+        gaps = node_gaps(BRepAdaptor_Surface(shapes[k], True), faces[k].nodes[used], faces[k].uv[used])
+        if off[k] > limit + gaps.max():
+            return True
+    return False
 
 
 def count_open_edges(mesh: TriangleMesh) -> int:

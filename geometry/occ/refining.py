@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 
 from geometry.mesh import F64
-from geometry.occ.deviation import distance_near
+from geometry.occ.deviation import distance_near, node_gaps
 
 I64 = NDArray[np.int64]
 
@@ -27,8 +27,9 @@ FLIP_GAIN = 0.8
 FLIP_ROOM = 1e-3
 # A triangle with an angle above this (rad) is a cap.
 CAP = np.radians(165.0)
-# Sides are not split below this many chords: such a short side deviates because its ends do, not because it is long.
-SHORTEST = 2.0
+# Sides are not split below this many chords and this many times the gap between their ends and the surface: such a
+# short side deviates because its ends do, not because it is long.
+SHORTEST, SHORTEST_GAPS = 2.0, 8.0
 
 
 @dataclass
@@ -75,14 +76,12 @@ class _Distances:
 
     def __call__(self, net: Net, corners: I64) -> F64:
         """Upper bound per row of ``corners`` (k, 2 or 3); below the chord no more than that is said."""
-        out = np.empty(len(corners))
         keys = [tuple(row) for row in np.sort(corners, axis=1).tolist()]
         fresh = [i for i, key in enumerate(keys) if key not in self.known]
         points, uv = net.nodes[corners[fresh]].mean(axis=1).tolist(), net.uv[corners[fresh]].mean(axis=1)
         for i, point, place in zip(fresh, points, uv, strict=True):
             self.known[keys[i]] = distance_near(self.surface, point, place, enough=self.chord)
-        out[:] = [self.known[key] for key in keys]
-        return out
+        return np.array([self.known[key] for key in keys])
 
 
 def refine_net(surface: BRepAdaptor_Surface, net: Net, chord: float, most: int) -> Net:
@@ -96,14 +95,16 @@ def refine_net(surface: BRepAdaptor_Surface, net: Net, chord: float, most: int) 
     Returns Net: the nodes of ``net`` in their order, new ones on the surface behind them; the border is that of
     ``net``, side by side.
     Notes   a split puts the new node at the mean (u, v) of the ends of a side, and both triangles of a side are split,
-            so no gap can open. Ends early at ``most`` triangles or where only sides shorter than two chords deviate;
-            measure afterwards.
+            so no gap can open. Ends early at ``most`` triangles or where only sides deviate that are short beside
+            the chord or beside what nodes of the border miss the surface by; measure afterwards.
     """
     distances = _Distances(surface, chord)
+    gaps = node_gaps(surface, net.nodes, net.uv)
     for _ in range(ROUNDS):
         net = _flipped(net, distances)
         sides = _sides(net)
-        marked = _marked(net, sides, distances)
+        gaps = np.concatenate([gaps, np.zeros(len(net.nodes) - len(gaps))])
+        marked = _marked(net, sides, gaps, distances)
         if not marked.any() or len(net.triangles) > most:
             break
         net = _split(surface, net, sides, marked)
@@ -126,13 +127,14 @@ def _sides(net: Net) -> _Sides:
     return _Sides(ends, of.reshape(-1, 3), uses)
 
 
-def _marked(net: Net, sides: _Sides, distances: _Distances) -> np.ndarray:
+def _marked(net: Net, sides: _Sides, gaps: F64, distances: _Distances) -> np.ndarray:
     """(k,) bool, sides to split: inner ones that deviate, and the longest inner one of a triangle that does."""
     inner = sides.inner
     length = np.linalg.norm(net.nodes[sides.ends[:, 0]] - net.nodes[sides.ends[:, 1]], axis=1)
     marked = np.zeros(len(sides.ends), bool)
     able = np.zeros(len(sides.ends), bool)
-    able[inner] = length[inner] > SHORTEST * distances.chord
+    shortest = SHORTEST * distances.chord + SHORTEST_GAPS * gaps[sides.ends].mean(axis=1)
+    able[inner] = length[inner] > shortest[inner]
     marked[inner] = able[inner] & (distances(net, sides.ends[inner]) > distances.chord)
     rest = np.flatnonzero(~marked[sides.of].any(axis=1) & able[sides.of].any(axis=1))
     off = rest[distances(net, net.triangles[rest]) > distances.chord]
