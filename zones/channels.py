@@ -17,6 +17,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.sampling import sample_surface
 from zones.facegraph import FaceGraph, cast
+from zones.footprints import cap_footprints
 from zones.smooth import SmoothFaces
 
 FACING_DOT = -0.3
@@ -24,7 +25,9 @@ FACING_SHARE = 0.02
 SAMPLES_PER_WALL = 3000
 # Local refinement: starts, random points a round, rounds, and how much the neighbourhood shrinks when the best is well
 # inside it (nearer than INNER of its radius); otherwise it only moves, along a slanting border for example.
-STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 10, 0.4, 0.7
+STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 12, 0.4, 0.5
+# Triangles are looked up once within this multiple of the first radius.
+AROUND = 4.0
 NEAREST, RIM_SAMPLES, TRIANGLES = 200, 600, 300
 # Points stay these shares of a triangle away from its corners and edges, so that rays do not leave through a border.
 INSETS = (1e-3, 1e-5)
@@ -81,21 +84,23 @@ class _Field:
     def __init__(self, graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> None:
         keep = ~left_out[graph.face_of]
         full, uv = graph.mesh, graph.part.uv
-        self.mesh = TriangleMesh(full.vertices, full.faces[keep], full.face_ids[keep])
-        self.tree = TriangleTree(self.mesh)
-        self.skin = graph.skin
-        owner = np.full(graph.n, -1)
+        owner = np.full(graph.n + 1, -1)
         for wall, faces in enumerate(sides):
             owner[faces] = wall
+        caps = cap_footprints(graph, left_out, owner[:-1] >= 0)
+        self.mesh = _with_triangles(TriangleMesh(full.vertices, full.faces[keep], full.face_ids[keep]), caps,
+                                    graph.n + 1)
+        self.tree = TriangleTree(self.mesh)
+        self.skin = graph.skin
         self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
         self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
                                   max(graph.part.chord, graph.part.deviation))
-        self.on_rim = np.zeros(len(full.vertices), bool)
+        self.on_rim = np.zeros(len(self.mesh.vertices), bool)
         for faces in sides:
             self.on_rim[_rim_nodes(graph, faces)] = True
         self.side_area = np.array([graph.area[f].sum() for f in sides])
         self.count = len(sides)
-        self.patches: dict[int, tuple[F64, F64, np.ndarray]] = {}
+        self.patches: dict[int, tuple[np.ndarray, F64, F64]] = {}
 
     def look(self, points: F64, triangles: np.ndarray) -> tuple[F64, np.ndarray, F64]:
         """Outward rays from points of sides on the triangles they lie on.
@@ -129,7 +134,7 @@ class _Field:
         triangles = np.flatnonzero(self.owner == wall)
         s = sample_surface(self.mesh, SAMPLES_PER_WALL / area, seed=29, triangles=triangles)
         rim = triangles[self.on_rim[self.mesh.faces[triangles]].any(axis=1)]
-        rim = rim[np.unique(np.linspace(0, max(len(rim) - 1, 0), RIM_SAMPLES).astype(int))] if len(rim) else rim
+        rim = rim[_regular(len(rim), RIM_SAMPLES)]
         t = self.mesh.triangles[rim]
         corners = (t + INSETS[0] * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
         points, owner = np.concatenate([s.points, corners]), np.concatenate([s.triangle, np.repeat(rim, 3)])
@@ -176,17 +181,17 @@ class _Field:
 
     def _descend(self, start: Start, radius: float) -> tuple[float, F64, F64]:
         """Search ever smaller neighbourhoods of a start on the sides of its wall: least length, point, foot."""
-        low, high, side = self._patch(start.wall)
-        front = self.mesh.normals[start.triangle]
+        reach = AROUND * radius
+        side, low, high, anchor = *self._side_near(start, start.point, reach), start.point
         best = (start.distance, start.point, start.point)
         points, triangles = start.point[None], np.array([start.triangle])
         for turn in range(ROUNDS):
             centre = best[1]
-            close = np.flatnonzero(((low <= centre + radius) & (high >= centre - radius)).all(axis=1))
-            close = side[close]
-            close = close[self.mesh.normals[close] @ front > 0]
+            if float(np.abs(centre - anchor).max()) > reach - radius:
+                side, low, high, anchor = *self._side_near(start, centre, reach), centre
+            close = side[((low <= centre + radius) & (high >= centre - radius)).all(axis=1)]
             # a regular choice where there are many; later rounds see them all
-            close = close[np.unique(np.linspace(0, len(close) - 1, min(len(close), TRIANGLES)).astype(int))]
+            close = close[_regular(len(close), TRIANGLES)]
             near = _points_near(self.mesh, close, self.on_rim, centre, radius, turn)
             points, triangles = np.concatenate([points[:1], near[0]]), np.concatenate([triangles[:1], near[1]])
             distance, met, feet = self.look(points, triangles)
@@ -201,13 +206,30 @@ class _Field:
                 radius *= SHRINK
         return best
 
-    def _patch(self, wall: int) -> tuple[F64, F64, np.ndarray]:
-        """Boxes and indices of the triangles of the sides of a wall."""
-        if wall not in self.patches:
-            side = np.flatnonzero(self.owner == wall)
+    def _side_near(self, start: Start, centre: F64, reach: float) -> tuple[np.ndarray, F64, F64]:
+        """Triangles of the sides of a wall within a box, on the side of the start, and their own boxes."""
+        if start.wall not in self.patches:
+            side = np.flatnonzero(self.owner == start.wall)
             t = self.mesh.triangles[side]
-            self.patches[wall] = (t.min(axis=1), t.max(axis=1), side)
-        return self.patches[wall]
+            self.patches[start.wall] = (side, t.min(axis=1), t.max(axis=1))
+        side, low, high = self.patches[start.wall]
+        rows = np.arange(len(side))
+        for k in range(3):
+            rows = rows[(low[rows, k] <= centre[k] + reach) & (high[rows, k] >= centre[k] - reach)]
+        rows = rows[self.mesh.normals[side[rows]] @ self.mesh.normals[start.triangle] > 0]
+        return side[rows], low[rows], high[rows]
+
+
+def _regular(count: int, most: int) -> np.ndarray:
+    """Indices of at most so many of a row, spread evenly."""
+    return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(np.int64)
+
+
+def _with_triangles(mesh: TriangleMesh, more: F64, number: int) -> TriangleMesh:
+    """The mesh with triangles (k, 3, 3) of one more face after its own."""
+    corner = np.arange(3 * len(more), dtype=np.int32).reshape(-1, 3) + np.int32(len(mesh.vertices))
+    return TriangleMesh(np.concatenate([mesh.vertices, more.reshape(-1, 3)]), np.concatenate([mesh.faces, corner]),
+                        np.concatenate([mesh.face_ids, np.full(len(more), number, mesh.face_ids.dtype)]))
 
 
 def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
@@ -227,7 +249,7 @@ def _points_near(mesh: TriangleMesh, triangles: np.ndarray, on_rim: np.ndarray, 
     t = mesh.triangles[triangles]
     corner = (t + INSETS[0] * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
     rng = np.random.default_rng(seed)
-    pick = np.unique(np.linspace(0, len(t) - 1, min(len(t), 64)).astype(int))
+    pick = _regular(len(t), 64)
     spread, owner = _onto_triangles(t[pick], centre + radius * rng.uniform(-1.0, 1.0, (POINTS, 3)))
     rim, beside = _along_rim(t, on_rim[mesh.faces[triangles]], centre, radius)
     points = np.concatenate([corner, rim, spread])
@@ -256,11 +278,10 @@ def _along_rim(t: F64, rim: np.ndarray, centre: F64, radius: float) -> tuple[F64
 def _onto_triangles(t: F64, points: F64) -> tuple[F64, np.ndarray]:
     """Points projected into the plane of each triangle, kept where they fall inside it: (k, 3), rows of t."""
     e1, e2 = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    n = np.cross(e1, e2)
-    square = np.einsum("ij,ij->i", n, n)
-    square = np.maximum(square, 1e-300)
-    w = points[None] - t[:, 0][:, None]
-    b1 = np.einsum("ijk,ik->ij", np.cross(w, e2[:, None]), n) / square[:, None]
-    b2 = np.einsum("ijk,ik->ij", np.cross(e1[:, None], w), n) / square[:, None]
+    g11, g12, g22 = ((a * b).sum(axis=1)[:, None] for a, b in ((e1, e1), (e1, e2), (e2, e2)))
+    det = np.maximum(g11 * g22 - g12 * g12, 1e-300)
+    w1 = e1 @ points.T - (e1 * t[:, 0]).sum(axis=1)[:, None]
+    w2 = e2 @ points.T - (e2 * t[:, 0]).sum(axis=1)[:, None]
+    b1, b2 = (w1 * g22 - w2 * g12) / det, (w2 * g11 - w1 * g12) / det
     i, j = np.nonzero((b1 > INSETS[0]) & (b2 > INSETS[0]) & (b1 + b2 < 1 - INSETS[0]))
     return np.asarray(t[i, 0] + b1[i, j, None] * e1[i] + b2[i, j, None] * e2[i]), i

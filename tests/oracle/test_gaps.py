@@ -108,7 +108,8 @@ def found_gap(surfaces: list[tuple[Surface, float]], sides: list[list[int]], col
     mesh, uv, links = mesh_of(surfaces, columns, rows)
     face_of = mesh.face_ids.astype(np.int64) - 1
     graph: Any = SimpleNamespace(
-        mesh=mesh, face_of=face_of, n=len(surfaces), at=links, skin=1e-6 * 50.0,
+        mesh=mesh, face_of=face_of, n=len(surfaces), at=links, links=[], skin=1e-6 * 50.0,
+        fillet=np.zeros(len(surfaces), bool), sliver=np.zeros(len(surfaces), bool),
         area=np.bincount(face_of, weights=mesh.areas), part=SimpleNamespace(uv=uv, chord=0.02, deviation=0.02))
     channels = find_facings(graph, [np.array(s) for s in sides], np.zeros(len(surfaces), bool))
     assert len(channels) == 1

@@ -17,6 +17,54 @@ RIDGE = np.array([1e-14, 1e-14, 1e-10, 1e-10, 1e-10, 1e-6, 1e-6, 1e-6, 1e-6])
 
 
 @njit(cache=True, nogil=True)
+def local_nodes(faces, ids, par, vertices, same):
+    """Nodes that are one per face, vertex and parameters, so both sides of a seam have their own.
+
+    faces (k, 3), ids (k,) of triangles, par (k, 3, 2), number of vertices; parameters within ``same`` are one.
+    Returns (k, 3) int64 nodes of the triangles and (n,) int64, for every node its first corner (3 t + c).
+    """
+    corner = np.empty((len(faces), 3), np.int64)
+    head, follows = np.full(vertices, -1, np.int64), np.empty(3 * len(faces), np.int64)
+    first = np.empty(3 * len(faces), np.int64)
+    n = 0
+    for t in range(len(faces)):
+        for c in range(3):
+            node = head[faces[t, c]]
+            while node >= 0:
+                r, q = first[node] // 3, first[node] % 3
+                if (ids[r] == ids[t] and abs(par[r, q, 0] - par[t, c, 0]) <= same
+                        and abs(par[r, q, 1] - par[t, c, 1]) <= same):
+                    break
+                node = follows[node]
+            if node < 0:
+                node = n
+                first[node] = 3 * t + c
+                follows[node] = head[faces[t, c]]
+                head[faces[t, c]] = node
+                n += 1
+            corner[t, c] = node
+    return corner, first[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def rings(corner, count):
+    """Neighbours of every node, most of them twice: (n + 1,) int64 starts and the nodes in one row."""
+    start = np.zeros(count + 1, np.int64)
+    for t in range(len(corner)):
+        for c in range(3):
+            start[corner[t, c] + 1] += 2
+    for i in range(count):
+        start[i + 1] += start[i]
+    at, ring = start[:-1].copy(), np.empty(start[-1], np.int64)
+    for t in range(len(corner)):
+        for c in range(3):
+            i = corner[t, c]
+            ring[at[i]], ring[at[i] + 1] = corner[t, (c + 1) % 3], corner[t, (c + 2) % 3]
+            at[i] += 2
+    return start, ring
+
+
+@njit(cache=True, nogil=True)
 def _neighbours(i, start, ring, out):
     """Nodes round node i, without it, each once: two rings, and up to ``RINGS`` until there are ``ENOUGH``."""
     n, done = 0, 0
@@ -106,22 +154,34 @@ def fit_patches(place, par, start, ring):
 
 
 @njit(cache=True, nogil=True)
-def blend_patches(corner, share, place, par, coef):
-    """Places (k, 3) and unit normals (k, 3) of points given by three nodes each and their barycentric shares.
+def _shares(a, b, c, p, out):
+    """Barycentric coordinates of p in the triangle a b c, clipped to it."""
+    e, f, w = b - a, c - a, p - a
+    ee, ef, ff, we, wf = e @ e, e @ f, f @ f, w @ e, w @ f
+    det = max(ee * ff - ef * ef, 1e-300)
+    out[1] = min(max((we * ff - wf * ef) / det, 0.0), 1.0)
+    out[2] = min(max((wf * ee - we * ef) / det, 0.0), 1.0 - out[1])
+    out[0] = 1.0 - out[1] - out[2]
 
-    The three patches, taken at the point's own parameters, are blended by the shares. NaN normals where the
-    parameters are singular; the sign follows u x v.
+
+@njit(cache=True, nogil=True)
+def blend_patches(corner, points, place, par, coef):
+    """Places (k, 3) and unit normals (k, 3) on the patches at points (k, 3) of triangles of nodes (k, 3).
+
+    The three patches of a triangle, taken at the point's own parameters, are blended by its barycentric coordinates.
+    NaN normals where the parameters are singular; the sign follows u x v.
     """
     where, normal = np.zeros((len(corner), 3)), np.empty((len(corner), 3))
-    xu, xv = np.empty(3), np.empty(3)
+    xu, xv, share = np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(corner)):
+        _shares(place[corner[k, 0]], place[corner[k, 1]], place[corner[k, 2]], points[k], share)
         u, v = 0.0, 0.0
         for m in range(3):
-            u += share[k, m] * par[corner[k, m], 0]
-            v += share[k, m] * par[corner[k, m], 1]
+            u += share[m] * par[corner[k, m], 0]
+            v += share[m] * par[corner[k, m], 1]
         xu[:], xv[:] = 0.0, 0.0
         for m in range(3):
-            i, w = corner[k, m], share[k, m]
+            i, w = corner[k, m], share[m]
             s, t = u - par[i, 0], v - par[i, 1]
             for c in range(3):
                 x = coef[i, :, c]
