@@ -2,8 +2,8 @@
 
 The kernel checks its triangles against the surface and inserts nodes for a fixed number of rounds, with triangles that
 are Delaunay in the plane of the parameters stretched to a square. On long ruled faces that turns triangles which ran
-along the rulings into wide fans across the bend, and the rounds end before the fans are split. Here a flip has to pay
-in distance to the surface, and splitting goes on until every triangle keeps the chord.
+along the rulings into wide fans across the bend, and some are left when the rounds are over. Here a flip has to pay in
+distance to the surface, and splitting goes on until every triangle keeps the chord.
 """
 
 from __future__ import annotations
