@@ -136,7 +136,7 @@ PAIRS = {
 def test_gap_of_two_ruled_walls_is_that_of_dense_exact_rays(name: str, rows: int) -> None:
     a, b = (PAIRS[name][0], -1.0), (PAIRS[name][1], 1.0)
     true = min(dense_gap(a, b), dense_gap(b, a))
-    assert found_gap([a, b], [[0], [1]], 60, rows) == pytest.approx(true, rel=2e-3)
+    assert found_gap([a, b], [[0], [1]], 60, rows) == pytest.approx(true, rel=4e-4)
 
 
 @pytest.mark.parametrize("rows", [1, 5])
@@ -144,7 +144,7 @@ def test_gap_of_two_ruled_walls_is_that_of_dense_exact_rays(name: str, rows: int
 def test_gap_of_an_oval_ring_facing_itself(a: float, b: float, lean: float, rows: int) -> None:
     side = (oval(a, b, lean), -1.0)
     true = dense_gap(side, side, 0.5)
-    assert found_gap([side], [[0]], 64, rows) == pytest.approx(true, rel=2e-3)
+    assert found_gap([side], [[0]], 64, rows) == pytest.approx(true, rel=4e-4)
 
 
 @pytest.mark.parametrize("k", [0.0, 0.05, 0.2])
