@@ -136,9 +136,9 @@ SLENDER_FORK = [(10, -9), (11, -9), (11, -5), (16, 0.5), (14.8, 0.5), (10.5, -4.
 
 def aslant() -> Shape:
     """Two walls 3 apart and a steep bar that meets both slantwise: rays across the bar leave by the back of a wall."""
-    bar = outline("XZ", [(-2, 3), (-2, -1), (2, 1), (2, 5)], -1.2, (0, -0.6, 8))
-    return plate().union(box(50, 2, 14, 0, -5, 3)).union(box(50, 2, 14, 0, 0, 3)).union(
-        bar.rotate((0, 0, 0), (0, 0, 1), 60).translate((20, -1.5, 0)))
+    bar = outline("XZ", [(-5, 2), (-5, -3), (5, 1), (5, 6)], -2.2, (0, -1.1, 9)).rotate((0, 0, 0), (0, 0, 1), 55)
+    bar = bar.translate((20, -1.5, 0)).intersect(box(60, 5, 40, -5, -4, 0))
+    return plate().union(box(50, 2, 14, 0, -5, 3)).union(box(50, 2, 14, 0, 0, 3)).union(bar)
 
 
 SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
