@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+import geometry.kernels.cache  # noqa: F401  keys numba's cache before the first kernel is met
 from examples.splines import F64
 from examples.walls import LEFT, RIGHT, WallSpec
 

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import binary_dilation, distance_transform_edt
+from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
@@ -34,6 +35,8 @@ LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
 FRUSTUM_SLICES = 6
 FEW = 4000  # queries below this are not worth waking a second thread for
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
+AIMED = 12  # free nodes a flat bottom is tried towards over a level place
+INSIDE = 1e-5  # mm: a flat bottom is not asked to reach nearer than this to its own rim
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
 
 
@@ -258,22 +261,27 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
 
 
 def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
-    """Tips (n, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards the nearest free node.
+    """Tips (n, k, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards free nodes near by.
 
-    One direction for each, so one step of the lattice is what can be missed where any place under the flat is free.
+    A node that lies under the flat is free as it stands; towards farther ones the tip goes as far as the flat allows.
+    So where any place is free under the flat, less than one step of the lattice is what can be missed. The last of the k
+    goes towards the middle of those nodes, which is straight away from a straight wall.
     """
-    lat, out = field.lattice, np.column_stack([points[:, :2], tip_z])
+    lat = field.lattice
+    out = np.repeat(np.column_stack([points[:, :2], tip_z])[:, None], AIMED + 1, axis=1)
     level = np.round(tip_z, 6)  # a plane that was turned is level but for rounding
     for z in np.unique(level):
         mine = np.flatnonzero(level == z)
         free = field.cut_height <= z
-        if not free.any():
+        i, j = np.nonzero(free & binary_dilation(~free))
+        if not len(i):
             continue
-        near = distance_transform_edt(~free, return_distances=False, return_indices=True)
-        i, j = near[:, *lat.cells(points[mine, :2])]
-        way = np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i]) - points[mine, :2]
-        far = np.linalg.norm(way, axis=1)
-        out[mine, :2] += way * np.minimum(1.0, (flat - 1e-3) / np.maximum(far, 1e-12))[:, None]
+        rim = np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i])
+        near = cKDTree(rim).query(points[mine, :2], k=min(AIMED, len(rim)))[1].reshape(len(mine), -1)
+        way = rim[near] - points[mine, None, :2]
+        way = np.concatenate([way, 1e3 * way.mean(axis=1, keepdims=True)], axis=1)
+        far = np.linalg.norm(way, axis=2, keepdims=True)
+        out[mine, :way.shape[1], :2] += way * np.minimum(1.0, (flat - INSIDE) / np.maximum(far, 1e-12))
     return out
 
 
@@ -319,9 +327,13 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float, play: flo
                 cutter[todo] |= free
                 whole[todo[ok]] = True
                 tips[todo[better]] = trial[better]
-        todo = np.flatnonzero(level & ~whole)
-        if aim and len(todo):
-            trial = _aimed(field, points[todo], tips[todo, 2], flat)
+        open_to = np.flatnonzero(level & ~whole)
+        trials = _aimed(field, points[open_to], tips[open_to, 2], flat) if aim and len(open_to) else None
+        for k in range(AIMED + 1 if trials is not None else 0):
+            left = np.flatnonzero(~whole[open_to])
+            if trials is None or not len(left):
+                break
+            todo, trial = open_to[left], np.ascontiguousarray(trials[left, k])
             free = ~field.blocked_by_cutter(trial)
             ok = free & ~field.blocked_by_body(trial)
             better = ok | (free & ~cutter[todo])
