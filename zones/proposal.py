@@ -162,8 +162,8 @@ def _known(few: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTr
     for key in sorted(fields):
         open_to = np.flatnonzero(why == "")
         normals = few.normals[open_to]
-        takes = touchable(fields[key], few.points[open_to], normals, lift)[1] & able(fields[key].tool, normals)
-        why[open_to[takes]] = "pass"
+        takes = touchable(fields[key], few.points[open_to], normals, lift, aim=True)[1]
+        why[open_to[takes & able(fields[key].tool, normals)]] = "pass"
     return why
 
 
@@ -209,7 +209,7 @@ class _Shop:
             bare = replace(body, shank_diameter=body.diameter, holder=())
             near = TipField(self.tree, bare, self.clear, self.part.bounds, body.radius, lattice_step(body),
                             self.allowance, self.cusp)
-            _, fits, tips = touchable(near, points[ready], normals[ready], self.lift, aim=False)
+            _, fits, tips = touchable(near, points[ready], normals[ready], self.lift)
             rows = ready[fits]
             if not len(rows):
                 continue

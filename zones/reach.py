@@ -264,8 +264,8 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
     """Tips (n, k, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards free nodes near by.
 
     A node that lies under the flat is free as it stands; towards farther ones the tip goes as far as the flat allows.
-    So where any place is free under the flat, less than one step of the lattice is what can be missed. The last of the k
-    goes towards the middle of those nodes, which is straight away from a straight wall.
+    So where any place is free under the flat, less than one step of the lattice is what can be missed. The last of
+    the k goes towards the middle of those nodes, which is straight away from a straight wall.
     """
     lat = field.lattice
     out = np.repeat(np.column_stack([points[:, :2], tip_z])[:, None], AIMED + 1, axis=1)
@@ -286,13 +286,13 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
 
 
 def touchable(field: TipField, points: F64, normals: F64, lift: float, play: float = PLAY_STEPS,
-              aim: bool = True) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+              aim: bool = False) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
     """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
 
     play : lattice steps of room to move away from a wall beside it: a channel that fits the tool like a gauge is for
            the next thinner one
-    aim  : whether a flat bottom is also tried over a level place from the nearest free node of the lattice, which has
-           to be laid out for that
+    aim  : whether a flat bottom is also tried over a level place towards free nodes of the lattice near by. That is the
+           true reach; the planner does not ask for it, because its passes over level planes stop at the lattice
 
     Returns
     -------

@@ -146,7 +146,7 @@ def _reasons(few: SurfaceSamples, fields: dict[str, TipField], part: Part, tree:
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
         need[k] = {"kind": "other access"}
     open_to = np.flatnonzero(reason == "")
-    asked = [(fields[t], *touchable(fields[t], few.points[open_to], few.normals[open_to], lift))
+    asked = [(fields[t], *touchable(fields[t], few.points[open_to], few.normals[open_to], lift, aim=True))
              for t in sorted(fields, key=lambda t: (fields[t].tool.diameter, t))]
     cuts = [np.full(len(open_to), f.tool.corner_radius > 0) | _upright(few.normals[open_to]) for f, *_ in asked]
     for (_, _, by_tool, _), able in zip(asked, cuts, strict=True):
@@ -203,7 +203,7 @@ def _too_thick(thinnest: ToolBody, few: SurfaceSamples, tree: TriangleTree, part
             ahead, _ = first_hits(tree, few.points, few.normals, 1e-3, 1e6)
         body = replace(thinnest, diameter=d, corner_radius=corner, shank_diameter=d, neck_diameter=d, holder=())
         field = TipField(tree, body, Clearances(), part.bounds, d, lattice_step(body))
-        fits, _, tips = touchable(field, few.points[left], few.normals[left], lift, aim=False)
+        fits, _, tips = touchable(field, few.points[left], few.normals[left], lift)
         for k in np.flatnonzero(fits & (_upright(few.normals[left]) | (kind == "ball"))):
             i = int(left[k])
             reason[i] = "gap" if float(ahead[i]) < thinnest.diameter * 1.5 else "corner"
