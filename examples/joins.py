@@ -17,7 +17,7 @@ from shapely.ops import unary_union
 from examples.connections import ConnectionSpec
 from examples.freewall import FreeWall
 from examples.gaps import Gap
-from examples.layout import LayoutError, clear_of
+from examples.layout import LayoutError, clear_of, settled
 from examples.splines import F64
 from examples.walls import WallSpec
 
@@ -167,14 +167,7 @@ def join(
         raise LayoutError("met too obliquely")
     ends = np.array([*start, z[0]]), np.array([*found.end, z[1]])
     spec = ConnectionSpec(kind, (first, second), (i, found.other), *ends, tangents, width, depth, bend)
-    for _ in range(6):
-        if spec.buried(BURIED_BY):
-            break
-        spec = spec.narrowed(0.8)
-    else:
-        raise LayoutError("ends cannot be buried")
-    if spec.width < 0.7 or spec.span[1] - spec.span[0] < 0.05 or spec.void_share < 0.25:
-        raise LayoutError("too narrow, no span, or no void below")
+    spec = settled(spec, BURIED_BY, 6)
     _ends_only_there(walls, spec.footprint(), {i, found.other}, spec.z_range, 2)
     return spec
 

@@ -205,17 +205,26 @@ def connect(
                           tangents, width, depth, bend)
     if abs(bend) > 0.3 * float(np.linalg.norm(end - start)):
         raise LayoutError("bent too far for its length")
-    for _ in range(8):
-        if spec.buried(0.12):
+    spec = settled(spec, 0.12, 8)
+    outline = spec.footprint()
+    if any(w.section(0.5 * sum(spec.z_range)).intersects(outline) for k, w in enumerate(walls) if k not in pair):
+        raise LayoutError("meets a third wall")
+    return spec
+
+
+def settled(spec: ConnectionSpec, depth: float, rounds: int) -> ConnectionSpec:
+    """The connection narrowed until both ends lie ``depth`` mm inside their walls.
+
+    Raises LayoutError where so many rounds are not enough, or too little of it is left, or no void below.
+    """
+    for _ in range(rounds):
+        if spec.buried(depth):
             break
         spec = spec.narrowed(0.8)
     else:
         raise LayoutError("ends cannot be buried")
     if spec.width < 0.7 or spec.span[1] - spec.span[0] < 0.05 or spec.void_share < 0.25:
         raise LayoutError("too narrow, no span, or no void below")
-    outline = spec.footprint()
-    if any(w.section(0.5 * sum(spec.z_range)).intersects(outline) for k, w in enumerate(walls) if k not in pair):
-        raise LayoutError("meets a third wall")
     return spec
 
 

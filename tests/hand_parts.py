@@ -159,6 +159,22 @@ def samples_of(mesh: TriangleMesh, density: float, faces: set[int] | None = None
                             for f in ("points", "normals", "area", "face", "triangle")))
 
 
+def blocks(seed):
+    """Upright blocks of random widths and heights; the gaps between are as wide as the tools, or less."""
+    rng = np.random.default_rng(seed)
+    xs, ys = (np.concatenate([[0.0], np.cumsum(rng.uniform(0.8, 4.5, 5))]) for _ in range(2))
+    return terraces(xs, ys, rng.choice([1.0, 1.0, 2.5, 5.0, 8.0], (5, 5)))
+
+
+HOLDER = (HolderSegment(8, 14, 5), HolderSegment(14, 14, 20))
+SHORT_TOOLS = {
+    "ball": ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
+    "flat": tool(2.0, 0.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
+    "bull": tool(2.4, 0.4, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
+}
+"""Tools whose shank and holder soon meet what stands round them."""
+
+
 def view_of(part: Part, samples: SurfaceSamples, fields: dict[str, TipField],
             decomposition: Decomposition | None = None,
             labels: Labels | None = None, obstacles: TriangleTree | None = None) -> View:

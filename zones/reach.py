@@ -285,6 +285,19 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
     return out
 
 
+def _take(field: TipField, trial: F64, todo: NDArray[np.int64], cutter: NDArray[np.bool_], whole: NDArray[np.bool_],
+          tips: F64) -> None:
+    """Keep of trial tips (k, 3) for the samples ``todo`` what is free, in place; those of the whole tool come first."""
+    if not len(todo):
+        return
+    free = ~field.blocked_by_cutter(trial)
+    ok = free & ~field.blocked_by_body(trial)
+    better = ok | (free & ~cutter[todo])
+    cutter[todo] |= free
+    whole[todo[ok]] = True
+    tips[todo[better]] = trial[better]
+
+
 def touchable(field: TipField, points: F64, normals: F64, lift: float, play: float = PLAY_STEPS,
               aim: bool = False) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
     """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
@@ -317,29 +330,14 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float, play: flo
         for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)):
             for side in FLAT_RING:
                 todo = np.flatnonzero(level & ~whole)
-                if not len(todo):
-                    break
                 trial = tips[todo].copy()
                 trial[:, :2] = points[todo, :2] + reach * side
-                free = ~field.blocked_by_cutter(trial)
-                ok = free & ~field.blocked_by_body(trial)
-                better = ok | (free & ~cutter[todo])
-                cutter[todo] |= free
-                whole[todo[ok]] = True
-                tips[todo[better]] = trial[better]
+                _take(field, trial, todo, cutter, whole, tips)
         open_to = np.flatnonzero(level & ~whole)
-        trials = _aimed(field, points[open_to], tips[open_to, 2], flat) if aim and len(open_to) else None
-        for k in range(AIMED + 1 if trials is not None else 0):
-            left = np.flatnonzero(~whole[open_to])
-            if trials is None or not len(left):
-                break
-            todo, trial = open_to[left], np.ascontiguousarray(trials[left, k])
-            free = ~field.blocked_by_cutter(trial)
-            ok = free & ~field.blocked_by_body(trial)
-            better = ok | (free & ~cutter[todo])
-            cutter[todo] |= free
-            whole[todo[ok]] = True
-            tips[todo[better]] = trial[better]
+        if aim and len(open_to):
+            for trials in _aimed(field, points[open_to], tips[open_to, 2], flat).transpose(1, 0, 2):
+                left = np.flatnonzero(~whole[open_to])
+                _take(field, np.ascontiguousarray(trials[left]), open_to[left], cutter, whole, tips)
     tips[:, 2] -= LEVEL_TOLERANCE
     seen = normals[:, 2] > -0.02
     return cutter & seen, whole & seen, tips

@@ -192,27 +192,29 @@ def build_nodes(triangles: F64, leaf_size: int):
 
 
 @njit(**KERNEL)
+def facet_row(p, q, r):
+    """Upward unit normal, orientation and quality of a triangle."""
+    ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    wx, wy, wz = r[0] - q[0], r[1] - q[1], r[2] - q[2]
+    longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
+    side = 1.0 if nz >= 0.0 else -1.0
+    # length / longest is height over longest edge: the normal's error is about 1e-16 over that.
+    if length <= 1e-11 * longest or abs(nz) <= 1e-9 * length:
+        return 0.0, 0.0, 0.0, side, EDGES_ONLY
+    quality = SOUND if length > 1e-5 * longest and abs(nz) > 1e-3 * length else CAREFUL
+    return side * nx / length, side * ny / length, abs(nz) / length, side, quality
+
+
+@njit(**KERNEL)
 def facet_rows(corners: F64):
-    """(m, 5) upward unit normals, orientation and quality of each triangle (m, 3, 3), mm."""
+    """(m, 5) ``facet_row`` of each triangle (m, 3, 3), mm."""
     m = corners.shape[0]
-    out = np.zeros((m, 5))
+    out = np.empty((m, 5))
     for i in range(m):
-        p, q, r = corners[i, 0], corners[i, 1], corners[i, 2]
-        ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        wx, wy, wz = r[0] - q[0], r[1] - q[1], r[2] - q[2]
-        longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
-        side = 1.0 if nz >= 0.0 else -1.0
-        # length / longest is height over longest edge: the normal's error is about 1e-16 over that.
-        if length <= 1e-11 * longest or abs(nz) <= 1e-9 * length:
-            out[i, 3] = side
-            out[i, 4] = EDGES_ONLY
-            continue
-        out[i, 0], out[i, 1], out[i, 2] = side * nx / length, side * ny / length, abs(nz) / length
-        out[i, 3] = side
-        out[i, 4] = SOUND if length > 1e-5 * longest and abs(nz) > 1e-3 * length else CAREFUL
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4] = facet_row(corners[i, 0], corners[i, 1], corners[i, 2])
     return out
 
 

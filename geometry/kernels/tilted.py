@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit, prange
 
-from geometry.kernels.bvh import CAREFUL, EDGES_ONLY, SOUND, STACK, TreeArrays
+from geometry.kernels.bvh import STACK, TreeArrays, facet_row
 from geometry.kernels.drop import BLOCK_TOLERANCE, _bound, _triangle
 from geometry.kernels.options import KERNEL
 
@@ -30,22 +30,6 @@ FACING = 0.05  # covering planes steeper than this (n_z over n_xy) are not used,
 def _turned(t, x, y, z):
     return (t[0, 0] * x + t[0, 1] * y + t[0, 2] * z, t[1, 0] * x + t[1, 1] * y + t[1, 2] * z,
             t[2, 0] * x + t[2, 1] * y + t[2, 2] * z)
-
-
-@njit(**KERNEL)
-def _facet(p, q, s):
-    """Facet row of one triangle: what ``geometry.kernels.bvh.facet_rows`` says of it."""
-    ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    vx, vy, vz = s[0] - p[0], s[1] - p[1], s[2] - p[2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
-    wx, wy, wz = s[0] - q[0], s[1] - q[1], s[2] - q[2]
-    longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
-    side = 1.0 if nz >= 0.0 else -1.0
-    if length <= 1e-11 * longest or abs(nz) <= 1e-9 * length:
-        return 0.0, 0.0, 0.0, side, EDGES_ONLY
-    quality = SOUND if length > 1e-5 * longest and abs(nz) > 1e-3 * length else CAREFUL
-    return side * nx / length, side * ny / length, abs(nz) / length, side, quality
 
 
 @njit(**KERNEL)
@@ -91,7 +75,7 @@ def _enters(tree, i, t, x, y, z, floor, widest, bodies):
     if (min(p[0], q[0], s[0]) - x > widest or x - max(p[0], q[0], s[0]) > widest
             or min(p[1], q[1], s[1]) - y > widest or y - max(p[1], q[1], s[1]) > widest):
         return False
-    facet = _facet(p, q, s)
+    facet = facet_row(p, q, s)
     for k in range(bodies.shape[0]):
         R = bodies[k, 0]
         r = min(bodies[k, 1], R)

@@ -11,20 +11,22 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment
-from tests.hand_parts import ball, box_mesh, dome, joined, low_walls, slope_field, terraces, tool, walls
+from tests.hand_parts import (
+    SHORT_TOOLS,
+    ball,
+    blocks,
+    box_mesh,
+    dome,
+    joined,
+    low_walls,
+    slope_field,
+    tool,
+    walls,
+)
 from zones.reach import LOOKUP_STEP, Clearances, TipField, lattice_step, touchable
 
 LIFT = 0.005
 MARGIN = 8.0  # of the fields: the same for tools of any diameter
-HOLDER = (HolderSegment(8, 14, 5), HolderSegment(14, 14, 20))
-
-
-def blocks(seed):
-    """Upright blocks of random widths and heights; the gaps between are as wide as the tools, or less."""
-    rng = np.random.default_rng(seed)
-    xs, ys = (np.concatenate([[0.0], np.cumsum(rng.uniform(0.8, 4.5, 5))]) for _ in range(2))
-    return terraces(xs, ys, rng.choice([1.0, 1.0, 2.5, 5.0, 8.0], (5, 5)))
 
 
 SHAPES = {
@@ -34,13 +36,6 @@ SHAPES = {
     "dome": lambda: dome(radius=8.0, size=9.0, n=30),
     **{f"blocks {k}": lambda k=k: blocks(k) for k in range(6)},
 }
-SHORT = {
-    "ball": ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
-    "flat": tool(2.0, 0.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
-    "bull": tool(2.4, 0.4, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
-}
-
-
 @cache
 def part(name):
     mesh = SHAPES[name]()
@@ -79,13 +74,13 @@ def test_thinner_cutters_do_reach_more():
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("kind", SHORT)
+@pytest.mark.parametrize("kind", SHORT_TOOLS)
 @pytest.mark.parametrize("longer", [{"flute_length": 6.0}, {"neck_length": 4.0}, {"stickout": 9.0},
                                     {"neck_length": 7.0, "stickout": 9.0}],
                          ids=lambda c: " ".join(c))
 def test_a_longer_tool_reaches_no_less(longer, kind, name):
     mesh, samples = part(name)
-    short = SHORT[kind]
+    short = SHORT_TOOLS[kind]
     by_cutter, by_tool, _ = reach(mesh, samples, short)
     more_cutter, more_tool, _ = reach(mesh, samples, replace(short, **longer))
     assert (by_cutter == more_cutter).all()
@@ -93,10 +88,10 @@ def test_a_longer_tool_reaches_no_less(longer, kind, name):
     assert not (more_tool & ~more_cutter).any()
 
 
-@pytest.mark.parametrize("kind", SHORT)
+@pytest.mark.parametrize("kind", SHORT_TOOLS)
 def test_neck_and_stickout_do_count(kind):
     mesh, samples = part("walls")
-    short = SHORT[kind]
+    short = SHORT_TOOLS[kind]
     high_neck, high_holder, both = (int(reach(mesh, samples, replace(short, **change))[1].sum()) for change in (
         {"neck_length": 7.0}, {"stickout": 14.0}, {"neck_length": 7.0, "stickout": 14.0}))
     assert both > 1.1 * high_neck and both > 1.1 * high_holder
@@ -120,7 +115,7 @@ MOVES = [(0.0, (3.37, -120.11, 0.0)), (math.pi / 2, (0.0, 0.0, 0.0)), (0.7, (11.
 def test_reach_moves_with_the_part(move, name):
     mesh, samples = part(name)
     there_mesh, there = moved(samples, mesh, *move)
-    for kind, body in SHORT.items():
+    for kind, body in SHORT_TOOLS.items():
         by_cutter, by_tool, _ = reach(mesh, samples, body)
         cutter_there, tool_there, _ = reach(there_mesh, there, body)
         # the cutter is exact: only samples at the very limit may turn over, and where a flat bottom is put over a
@@ -137,16 +132,16 @@ def test_reach_moves_with_the_part(move, name):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("kind", SHORT)
+@pytest.mark.parametrize("kind", SHORT_TOOLS)
 def test_a_fixture_never_adds_reach(kind, name):
     mesh, samples = part(name)
     rng = np.random.default_rng(9)
-    by_cutter, by_tool, _ = reach(mesh, samples, SHORT[kind])
+    by_cutter, by_tool, _ = reach(mesh, samples, SHORT_TOOLS[kind])
     lo, hi = mesh.bounds
     for _ in range(3):
         corner = lo + rng.uniform(-0.2, 0.9, 3) * (hi - lo)
         clamp = box_mesh(corner, corner + rng.uniform(1.0, 5.0, 3))
-        fixed_cutter, fixed_tool, _ = reach(joined(mesh, clamp), samples, SHORT[kind], bounds=mesh.bounds)
+        fixed_cutter, fixed_tool, _ = reach(joined(mesh, clamp), samples, SHORT_TOOLS[kind], bounds=mesh.bounds)
         assert not (fixed_cutter & ~by_cutter).any()
         assert not (fixed_tool & ~by_tool).any()
 
