@@ -7,6 +7,7 @@ never sets the step for a whole zone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.levels import Line, dilated
-from toolpath.linking import FLUTE_SHARE, Linker, Motions, nearest_order
+from toolpath.linking import FLUTE_SHARE, RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
 from toolpath.stock import SKIN, StockMap
@@ -228,6 +229,7 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
     linker = Linker(field, stock, _motions(cut, settings))
     name, spacing, rounds = _strategy(zone, checks, field, cut, settings)
     budget = PASS_SHARE * settings.scallop_height
+    skin, slope = SKIN * field.tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
     failing = np.arange(len(points))
     for k in range(REFINEMENTS + 2 if len(points) else 0):
         groups = rounds(k, checks.tips[failing]) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
@@ -238,7 +240,7 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
                 if name != "zigzag":
                     line = _turned(line, settings)
                 before = len(linker.trajectories)
-                for layer in zigzag.skimmed(line, stock, field.tool, SKIN * field.tool.diameter):
+                for layer in zigzag.skimmed(line, stock, field.tool, skin, slope):
                     linker.add(layer)
                 for t in linker.trajectories[before:]:
                     if t.motion is Motion.CUT:

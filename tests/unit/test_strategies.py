@@ -327,7 +327,7 @@ def test_no_steep_part_of_a_skimmed_pass_takes_more_than_the_skin(body):
     line = Line(np.column_stack([x, np.full(41, 2.0), 0.9 + 0.7 * np.cos(1.3 * x)]), False)
     skin, top = 0.25, 1.9
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([10.0, 4, top]), 0.1)
-    got = zigzag.skimmed(line, stock, body, skin)
+    got = zigzag.skimmed(line, stock, body, skin, 0.05)
     assert got[-1] is line and len(got) > 3
     # without them the pass itself would take much more
     (plain,) = steepest_bites([line], Discs([0, 0], [10, 4], top), body)
@@ -336,20 +336,40 @@ def test_no_steep_part_of_a_skimmed_pass_takes_more_than_the_skin(body):
     # the looked-at places lie 0.3 radii apart on a slope of up to 0.9, the stock of the planner 0.1 mm
     assert max(bites) <= skin + 0.08
     assert all(np.diff([q.points[:, 2].max() for q in got]) < 1e-9)  # from the top down
-    for lifted in got[:-1]:
-        up = lifted.points[:, 2] - np.interp(lifted.points[:, 0], x, line.points[:, 2])
-        assert np.ptp(up) < 0.03 and abs(up.mean() / skin - round(up.mean() / skin)) < 0.1
+    lifts = [q.points[:, 2] - np.interp(q.points[:, 0], x, line.points[:, 2]) for q in got]
+    assert max(np.ptp(up) for up in lifts) < 0.03
+    steps = -np.diff([up.mean() for up in lifts])
+    assert np.ptp(steps) < 0.02 and 0.8 * skin < steps.max() <= skin
+
+
+def test_what_a_short_descent_takes_is_worked_off_going_sideways():
+    """On a short slope each layer may only add what the way back has earned; on a long one a skin each."""
+    mesh = box_mesh([0, 0, -2], [40, 4, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([40.0, 4, 3.0]), 0.1)
+    body, skin, slope = tool(2.0, 0.4), 0.4, 0.05
+    counts = []
+    for run, low in ((2.0, 1.4), (30.0, 0.6)):
+        line = Line(np.array([[3.0, 2, 2.6], [3.0 + run, 2, low]]), False)
+        got = zigzag.skimmed(line, stock, body, skin, slope)
+        heights = [float(np.interp(3.0 + 0.5 * run, q.points[:, 0], q.points[:, 2])) for q in got]
+        steps = -np.diff([3.0, *heights])  # from the top of the block down
+        debt = 0.0
+        for step in steps:
+            debt = max(debt - slope * run, 0.0) + step
+            assert debt <= skin + 0.05
+        counts.append(len(got))
+    assert counts[0] > 2 * counts[1]
 
 
 def test_a_level_pass_and_one_in_air_are_not_skimmed():
     mesh = box_mesh([0, 0, -2], [10, 4, 0])
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([10.0, 4, 3.0]), 0.1)
     level = Line(np.array([[1.0, 2, 0.1], [9, 2, 0.1]]), False)
-    assert zigzag.skimmed(level, stock, ball(2.0), 0.1) == [level]
+    assert zigzag.skimmed(level, stock, ball(2.0), 0.1, 0.05) == [level]
     above = Line(np.array([[1.0, 2, 5.0], [9, 2, 3.0]]), False)
-    assert zigzag.skimmed(above, stock, ball(2.0), 0.1) == [above]
+    assert zigzag.skimmed(above, stock, ball(2.0), 0.1, 0.05) == [above]
     into = Line(np.array([[1.0, 2, 3.0], [9, 2, 1.0]]), False)
-    assert len(zigzag.skimmed(into, stock, ball(2.0), 0.1)) > 5
+    assert len(zigzag.skimmed(into, stock, ball(2.0), 0.1, 0.05)) > 5
 
 
 # -- level planes -------------------------------------------------------------------------------------------------

@@ -95,34 +95,44 @@ def _joined(runs: list[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
     return out
 
 
-def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float) -> list[Line]:
+def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float) -> list[Line]:
     """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
+
+    A descent is worked off only by going sideways: over a piece of length s each layer after the first adds what
+    ``slope`` times s allows. So a place where stock stands h above the pass is taken in n equal layers, n the least
+    with h / n <= skin and h - (n - 1) slope s <= skin; short pieces get many thin ones.
 
     line  : Line; level ones are returned alone
     stock : StockMap as it stands
     skin  : mm, the most that is taken off in a descent
+    slope : mm per mm, of the ramp down which the tool may go for any length
 
     Returns
     -------
     list of Line
-        Highest first; the pass itself is last.
+        The layers of each piece from the top down; the pass itself is last.
     """
     rise = np.ptp(line.points[:, 2])
     if rise < 1e-6:
         return [line]
     points = dense(line.points, 0.3 * tool.radius)
+    deep = _steep_stock(points, stock, tool)
+    out: list[Line] = []
+    for piece in pieces_where(Line(points, False), deep > skin, tool.radius, 4.0 * tool.radius):
+        over = float(_steep_stock(dense(piece.points, 0.3 * tool.radius), stock, tool).max())
+        run = float(np.linalg.norm(np.diff(piece.points[:, :2], axis=0), axis=1).sum())
+        layers = max(math.ceil(over / skin), 1 + math.ceil(max(over - skin, 0.0) / max(slope * run, 1e-3)))
+        out.extend(Line(piece.points + np.array([0.0, 0.0, k * over / layers]), False)
+                   for k in range(layers - 1, 0, -1))
+    return [*out, line]
+
+
+def _steep_stock(points: F64, stock: StockMap, tool: ToolBody) -> F64:
+    """(n,) float64, mm: how far stock stands above the cutter where the pass goes up or down; 0 elsewhere."""
     over = stock.overlap(points, tool, -0.3)
     if tool.corner_radius == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim
         over = np.maximum(over, stock.standing(points, tool))
-    over[~np.isfinite(over)] = 0.0
-    steep = _descends(points)
-    if not steep.any() or float(over[steep].max()) <= skin:
-        return [line]
-    out: list[Line] = []
-    for k in range(int(float(over[steep].max()) / skin), 0, -1):
-        lifted = Line(points + np.array([0.0, 0.0, k * skin]), False)
-        out.extend(pieces_where(lifted, (over > k * skin) & steep, tool.radius, 4.0 * tool.radius))
-    return [*out, line]
+    return np.where(np.isfinite(over) & _descends(points), over, 0.0)
 
 
 def _descends(points: F64) -> NDArray[np.bool_]:
