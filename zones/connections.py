@@ -216,7 +216,7 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
                 unsupported: set[int]) -> bool:
     """Whether a group of bodies leaves void below some part of its span, where no floor or rib carries it either.
 
-    unsupported : bodies that carry nothing (bars and the like)
+    unsupported : bodies that carry nothing (bars and the like); what only stands on top carries nothing either
     """
     if len(void) == 0:
         return False
@@ -226,19 +226,41 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
     if span < 1e-9:
         return True
     along = (b - a) / span
-    covered = []
+    frame = np.column_stack([along, [-along[1], along[0]]])
+    tops, unders = [], []
     for border in borders:
         if (border.a in group) != (border.b in group):
-            other = border.b if border.a in group else border.a
+            other, own = (border.b, border.na) if border.a in group else (border.a, border.nb)
             if other not in unsupported and all(other != e.at for e in ends):
-                u = v[border.nodes][:, :2] @ along
-                covered.append((float(u.min()), float(u.max())))
-    u = void[:, :2] @ along
+                rises = float(np.nan_to_num(own[:, 2]).mean()) > STEEP_NZ
+                (tops if rises else unders).append(v[border.nodes][:, :2] @ frame)
+    where = void[:, :2] @ frame
+    covered = [(float(q[:, 0].min()), float(q[:, 0].max())) for q in unders if not _beside(q, tops, where)]
+    u = where[:, 0]
     slack = SPAN_SLACK * span
     under = np.zeros(len(u), bool)
     for low, high in covered:
         under |= (u >= low - slack) & (u <= high + slack)
     return bool((~under).sum() >= max(1, 0.02 * len(u)))
+
+
+def _beside(under: F64, tops: list[F64], void: F64) -> bool:
+    """Whether what meets the underside of a body passes it at its side, as a hub does, and carries nothing.
+
+    It meets the top over the same stretch too, and the void below lies all on one side of it; a rib under the middle
+    has void on both.
+
+    under, tops : (k, 2) float64, mm, borders at the underside and at the top, along and across the span
+    void        : (n, 2) float64, mm, places with void below
+    """
+    low, high = float(under[:, 0].min()), float(under[:, 0].max())
+    shared = sum(max(min(high, float(q[:, 0].max())) - max(low, float(q[:, 0].min())), 0.0) for q in tops)
+    here = void[(void[:, 0] >= low) & (void[:, 0] <= high)]
+    if shared < 0.5 * (high - low) or len(here) == 0:
+        return False
+    order = np.argsort(under[:, 0], kind="stable")
+    left = here[:, 1] > np.interp(here[:, 0], under[order, 0], under[order, 1])
+    return bool(left.all() or not left.any())
 
 
 def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[Border], base: set[int],
