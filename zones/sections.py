@@ -7,7 +7,7 @@ A piece is *backed* where the material across it ends on an opposed surface with
 backed pieces are stretches. Two stretches that follow each other on a loop and look at each other through the
 material have an end cap between them; if they do not, they are one side that goes on (round a corner of a tray,
 behind a rib). Where another wall, a connection or an opening interrupts a side, the stretches before and after are
-bridged by a straight chord when they lie in line and the chord runs through material or past an opening.
+bridged when they lie in line and the chord between them runs through material or past an opening.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import Part
+from zones.bridges import bridge
 from zones.model import Decomposition, Wall
 from zones.pieces import FREE, MINE, OTHER, Pieces, turn_between
 from zones.slices import Slicer
 
 # Lengths are multiples of the thickness of the wall.
-# Two thicknesses from its end decide what a stretch has behind it.
+# What of the last two thicknesses before its end a stretch that ends there has behind it.
 TAIL, TAIL_SHARE = 2.0, 0.25
 # Faces that belong to no wall, such as fillets, are walked round up to this length.
 AROUND = 6.0
@@ -35,10 +36,13 @@ CURL_LENGTH, CURL_WINDOW, CURL_TURN = 1.5, 0.25, 0.25
 GROW_TURN, GROW_LENGTH = 0.1, 3.0
 # Least cosine between a chord and the sides it joins.
 IN_LINE = 0.8
-# Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged.
+# Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged, or
+# where a side stays in parts.
 HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
 NODE_ROOM = 0.01  # of its height: how far from such a height a wall may be cut to keep clear of the nodes of the mesh
 BRIDGED_SHARE = 0.25
+# Another height is worth it where it leaves this much less, as a share of the length.
+GAIN = 0.02
 # Curves shorter than this share of the longest, or than two thicknesses, are no sides.
 SIDE_SHARE, SIDE_LENGTH = 0.25, 2.0
 
@@ -76,8 +80,8 @@ def wall_sections(part: Part, decomposition: Decomposition, height: float | None
     tuple of SideCurve
         By wall, then by centroid. Open walls have two; closed ones two rings. End caps and the roundings of ends are
         left out. Without a given height a wall is cut at 0.6, 0.4, 0.7 or 0.3 of its height instead of the middle
-        where that leaves less to bridge and over a quarter of the middle section would be bridges. Points are off
-        the exact surface by at most the deviation of the mesh, chords over interruptions aside.
+        where the middle section would leave a side in parts, or be bridges for over a quarter, and another does not.
+        Points are off the exact surface by at most the deviation of the mesh, bridges over interruptions aside.
     """
     count = max((f.number for f in part.faces), default=0) + 1
     owner = np.full(count, -1)
@@ -100,9 +104,8 @@ def _best_height(slicer: Slicer, owner: np.ndarray, index: int, wall: Wall,
     if height is None and span > 0:
         heights = [slicer.clear_of_nodes(z, NODE_ROOM * span) for z in heights]
     for z in heights:
-        curves, bridged = _Section(slicer, owner, index, wall, z).sides()
-        poor = bridged if len(curves) >= 2 else 2.0 - 0.5 * len(curves)
-        if poor < best[0]:
+        curves, poor = _Section(slicer, owner, index, wall, z).sides()
+        if poor < best[0] - GAIN:
             best = (poor, curves)
         if best[0] <= BRIDGED_SHARE:
             break
@@ -111,7 +114,7 @@ def _best_height(slicer: Slicer, owner: np.ndarray, index: int, wall: Wall,
 
 @dataclass(eq=False)
 class _Chain:
-    """A side in the making: rows of pieces in walking order, BRIDGE chords marked by -1."""
+    """A side in the making: rows of pieces in walking order, bridges marked by -1."""
 
     rows: list[int]
     closed: bool = False
@@ -121,9 +124,9 @@ class _Section(Pieces):
     """One wall cut at one height, and its stretches put together."""
 
     def sides(self) -> tuple[list[SideCurve], float]:
-        """Curves, and the share of their length that bridges."""
+        """Curves, and how poor they are: see ``_poor``."""
         if not (self.kind == MINE).any():
-            return [], 0.0
+            return [], 3.0
         chains = self._joined(self.stretches())
         used = {r for c in chains for r in c.rows}
         chains = self._bridge([self._trimmed(self._grown(c, used)) for c in chains])
@@ -140,7 +143,17 @@ class _Section(Pieces):
         kept = [i for i, t in enumerate(total) if t >= least]
         kept.sort(key=lambda i: tuple(np.round(curves[i].points.mean(axis=0) / (1e-3 * self.thick))))
         share = sum(bridged[i] for i in kept) / max(sum(total[i] for i in kept), 1e-30)
-        return [curves[i] for i in kept], float(share)
+        return [curves[i] for i in kept], self._poor(total, len(kept), share)
+
+    def _poor(self, total: list[float], kept: int, bridged: float) -> float:
+        """2 or more where a side lacks, 1 to 2 where one is in parts, else the share that bridges.
+
+        total : mm, length of every curve; kept : those that count as sides; bridged : share of their length
+        """
+        if kept < 2:
+            return 3.0 - 0.5 * kept
+        parts = sum(t for t in sorted(total)[:-2] if t >= SIDE_LENGTH * self.thick)
+        return 1.0 + parts / sum(total) if parts else float(bridged)
 
     def _joined(self, stretches: list[list[int]]) -> list[_Chain]:
         """Stretches that go on round a corner or behind a junction, joined along the loop."""
@@ -185,8 +198,13 @@ class _Section(Pieces):
         tail, head = self._tail(one[::-1]), self._tail(two)
         if one is two and not gap:
             return True
-        facing = np.isin(self.hit[tail], two).sum() + np.isin(self.hit[head], one).sum()
-        return bool(facing < TAIL_SHARE * (len(tail) + len(head)))
+        # What follows may stand in the gap too: the back of a thin lip at the end of the wall.
+        behind = max(self._share(tail, gap + two), self._share(head, gap + one))
+        return behind < TAIL_SHARE
+
+    def _share(self, rows: np.ndarray, others: list[int]) -> float:
+        """How much of some pieces has others behind it; by length, since facets crowd where a side bends."""
+        return float(self.length[rows] @ np.isin(self.hit[rows], others) / max(self.length[rows].sum(), 1e-30))
 
     def _tail(self, rows: list[int]) -> np.ndarray:
         reach = np.cumsum(self.length[rows]) - self.length[rows]
@@ -235,7 +253,7 @@ class _Section(Pieces):
         return last
 
     def _bridge(self, chains: list[_Chain]) -> list[_Chain]:
-        """Stretches of one side, joined by chords over what interrupts them, nearest first."""
+        """Stretches of one side, joined by bridges over what interrupts them, nearest first."""
         pairs = []
         for i, one in enumerate(chains):
             for j, two in enumerate(chains):
@@ -277,6 +295,17 @@ class _Section(Pieces):
             return None
         return far if self._filled(p, q) else None
 
+    def _over(self, chain: _Chain, k: int) -> list[F64]:
+        """Points of the bridge at place k of a chain: the end before it, and those up to the next start."""
+        ends = [j for j, row in enumerate(chain.rows) if row < 0]
+        here = ends.index(k)
+        one = chain.rows[ends[here - 1] + 1 if here else 0:k]
+        two = chain.rows[k + 1:ends[here + 1] if here + 1 < len(ends) else len(chain.rows)]
+        two = two or chain.rows[:ends[0]]  # the last bridge of a ring leads to its start
+        before = np.vstack([self.a[one[:1]], self.b[one]])
+        after = np.vstack([self.a[two], self.b[two[-1:]]])
+        return [before[-1], *bridge(before, after, self.thick)]
+
     def _heading(self, rows: list[int]) -> F64:
         """Mean direction of the pieces nearest to an end, unit."""
         reach = np.cumsum(self.length[rows]) - self.length[rows]
@@ -307,8 +336,9 @@ class _Section(Pieces):
         face: list[int] = []
         for k, row in enumerate(chain.rows):
             if row < 0:
-                points.append(self.b[chain.rows[k - 1]])
-                face.append(BRIDGE)
+                over = self._over(chain, k)
+                points += over
+                face += [BRIDGE] * len(over)
             elif not (self.inner[row] and k > 0 and chain.rows[k - 1] == row - 1):
                 points.append(self.a[row])
                 face.append(int(self.face[row]))

@@ -11,8 +11,8 @@ from geometry.mesh import TriangleMesh
 from geometry.part import Part
 from tests.decomposition_shapes import SHAPES, box, pair, plate, ring, to_part
 from zones.decompose import decompose
-from zones.model import Decomposition
-from zones.sections import SideCurve, wall_sections
+from zones.model import Decomposition, Wall
+from zones.sections import SideCurve, _Section, wall_sections
 from zones.slices import Slicer
 
 pytest.importorskip("cadquery")
@@ -48,7 +48,18 @@ def _bored():
     return plate().union(wall).union(box(50, 2, 14, 0, 10, 3))
 
 
+def _bent_window():
+    """A wall round half a circle of 8 mm with a window in its bend, so wide that its ends do not lie in line."""
+    import cadquery as cq
+
+    wall = cq.Workplane().circle(8.8).circle(7.2).extrude(14).intersect(cq.Workplane().rect(40, 20).extrude(14)
+                                                                        .translate((0, 11, 0)))
+    wall = wall.cut(cq.Workplane().box(12, 12, 2.8).translate((0, 8, 7)))
+    return plate(80, 60).union(wall.translate((25, 5, 3))).union(box(50, 2, 14, 0, 30, 3))
+
+
 OWN = {
+    "window in a bend": _bent_window,
     "slot": _slot,
     "lens": _lens,
     "pointed": lambda: _prism([(0, 0), (1, 1), (49, 1), (50, 0), (49, -1), (1, -1)]),
@@ -78,7 +89,9 @@ def length(c: SideCurve) -> float:
 
 
 def bridges(name: str, wall: str) -> list[int]:
-    return sorted(int((c.face == 0).sum()) for c in curves(name, wall))
+    """How many bridges each side has, which may be of several segments."""
+    starts = [(c.face == 0) & (np.roll(c.face, 1) != 0) for c in curves(name, wall)]
+    return sorted(int(s.sum()) for s in starts)
 
 
 EVERYDAY = ("T", "cross", "tray with a rib", "ring with a strut", "wall with a window", "bar through a wall",
@@ -122,7 +135,7 @@ def test_lengths_are_those_of_the_sides_without_their_ends(name, wall, expected)
     ("square bar", "W1", [0, 1]), ("cross", "W1", [1, 1]), ("T", "W2", [0, 1]), ("wall with a window", "W2", [1, 1]),
     ("bar through a wall", "W3", [1, 1]), ("ring with a strut", "W1", [0, 2]), ("two walls", "W1", [0, 0]),
 ])
-def test_interruptions_become_one_chord_each(name, wall, expected) -> None:
+def test_interruptions_become_one_bridge_each(name, wall, expected) -> None:
     assert bridges(name, wall) == expected
 
 
@@ -133,6 +146,35 @@ def test_rings_are_closed_and_a_slit_opens_them() -> None:
     assert length(inner) == pytest.approx(2 * np.pi * 18, rel=1e-3)
     assert not np.allclose(outer.points[0], outer.points[-1])
     assert not any(c.closed for c in curves("slit ring"))
+
+
+def test_a_bridge_in_a_ring_goes_round_with_it() -> None:
+    for c, radius in zip(sorted(curves("ring with a strut"), key=length), (18, 20), strict=True):
+        middle = 0.5 * (c.points + np.roll(c.points, -1, axis=0))
+        assert np.abs(np.hypot(*middle.T) - radius).max() < 0.025
+
+
+def test_a_side_in_parts_is_cut_at_another_height() -> None:
+    found = curves("window in a bend")
+    assert len(found) == 2 and all((c.face > 0).all() for c in found)
+    assert sorted(length(c) for c in found) == pytest.approx(sorted([r * np.pi for r in (7.2, 8.8)]), rel=0.1)
+    assert len({c.z for c in found}) == 1 and not 8.6 < found[0].z < 11.4
+    part, decomposition = made("window in a bend")
+    assert len([c for c in wall_sections(part, decomposition, height=10.0) if c.wall == "W1"]) > 2
+
+
+def test_sides_end_where_lips_do() -> None:
+    """A wall of one face all round whose sides run on as thin lips, one longer than the other, over a hollow end."""
+    hollow = [(50, 0.05), (48.9, 0.08), (48.9, 0.6), (48.3, 0.6), (48.3, 1.12), (50, 1.15)]
+    outline = np.array([(0, 0), (50, 0), *hollow, (50, 1.2), (0, 1.2)])
+    n = len(outline)
+    v = np.vstack([np.column_stack([outline, np.full(n, z)]) for z in (0.0, 10.0)])
+    f = np.array([t for i in range(n) for j in [(i + 1) % n] for t in ((i, j, n + j), (i, n + j, n + i))])
+    mesh = TriangleMesh(v, f.astype(np.int32), np.ones(len(f), np.int32))
+    wall = Wall("W1", (1,), (1,), 1.2, 0.0, 10.0)
+    sides = _Section(Slicer(mesh), np.array([-1, 0]), 0, wall, 5.0).sides()[0]
+    assert [length(c) for c in sides] == pytest.approx([50, 50])
+    assert all(np.ptp(c.points[:, 1]) < 1e-9 for c in sides)
 
 
 def test_wavy_sides_keep_their_length_and_strips_change_nothing() -> None:
