@@ -373,8 +373,8 @@ def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, norm
 
     field = reach.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, reach.lattice_step(tool), allowance,
                            cusp)
-    played = reach.touchable(field, points, normals, lift, aim=True)[1]
-    by_cutter, by_tool, _ = reach.touchable(field, points, normals, lift, play=0.0, aim=True)
+    played = reach.touchable(field, points, normals, lift)[1]
+    by_cutter, by_tool, _ = reach.touchable(field, points, normals, lift, play=0.0)
     return {"cutter": by_cutter, "tool": by_tool, "played": played}
 
 

@@ -228,6 +228,7 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
                            margin=1.5 * settings.scallop_height)
     linker = Linker(field, stock, _motions(cut, settings))
     name, spacing, rounds = _strategy(zone, checks, field, cut, settings)
+    thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
     budget = PASS_SHARE * settings.scallop_height
     skin, slope = SKIN * field.tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
     failing = np.arange(len(points))
@@ -241,7 +242,7 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
                     line = _turned(line, settings)
                 before = len(linker.trajectories)
                 for layer in zigzag.skimmed(line, stock, field.tool, skin, slope):
-                    linker.add(layer)
+                    linker.add(layer, thin)
                 for t in linker.trajectories[before:]:
                     if t.motion is Motion.CUT:
                         residual.cut(t.points, field.tool)
@@ -281,9 +282,7 @@ def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
     if zone.form is Form.LEVEL and flat > 0:
 
         def planes(k: int, tips: F64) -> list[list[Line]]:
-            if k == 0:
-                return floor.planes(field, tips, chord)
-            return [zigzag.passes(field, tips, 0.8 * flat / 2.0 ** (k - 1), 0.5, chord, k % 2 == 1, 0.1 * flat)]
+            return floor.planes(field, tips, chord, k) if k <= floor.MOST_FINER else []
 
         return "floor", 1.6 * flat, planes
     side = zigzag.side_step(tool.corner_radius, normals, cusp)

@@ -162,7 +162,7 @@ def _known(few: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTr
     for key in sorted(fields):
         open_to = np.flatnonzero(why == "")
         normals = few.normals[open_to]
-        takes = touchable(fields[key], few.points[open_to], normals, lift, aim=True)[1]
+        takes = touchable(fields[key], few.points[open_to], normals, lift)[1]
         why[open_to[takes & able(fields[key].tool, normals)]] = "pass"
     return why
 

@@ -15,12 +15,13 @@ neck goes. Source: ALGORITHMS 1, "reach is computed, not guessed".
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt
+from scipy.ndimage import binary_dilation, distance_transform_edt, maximum_filter
 from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
@@ -36,7 +37,8 @@ FRUSTUM_SLICES = 6
 FEW = 4000  # queries below this are not worth waking a second thread for
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
 AIMED = 12  # free nodes a flat bottom is tried towards over a level place
-INSIDE = 1e-5  # mm: a flat bottom is not asked to reach nearer than this to its own rim
+BEYOND = 3.0  # lattice steps outside the flat: how far these may be
+INSIDE = 1.5e-3  # mm: a flat bottom is not asked to reach nearer than this to its own rim: lines are off by so much
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
 
 
@@ -165,6 +167,14 @@ class TipField:
         """Tip limit for a disc whose underside stands at ``height``, mm."""
         return np.asarray(height + self.allowance + self.cusp - disc.height)
 
+    def window(self, lower: F64, upper: F64, step: float) -> TipField:
+        """The same tool over the same obstacles on a lattice of another ``step``, mm, from lower to upper (2,), mm."""
+        out = copy.copy(self)
+        out.lattice = Lattice.over(np.array([lower, upper]), 0.0, step)
+        out._cut = out._height = None
+        out._off = (math.nan, None)
+        return out
+
     @property
     def grown_radius(self) -> float:
         """Radius of the cutting part with the allowance, mm."""
@@ -193,6 +203,22 @@ class TipField:
             i, _ = self.coarse.cells(np.column_stack([np.zeros_like(ys), ys]))
             self._height = np.maximum(self.cut_height, self.noncut[np.ix_(i, j)])
         return self._height
+
+    def around(self, xy: F64, z: float, reach: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Nodes within ``reach`` mm of any of xy (n, 2) mm, along x and y: free and blocked for the cutting part at z.
+
+        Returns two (ny, nx) bool.
+        """
+        lat, size = self.lattice, 2 * int(math.ceil(reach / self.lattice.step)) + 1
+        near = maximum_filter(lat.mask(xy).view(np.uint8), size).view(np.bool_)
+        if self._cut is not None:
+            free = self._cut <= z
+        else:
+            i, j = np.nonzero(near)
+            free = np.zeros_like(near)
+            free[near] = ~self.blocked_by_cutter(np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i,
+                                                                 np.full(len(i), z)]))
+        return near & free, near & ~free
 
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
@@ -264,16 +290,16 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
     """Tips (n, k, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards free nodes near by.
 
     A node that lies under the flat is free as it stands; towards farther ones the tip goes as far as the flat allows.
-    So where any place is free under the flat, less than one step of the lattice is what can be missed. The last of
-    the k goes towards the middle of those nodes, which is straight away from a straight wall.
+    So about one step of the lattice is what can be missed, at the end of a corner of the free region. The last of the k
+    goes towards the middle of those nodes, which is straight away from a straight wall: there nothing is missed.
     """
     lat = field.lattice
     out = np.repeat(np.column_stack([points[:, :2], tip_z])[:, None], AIMED + 1, axis=1)
     level = np.round(tip_z, 6)  # a plane that was turned is level but for rounding
     for z in np.unique(level):
         mine = np.flatnonzero(level == z)
-        free = field.cut_height <= z
-        i, j = np.nonzero(free & binary_dilation(~free))
+        free, blocked = field.around(points[mine, :2], float(z), flat + BEYOND * lat.step)
+        i, j = np.nonzero(free & binary_dilation(blocked))
         if not len(i):
             continue
         rim = np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i])
@@ -298,14 +324,14 @@ def _take(field: TipField, trial: F64, todo: NDArray[np.int64], cutter: NDArray[
     tips[todo[better]] = trial[better]
 
 
-def touchable(field: TipField, points: F64, normals: F64, lift: float, play: float = PLAY_STEPS,
-              aim: bool = False) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+def touchable(field: TipField, points: F64, normals: F64, lift: float,
+              play: float = PLAY_STEPS) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
     """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
 
     play : lattice steps of room to move away from a wall beside it: a channel that fits the tool like a gauge is for
            the next thinner one
-    aim  : whether a flat bottom is also tried over a level place towards free nodes of the lattice near by. That is the
-           true reach; the planner does not ask for it, because its passes over level planes stop at the lattice
+
+    A flat bottom is tried over a level place straight, off its middle, and towards free nodes of the lattice near by.
 
     Returns
     -------
@@ -334,7 +360,7 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float, play: flo
                 trial[:, :2] = points[todo, :2] + reach * side
                 _take(field, trial, todo, cutter, whole, tips)
         open_to = np.flatnonzero(level & ~whole)
-        if aim and len(open_to):
+        if len(open_to):
             for trials in _aimed(field, points[open_to], tips[open_to, 2], flat).transpose(1, 0, 2):
                 left = np.flatnonzero(~whole[open_to])
                 _take(field, np.ascontiguousarray(trials[left]), open_to[left], cutter, whole, tips)

@@ -146,7 +146,7 @@ def _reasons(few: SurfaceSamples, fields: dict[str, TipField], part: Part, tree:
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
         need[k] = {"kind": "other access"}
     open_to = np.flatnonzero(reason == "")
-    asked = [(fields[t], *touchable(fields[t], few.points[open_to], few.normals[open_to], lift, aim=True))
+    asked = [(fields[t], *touchable(fields[t], few.points[open_to], few.normals[open_to], lift))
              for t in sorted(fields, key=lambda t: (fields[t].tool.diameter, t))]
     cuts = [np.full(len(open_to), f.tool.corner_radius > 0) | _upright(few.normals[open_to]) for f, *_ in asked]
     for (_, _, by_tool, _), able in zip(asked, cuts, strict=True):

@@ -47,7 +47,7 @@ def reach(mesh, samples, body, clear=None, bounds=None):
     """by_cutter, by_tool and tips of the samples; ``bounds`` where the mesh holds more than the part."""
     field = TipField(TriangleTree(mesh), body, clear or Clearances(), mesh.bounds if bounds is None else bounds,
                      MARGIN, lattice_step(body))
-    return touchable(field, samples.points, samples.normals, LIFT, aim=True)
+    return touchable(field, samples.points, samples.normals, LIFT)
 
 
 @pytest.mark.parametrize("name", SHAPES)

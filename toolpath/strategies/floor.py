@@ -1,6 +1,12 @@
-"""Level planes: an end mill with a flat bottom follows the walls at the height of the plane, then rings inside."""
+"""Level planes: an end mill with a flat bottom follows the walls at the height of the plane, then rings inside.
+
+All moves are level. What the lines of the planning lattice miss is looked at again in small windows on finer ones:
+a corner of the free region between two walls that is narrower than a cell, and islands where rings turn sharply.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +14,14 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from toolpath.levels import Line, contours, dilated, lines_at, pieces_where, thinned
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
+EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE
+FINER = 4  # times, of the lattice of one round to that of the next
+NEAR = 2.0  # steps of the planning lattice round what is left that lines are wanted in
+MOST_FINER = 2  # rounds on finer lattices
+MOST_NODES = 250_000  # of a window, where its lattice is finer than that of the planner
 
 
 def plane_heights(tips: F64) -> list[float]:
@@ -23,32 +34,61 @@ def plane_heights(tips: F64) -> list[float]:
     return [float(np.median(group)) for group in np.split(z, cuts) if len(group)]
 
 
-def planes(field: TipField, tips: F64, tolerance: float) -> list[list[Line]]:
+def planes(field: TipField, tips: F64, tolerance: float, finer: int = 0) -> list[list[Line]]:
     """Passes over level area, plane by plane from the top.
 
     field     : TipField of a tool whose bottom is flat out to R - r
     tips      : (n, 3) float64, mm, tips that touch the samples
-    tolerance : mm, of the lines along walls
+    tolerance : mm, of the lines along walls; never more than ``EXACT``
+    finer     : 0 for lines over all the area; k for lines near what is still left, on lattices ``FINER``**k finer
 
     Returns
     -------
     list of lists of Line, one list a plane
-        Rings at most 0.8 of the flat diameter apart, and the line that touches whatever stands beside the plane.
+        Rings at most 0.8 of the flat diameter apart, half that with every k, and the line that touches whatever
+        stands beside the plane.
     """
-    lat, tool = field.lattice, field.tool
-    flat = tool.radius - tool.corner_radius
+    tool, step = field.tool, field.lattice.step
     out = []
     for z in plane_heights(tips):
         mine = tips[np.abs(tips[:, 2] - z) < 2.0 * SAME_PLANE]
-        mask = dilated(lat.mask(mine[:, :2]), max(1.5, 0.2 * tool.radius / lat.step))
-        free = field.height <= z + LEVEL_TOLERANCE
-        lines = _rings(field, z, mask & free, 0.2 * flat, 1.6 * flat)
-        active = dilated(mask, 2.0 * tool.radius / lat.step)
-        for line in contours(field, z, active, tolerance):
-            near = mask[lat.cells(line.points[:, :2])]
-            lines.extend(pieces_where(line, np.asarray(near), 0.2 * tool.radius, 2.0 * tool.radius))
-        out.append(lines)
+        if finer:
+            near = NEAR * step
+            parts = [_plane(w, z, t, min(tolerance, EXACT), 2.0**-finer, near, near)
+                     for w, t in _windows(field, mine, finer)]
+            out.append([line for lines in parts for line in lines])
+        else:
+            near = max(1.5 * step, 0.2 * tool.radius)
+            out.append(_plane(field, z, mine, min(tolerance, EXACT), 1.0, near, 2.0 * tool.radius))
     return out
+
+
+def _plane(field: TipField, z: float, tips: F64, tolerance: float, share: float, near: float,
+           join: float) -> list[Line]:
+    """Rings ``share`` times as far apart as usual over the tips at z, and what stands within ``near`` mm of them."""
+    lat, tool = field.lattice, field.tool
+    flat = tool.radius - tool.corner_radius
+    mask = dilated(lat.mask(tips[:, :2]), near / lat.step)
+    free = field.height <= z + LEVEL_TOLERANCE
+    lines = _rings(field, z, mask & free, 0.2 * flat, 1.6 * flat * share)
+    active = dilated(mask, join / lat.step)
+    for line in contours(field, z, active, tolerance):
+        wanted = mask[lat.cells(line.points[:, :2])]
+        lines.extend(pieces_where(line, np.asarray(wanted), near, join))
+    return lines
+
+
+def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField, F64]]:
+    """The field on a finer lattice round each group of tips (n, 3), mm, that lie near together."""
+    lat = field.lattice
+    cells = 3.0 * NEAR
+    labels, count = ndimage.label(dilated(lat.mask(tips[:, :2]), 0.5 * cells), np.ones((3, 3)))
+    group = labels[lat.cells(tips[:, :2])]
+    for k in range(1, count + 1):
+        mine = tips[group == k]
+        lower, upper = mine[:, :2].min(axis=0) - cells * lat.step, mine[:, :2].max(axis=0) + cells * lat.step
+        step = max(lat.step / FINER**finer, float(np.sqrt(np.prod(upper - lower) / MOST_NODES)))
+        yield field.window(lower, upper, min(step, lat.step)), mine
 
 
 def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spacing: float) -> list[Line]:
