@@ -98,29 +98,60 @@ class FreeWall(WallSpec):
         return interpolate_closed(u, points)
 
     def loop(self, v: float) -> BSpline:
-        """Both sides and both rounded ends as one closed curve, right side forward, left side back; parameter 0..4.
+        """Both sides and both rounded ends as one closed curve: right side 0..1, end, left side back, other end.
 
         v : 0 at the floor, 1 at the top
+
+        The ends have the parameter speed of the sides, and the nodes of a side come closer together towards an end:
+        a step of either would ring.
         """
-        u, half_turn = self._nodes(), np.linspace(0, np.pi, CAP_NODES + 2)[1:-1]
-        right, left = self._rail(RIGHT, v)(u), self._rail(LEFT, v)(u)
+        u, half_turn = self._side_nodes, np.linspace(0, np.pi, CAP_NODES + 2)[1:-1]
+        right, left = self._rail(RIGHT, v), self._rail(LEFT, v)
         caps = []
-        for a, b, d in ((right[-1], left[-1], right[-1] - right[-2]), (left[0], right[0], right[0] - right[1])):
-            out = d * [1, 1, 0] / np.hypot(*d[:2]) * 0.5 * np.linalg.norm(b - a)
-            caps.append(0.5 * (a + b) + 0.5 * (a - b) * np.cos(half_turn)[:, None] + out * np.sin(half_turn)[:, None])
+        for at, a, b in ((1.0, right, left), (0.0, left, right)):
+            p, q = a(at), b(at)
+            out = a.derivative()(at) * [1, 1, 0] * (1.0 if at else -1.0)
+            out *= 0.5 * np.linalg.norm(q - p) / np.hypot(*out[:2])
+            caps.append(0.5 * (p + q) + 0.5 * (p - q) * np.cos(half_turn)[:, None] + out * np.sin(half_turn)[:, None])
         share = np.arange(1, CAP_NODES + 1) / (CAP_NODES + 1)
-        t = np.concatenate([u, 1 + share, 2 + u, 3 + share, [4.0]])
-        return interpolate_closed(t, np.vstack([right, caps[0], left[::-1], caps[1], right[:1]]))
+        first, last = self._caps
+        t = np.concatenate([u, 1 + last * share, 1 + last + u, 2 + last + first * share, [2 + last + first]])
+        return interpolate_closed(t, np.vstack([right(u), caps[0], left(u[::-1]), caps[1], right(u[:1])]))
+
+    @cached_property
+    def _caps(self) -> tuple[float, float]:
+        """Parameter widths of the rounded ends at u = 0 and 1, in the speed of the sides there at half height."""
+        out = []
+        for u in (0.0, 1.0):
+            right, left = (self._rail(s, 0.5) for s in (RIGHT, LEFT))
+            speed = 0.5 * sum(float(np.hypot(*k.derivative()(u)[:2])) for k in (right, left))
+            out.append(0.5 * np.pi * float(np.linalg.norm((right(u) - left(u))[:2])) / speed)
+        return out[0], out[1]
+
+    @cached_property
+    def _side_nodes(self) -> F64:
+        """Nodes of a side of the loop: those of the rail, between them and the ends ever closer ones.
+
+        They lie the same way round on both sides, or a ruled face between two loops would not be ruled.
+        """
+        u = self._nodes()
+        step = min(self._caps) / (CAP_NODES + 1)
+        near = np.cumsum(step * 2.0 ** np.arange(12))
+        near = near[near < 0.5 * u[1]]
+        return np.unique(np.concatenate([u, near, 1.0 - near]))
 
     @cached_property
     def _loops(self) -> tuple[BSpline, BSpline]:
         return self.loop(0.0), self.loop(1.0)
 
+    def _along_loop(self, side: int, u: F64) -> F64:
+        return np.asarray(2.0 + self._caps[1] - np.asarray(u) if side == LEFT else u)
+
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface, (n, 3) mm; see WallSpec."""
         if not self.merged:
             return super().side_point(side, u, v)
-        t = 3.0 - np.asarray(u) if side == LEFT else np.asarray(u)
+        t = self._along_loop(side, u)
         lo, hi = (k(t) for k in self._loops)
         return np.asarray(lo + (hi - lo) * np.asarray(v)[..., None])
 
@@ -128,7 +159,7 @@ class FreeWall(WallSpec):
         """Partial derivatives of a side by u and by v, two (n, 3) mm; see WallSpec."""
         if not self.merged:
             return super().side_derivatives(side, u, v)
-        t, sign = (3.0 - np.asarray(u), -1.0) if side == LEFT else (np.asarray(u), 1.0)
+        t, sign = self._along_loop(side, u), -1.0 if side == LEFT else 1.0
         (lo, hi), (dlo, dhi) = (k(t) for k in self._loops), (sign * k.derivative()(t) for k in self._loops)
         return np.asarray(dlo + (dhi - dlo) * np.asarray(v)[..., None]), np.asarray(hi - lo)
 

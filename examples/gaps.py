@@ -5,16 +5,20 @@ first other wall it meets inside that wall's sides decides the channel, and the
 shortest such ray is the gap. Plan sections give the start, Newton on the ruled
 surface the exact foot. Connections are left out, as in the definition of the gap.
 A free wall may be closed and may face itself; its rays count where they meet the
-other side within 72 degrees of square (``facing_dot``).
+other side within 72 degrees of square (``facing_dot``), and tops and ends of walls stop
+them. The shortest of them may begin on a border of a side, or end on one; both are looked
+for along the borders, the latter backwards from the border point.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
 import geometry.kernels.cache  # noqa: F401  keys numba's cache before the first kernel is met
 from examples.splines import F64
@@ -30,8 +34,12 @@ FARTHEST = 40.0
 """mm; rays from and to free walls are not followed beyond."""
 ROUNDS = 40
 """Windows that the search for the shortest ray of a free wall looks through at most."""
-STARTS = 10
+STARTS = 4
 """Places on a free wall where the search for the shortest ray begins; one at each height, for it may end at a hub."""
+BORDER_PLACES = 161
+"""Places on each border of a side from which, and to which, rays are looked for first."""
+LID_SKIN = 0.01
+"""mm; tops and ends stop a ray only when that far before its end, and its own wall's that far behind its beginning."""
 SKIN = 1e-3
 """mm; a ray does not meet its own wall nearer than that."""
 
@@ -43,7 +51,7 @@ class Gap:
     walls   : places in the layout, first < second
     gap_min : least outward ray distance, mm
     at      : point on the side where the shortest ray starts, mm
-    border  : whether that point lies on the border of the side (end, floor or top)
+    border  : whether the ray begins or ends on the border of a side (end, floor or top)
     area    : mm² of side area that faces the other wall
     """
 
@@ -101,6 +109,10 @@ def _facing(
                           near, ZOOMS if exact else 0)
             if found[0] < gap:
                 gap, at, border = found
+        if exact and walls[i].sees_itself:
+            on_border = _on_borders(walls, i, side, blocked, int(j), (u[mine], v[mine]), reach[mine], low, gap, near)
+            if on_border[0] < gap:
+                gap, at, border = *on_border, True
         x, y, z = (float(c) for c in at)
         pair = (min(i, int(j)), max(i, int(j)))
         out.append(Gap(pair, gap, (x, y, z), border, float(weight[mine].sum())))
@@ -169,6 +181,112 @@ def _search(
     return gap, at, border
 
 
+def _on_borders(
+    walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, uv: tuple[F64, F64], reach: F64,
+    low: float, gap: float, near: set[int] | None,
+) -> tuple[float, F64]:
+    """Shortest ray from a side of wall i to wall j that begins on the border of the one side or ends on the other's.
+
+    uv, reach : (n,) each, where rays to j begin and how long they are; the starts for rays found backwards
+    Returns its length, inf where none is found, and its start.
+    """
+    wall, other = walls[i], walls[j]
+
+    def along(border: tuple[F64, F64]) -> tuple[F64, F64]:
+        points, seen, far = _cast(walls, i, side, *border, blocked, 1.2 * gap + 1.0, near)
+        return np.where(seen == j, far, np.inf), points
+
+    best: tuple[float, F64] = (np.inf, np.zeros(3))
+    for border in _borders(wall, low):
+        best = min(best, _least_along(border, along), key=lambda b: b[0])
+    begin = np.column_stack([wall.side_point(side, *uv), wall.side_normal(side, *uv)])
+    feet, starts = cKDTree(begin[:, :3] + reach[:, None] * begin[:, 3:]), cKDTree(begin[:, :3])
+    apart = wall.length / 100 + wall.height / 4  # no place of the side that sees j is farther from a start
+    for facing in (LEFT, RIGHT):
+        def backwards(border: tuple[F64, F64], facing: int = facing) -> tuple[F64, F64]:
+            length, every = np.full(len(border[0]), np.inf), other.side_point(facing, *border)
+            near_enough = np.flatnonzero(starts.query(every)[0] <= gap + apart)
+            if len(near_enough) == 0:
+                return length, every
+            q, back = every[near_enough], other.side_normal(facing, *border)[near_enough]
+            k = feet.query(q)[1]
+            s, u, v = _ray_through(wall, side, q, uv[0][k], uv[1][k], reach[k])
+            start, normal = wall.side_point(side, u, v), wall.side_normal(side, u, v)
+            good = np.isfinite(s) & (s > SKIN) & (v >= low) & ((normal * back).sum(axis=1) < wall.facing_dot)
+            good &= s < gap
+            rows = np.flatnonzero(good)
+            if len(rows):
+                _, seen, far = _cast(walls, i, side, u[rows], v[rows], None, 1.2 * gap + 1.0, near)
+                good[rows] = (seen == j) | (far >= s[rows] - 1e-6)
+                if blocked is not None:
+                    good[rows] &= ~blocked(start[rows], start[rows] + 0.999 * s[rows, None] * normal[rows])
+            length[near_enough] = np.where(good, s, np.inf)
+            every[near_enough] = start
+            return length, every
+
+        for border in _borders(other, low * wall.height / other.height):
+            best = min(best, _least_along(border, backwards), key=lambda b: b[0])
+    return best
+
+
+def _borders(wall: WallSpec, low: float) -> list[Callable[[F64], tuple[F64, F64]]]:
+    """Foot, top and ends of a side, as curves of a parameter 0..1 in (u, v)."""
+    out: list[Callable[[F64], tuple[F64, F64]]] = [
+        lambda t: (t, np.full(len(t), low)), lambda t: (t, np.ones(len(t)))]
+    if not wall.closed:
+        out += [lambda t: (np.zeros(len(t)), low + (1 - low) * t), lambda t: (np.ones(len(t)), low + (1 - low) * t)]
+    return out
+
+
+def _least_along(border: Callable[[F64], tuple[F64, F64]],
+                 rays: Callable[[tuple[F64, F64]], tuple[F64, F64]]) -> tuple[float, F64]:
+    """Least length along a border, looked at ever closer round the best few places: the length and its start."""
+    t, pitch = np.linspace(0.0, 1.0, BORDER_PLACES), 1.0 / (BORDER_PLACES - 1)
+    best: tuple[float, F64] = (np.inf, np.zeros(3))
+    for _ in range(6):
+        length, start = rays(border(t))
+        order = np.argsort(length, kind="stable")
+        order = order[np.isfinite(length[order])][:4]
+        if len(order) == 0:
+            break
+        if length[order[0]] < best[0]:
+            best = float(length[order[0]]), start[order[0]]
+        t = np.unique(np.clip(t[order, None] + pitch * np.linspace(-1.0, 1.0, 17), 0.0, 1.0))
+        pitch /= 8.0
+    return best
+
+
+def _ray_through(wall: WallSpec, side: int, q: F64, u: F64, v: F64, s: F64) -> tuple[F64, F64, F64]:
+    """Rays from a side that go through points q (n, 3), by Newton from (u, v, s): length (inf: none), u and v."""
+    h = 1e-6
+    u, v, s = u.copy(), v.copy(), s.copy()
+
+    def end(u: F64, v: F64) -> F64:
+        uc, vc = (np.mod(u, 1.0) if wall.closed else np.clip(u, 0.0, 1.0)), np.clip(v, 0.0, 1.0)
+        du, dv = wall.side_derivatives(side, uc, vc)
+        off = np.zeros_like(u) if wall.closed else u - uc
+        return np.asarray(wall.side_point(side, uc, vc) + du * off[:, None] + dv * (v - vc)[:, None]
+                          + s[:, None] * wall.side_normal(side, uc, vc))
+
+    for _ in range(15):
+        uc, vc = (np.mod(u, 1.0) if wall.closed else np.clip(u, h, 1.0 - h)), np.clip(v, h, 1.0 - h)
+        du = (end(uc + h, vc) - end(uc - h, vc)) / (2 * h)
+        dv = (end(uc, vc + h) - end(uc, vc - h)) / (2 * h)
+        jacobian = np.stack([du, dv, wall.side_normal(side, uc, vc)], axis=-1)
+        r = q - end(u, v)
+        bad = np.abs(np.linalg.det(jacobian)) < 1e-12
+        jacobian[bad] = np.eye(3)
+        step = np.linalg.solve(jacobian, r[..., None])[..., 0]
+        step = np.nan_to_num(np.clip(step, [-0.1, -0.3, -np.inf], [0.1, 0.3, np.inf]))
+        u, v, s = u + step[:, 0], v + step[:, 1], s + step[:, 2]
+        if float(np.abs(step).max()) < 1e-11:
+            break
+    missed = (np.linalg.norm(q - end(u, v), axis=1) > 1e-6) | (v < -1e-9) | (v > 1.0 + 1e-9)
+    missed |= ~np.isfinite(u) if wall.closed else (u < -1e-9) | (u > 1.0 + 1e-9)
+    u = np.mod(u, 1.0) if wall.closed else np.clip(u, 0.0, 1.0)
+    return np.where(missed, np.inf, s), u, np.clip(v, 0.0, 1.0)
+
+
 def _on_border(wall: WallSpec, u: float, v: float, low: float) -> bool:
     return bool(v <= low or v >= 1.0 or (not wall.closed and (u <= 0.0 or u >= 1.0)))
 
@@ -193,9 +311,65 @@ def _cast(
     first = np.argmin(distance, axis=0)
     reach = distance[first, np.arange(len(u))]
     hit = np.flatnonzero(np.isfinite(reach))
+    for k, wall in enumerate(walls) if walls[i].sees_itself else ():
+        if len(hit) and (among is None or k in among or _apart(origin[hit], wall) <= farthest):
+            lid = _lid(wall)
+            least = LID_SKIN if k == i else 1e-9
+            met = _first_triangle(origin[hit], normal[hit], lid, least, reach[hit] - LID_SKIN)
+            reach[hit[met]] = np.inf
+            hit = hit[~met]
     if blocked is not None and len(hit):
         reach[hit[blocked(origin[hit], origin[hit] + normal[hit] * reach[hit, None])]] = np.inf
     return origin, first, reach
+
+
+@lru_cache(maxsize=256)
+def _lid(wall: WallSpec) -> F64:
+    """(m, 3, 3) float64, mm: triangles over the top and the ends of a wall; rays do not go through these."""
+    u = np.linspace(0.0, 1.0, wall.segments + 1)
+    left, right = (wall.side_point(s, u, np.ones(len(u))) for s in (LEFT, RIGHT))
+    strips = [(left[:-1], right[:-1], left[1:]), (right[:-1], right[1:], left[1:])]
+    if not wall.closed:
+        for at in (0.0, 1.0):
+            e, v = np.full(9, at), np.linspace(0.0, 1.0, 9)
+            a, b = wall.side_point(LEFT, e, v), wall.side_point(RIGHT, e, v)
+            strips += [(a[:-1], b[:-1], a[1:]), (b[:-1], b[1:], a[1:])]
+    return np.ascontiguousarray(np.concatenate([np.stack(s, axis=1) for s in strips]))
+
+
+@njit(cache=True, nogil=True)
+def _first_triangle(p: F64, d: F64, triangles: F64, least: float, most: F64) -> np.ndarray:
+    """(n,) bool: whether rays (n, 3) meet a triangle (m, 3, 3) farther than ``least`` and nearer than ``most``, mm."""
+    out = np.zeros(len(p), np.bool_)
+    low, high = np.empty(len(triangles)), np.empty(len(triangles))
+    for k in range(len(triangles)):
+        low[k], high[k] = triangles[k, :, 2].min(), triangles[k, :, 2].max()
+    for i in range(len(p)):
+        z0, z1 = p[i, 2], p[i, 2] + most[i] * d[i, 2]
+        z0, z1 = min(z0, z1) - 1e-9, max(z0, z1) + 1e-9
+        for k in range(len(triangles)):
+            if low[k] > z1 or high[k] < z0:
+                continue
+            a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+            e1x, e1y, e1z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+            e2x, e2y, e2z = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+            hx, hy, hz = d[i, 1] * e2z - d[i, 2] * e2y, d[i, 2] * e2x - d[i, 0] * e2z, d[i, 0] * e2y - d[i, 1] * e2x
+            det = e1x * hx + e1y * hy + e1z * hz
+            if abs(det) < 1e-14:
+                continue
+            wx, wy, wz = p[i, 0] - a[0], p[i, 1] - a[1], p[i, 2] - a[2]
+            f = (wx * hx + wy * hy + wz * hz) / det
+            if f < 0.0 or f > 1.0:
+                continue
+            qx, qy, qz = wy * e1z - wz * e1y, wz * e1x - wx * e1z, wx * e1y - wy * e1x
+            g = (d[i, 0] * qx + d[i, 1] * qy + d[i, 2] * qz) / det
+            if g < 0.0 or f + g > 1.0:
+                continue
+            s = (e2x * qx + e2y * qy + e2z * qz) / det
+            if least < s < most[i]:
+                out[i] = True
+                break
+    return out
 
 
 def _apart(origin: F64, wall: WallSpec) -> float:

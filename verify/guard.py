@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64, I32, TriangleMesh
+from geometry.nearest import nearest
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples, sample_surface
-from verify.kernels.nearest import nearest_distances
 
 GUARD_DENSITY = 25.0
 GUARD_MOST = 1_000_000
@@ -88,6 +88,5 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F
     stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
     share = np.arange(1, DEPTH_STEPS + 1) / DEPTH_STEPS
     where = points[:, None, :] - (stretch[:, None] * share)[:, :, None] * normals[:, None, :]
-    out, t = np.empty(n * DEPTH_STEPS), tree.arrays
-    nearest_distances(t.lower, t.upper, t.child, t.first, t.size, t.corners, where.reshape(-1, 3), out)
+    out, _, _ = nearest(tree, where.reshape(-1, 3))
     return np.minimum(out.reshape(n, DEPTH_STEPS).max(axis=1), along)

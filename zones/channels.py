@@ -3,21 +3,30 @@
 From samples of every side a ray leaves along the outward normal; connections, fillets and slivers are left out of
 the mesh it meets. The first hit decides what the side faces. A pair of walls (or one wall with itself) has a
 channel when the side area that faces the other adds up to ``FACING_SHARE`` of half the smaller one's side area.
-The shortest ray is then refined on the triangles around it. Rays start and end on the exact surface with its normal
-there, as patches through the mesh nodes give it (``zones.smooth``): facets alone are half a facet wrong at borders.
+The shortest ray is then refined on the triangles around it, and along the borders of both sides (``zones.borders``).
+Rays start and end on the exact surface with its normal there, as patches through the mesh nodes give it
+(``zones.smooth``): facets alone are half a facet wrong at borders.
+
+A ray from a wall to itself does not count where start and foot lie on one piece of the side within a ball as wide as
+the wall is thick: that is a notch or a corner of the side.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.nearest import nearest
 from geometry.sampling import sample_surface
+from zones.borders import Border, Places, neighbours, side_triangles
 from zones.facegraph import FaceGraph, cast
 from zones.footprints import cap_footprints
+from zones.kernels.nearby import one_piece
 from zones.smooth import SmoothFaces
 
 FACING_DOT = -0.3
@@ -28,9 +37,12 @@ SAMPLES_PER_WALL = 3000
 STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 12, 0.4, 0.5
 # Triangles are looked up once within this multiple of the first radius.
 AROUND = 4.0
-NEAREST, RIM_SAMPLES, TRIANGLES = 200, 600, 300
+NEAREST, TRIANGLES = 200, 300
 # Points stay these shares of a triangle away from its corners and edges, so that rays do not leave through a border.
 INSETS = (1e-3, 1e-5)
+# The foot of a perpendicular lies inside a side where what is left along the side, after so many corrections, is this
+# share of the way, at most.
+ASKEW, FOOT_TURNS = 2e-3, 5
 ALONG_RIM = np.array([-1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0])
 
 
@@ -78,29 +90,74 @@ def find_facings(graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray
     return field.facings()
 
 
+class _Side:
+    """The side triangles of one wall and what is looked up on them.
+
+    mesh      : TriangleMesh
+    triangles : (k,) int, its side triangles, ascending
+    around    : (n,) int, all triangles of the faces that hold them, ascending
+    """
+
+    def __init__(self, mesh: TriangleMesh, triangles: np.ndarray, around: np.ndarray) -> None:
+        self.mesh, self.triangles, self.around = mesh, triangles, around
+        self.area = float(mesh.areas[triangles].sum())
+        self.border = Border.of(mesh, triangles)
+        self.rim = np.unique(self.border.nodes)
+
+    @cached_property
+    def corners(self) -> F64:
+        """(k, 3, 3) float64, mm."""
+        return np.ascontiguousarray(self.mesh.triangles[self.triangles])
+
+    @cached_property
+    def low(self) -> F64:
+        """(k, 3) float64, mm: lower corners of the boxes of the triangles."""
+        return np.asarray(self.corners.min(axis=1))
+
+    @cached_property
+    def high(self) -> F64:
+        """(k, 3) float64, mm: their upper corners."""
+        return np.asarray(self.corners.max(axis=1))
+
+    @cached_property
+    def tree(self) -> TriangleTree:
+        """Hierarchy over the side triangles alone."""
+        faces = self.mesh.faces[self.triangles]
+        return TriangleTree(TriangleMesh(self.mesh.vertices, faces, self.mesh.face_ids[self.triangles]))
+
+    @cached_property
+    def patch(self) -> tuple[np.ndarray, F64]:
+        """(n, 3) int64 neighbours of ``around`` across the edges, -1 where there is none, and (n, 3, 3) corners."""
+        return neighbours(self.mesh.faces[self.around]), np.ascontiguousarray(self.mesh.triangles[self.around])
+
+
 class _Field:
     """The mesh without what rays pass through, and the sides of the walls on it."""
 
     def __init__(self, graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> None:
         keep = ~left_out[graph.face_of]
         full, uv = graph.mesh, graph.part.uv
-        owner = np.full(graph.n + 1, -1)
+        owner = np.full(len(full.faces), -1)
+        is_side = np.zeros(graph.n, bool)
         for wall, faces in enumerate(sides):
-            owner[faces] = wall
-        caps = cap_footprints(graph, left_out, owner[:-1] >= 0)
+            owner[side_triangles(graph, faces)] = wall
+            is_side[faces] = True
+        caps = cap_footprints(graph, left_out, is_side)
         self.mesh = _with_triangles(TriangleMesh(full.vertices, full.faces[keep], full.face_ids[keep]), caps,
                                     graph.n + 1)
+        self.owner = np.concatenate([owner[keep], np.full(len(caps), -1)])
         self.tree = TriangleTree(self.mesh)
         self.skin = graph.skin
-        self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
         self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
                                   max(graph.part.chord, graph.part.deviation))
-        self.on_rim = np.zeros(len(self.mesh.vertices), bool)
-        for faces in sides:
-            self.on_rim[_rim_nodes(graph, faces)] = True
-        self.side_area = np.array([graph.area[f].sum() for f in sides])
         self.count = len(sides)
-        self.patches: dict[int, tuple[np.ndarray, F64, F64]] = {}
+        face = self.mesh.face_ids.astype(np.int64) - 1
+        self.walls = [_Side(self.mesh, np.flatnonzero(self.owner == k), np.flatnonzero(np.isin(face, f)))
+                      for k, f in enumerate(sides)]
+        self.on_rim = np.zeros(len(self.mesh.vertices), bool)
+        for mine in self.walls:
+            self.on_rim[mine.rim] = True
+        self.thickness = [float(np.median(graph.inward[np.isin(graph.face, f)])) for f in sides]
 
     def look(self, points: F64, triangles: np.ndarray) -> tuple[F64, np.ndarray, F64]:
         """Outward rays from points of sides on the triangles they lie on.
@@ -115,7 +172,7 @@ class _Field:
         met = points[rows] + distance[rows, None] * normal[rows]
         foot, back = self.smooth.at(met, hit[rows])
         dot = np.einsum("ij,ij->i", back, normal[rows])
-        facing = dot < FACING_DOT
+        facing = (dot < FACING_DOT) & ~self._local(start[rows], triangles[rows], met, hit[rows])
         rows, dot, back = rows[facing], dot[facing], back[facing]
         # The planes that touch the exact surface at both ends, instead of the facets.
         off = (foot - met)[facing] - (start - points)[rows]
@@ -126,58 +183,125 @@ class _Field:
         feet[rows] = start[rows] + length[rows, None] * normal[rows]
         return length, wall, feet
 
-    def starts(self, wall: int, area: float) -> tuple[F64, np.ndarray, F64]:
-        """Points to look from: evenly spread samples, and points just inside the borders of the sides.
+    def _local(self, points: F64, triangles: np.ndarray, feet: F64, hit: np.ndarray) -> np.ndarray:
+        """Whether rays between two places of one wall only cross a notch or a corner of its side, (k,) bool."""
+        out = np.zeros(len(points), bool)
+        wall = self.owner[triangles]
+        near = np.linalg.norm(feet - points, axis=1)
+        for w in np.unique(wall[wall == self.owner[hit]]).tolist():
+            rows = np.flatnonzero((wall == w) & (self.owner[hit] == w) & (near <= self.thickness[w]))
+            if len(rows):
+                side, found = self.walls[w], np.zeros(len(rows), bool)
+                one_piece(*side.patch, np.searchsorted(side.around, triangles[rows]),
+                          np.searchsorted(side.around, hit[rows]), points[rows], self.thickness[w], found)
+                out[rows] = found
+        return out
 
-        Returns (n, 3) points, (n,) triangles and (n,) mm² each stands for, zero on the borders.
+    def to_border(self, wall: int, other: int, most: float) -> Callable[[F64, np.ndarray], tuple[F64, F64, F64]]:
+        """The rays from a wall that meet given points of the border of another one, found backwards.
+
+        most : mm; longer ones are not looked for
         """
-        triangles = np.flatnonzero(self.owner == wall)
-        s = sample_surface(self.mesh, SAMPLES_PER_WALL / area, seed=29, triangles=triangles)
-        rim = triangles[self.on_rim[self.mesh.faces[triangles]].any(axis=1)]
-        rim = rim[_regular(len(rim), RIM_SAMPLES)]
-        t = self.mesh.triangles[rim]
-        corners = (t + INSETS[0] * (t.mean(axis=1, keepdims=True) - t)).reshape(-1, 3)
-        points, owner = np.concatenate([s.points, corners]), np.concatenate([s.triangle, np.repeat(rim, 3)])
-        return points, owner, np.concatenate([s.area, np.zeros(len(corners))])
+        side = self.walls[wall]
+
+        def rays(points: F64, triangles: np.ndarray) -> tuple[F64, F64, F64]:
+            length, start, foot = np.full(len(points), np.inf), points.copy(), points.copy()
+            _, at, near = nearest(side.tree, points, most)
+            rows = np.flatnonzero(at >= 0)
+            foot[rows], back = self.smooth.at(points[rows], triangles[rows])
+            place, here = at[rows], near[rows]
+            for turn in range(FOOT_TURNS):
+                start[rows], normal = self.smooth.at(here, side.triangles[place])
+                way = foot[rows] - start[rows]
+                s = np.einsum("ij,ij->i", way, normal)
+                along = way - s[:, None] * normal
+                if turn < FOOT_TURNS - 1:
+                    # the foot on the facets is where the facet is square to the way, not the surface
+                    _, place, here = nearest(side.tree, start[rows] + along)
+            place = side.triangles[place]
+            good = (s > self.skin) & (np.linalg.norm(along, axis=1) <= ASKEW * s)
+            good &= np.einsum("ij,ij->i", normal, back) < FACING_DOT
+            good[good] &= ~self._local(start[rows[good]], place[good], foot[rows[good]], triangles[rows[good]])
+            clear, _ = cast(self.tree, start[rows[good]], normal[good], self.skin)
+            good[good] &= clear >= 0.95 * s[good] - self.smooth.tolerance
+            length[rows[good]] = s[good]
+            return length, start, foot
+
+        return rays
+
+    def from_border(self, other: int) -> Callable[[F64, np.ndarray], tuple[F64, F64, F64]]:
+        """The rays from points beside a border that meet a wall."""
+        def rays(points: F64, triangles: np.ndarray) -> tuple[F64, F64, F64]:
+            distance, met, feet = self.look(points, triangles)
+            return np.where(met == other, distance, np.inf), points, feet
+
+        return rays
 
     def facings(self) -> list[Facing]:
+        """Pairs of walls that see each other, in order of the pair."""
         area: dict[tuple[int, int], float] = {}
         best: dict[tuple[int, int], list[Start]] = {}
-        for wall in range(self.count):
-            if self.side_area[wall] <= 0:
+        rim: dict[int, tuple[Places, F64, np.ndarray]] = {}
+        for wall, side in enumerate(self.walls):
+            if side.area <= 0:
                 continue
-            points, triangle, weight = self.starts(wall, self.side_area[wall])
+            s = sample_surface(self.mesh, SAMPLES_PER_WALL / side.area, seed=29, triangles=side.triangles)
+            at = side.border.places()
+            points = np.concatenate([s.points, side.border.points(at, INSETS[0])])
+            triangle = np.concatenate([s.triangle, side.border.triangle[at.piece]])
             distance, met, _ = self.look(points, triangle)
+            inner = len(s.points)
+            rim[wall] = at, distance[inner:], met[inner:]
             for other in np.unique(met[met >= 0]).tolist():
                 rows = np.flatnonzero(met == other)
                 pair = (min(wall, other), max(wall, other))
-                area[pair] = area.get(pair, 0.0) + float(weight[rows].sum())
+                area[pair] = area.get(pair, 0.0) + float(s.area[rows[rows < inner]].sum())
                 near = rows[np.argsort(distance[rows], kind="stable")][:NEAREST]
                 best.setdefault(pair, []).extend(
                     Start(float(distance[i]), wall, other, int(triangle[i]), points[i]) for i in near)
         out = []
         for pair in sorted(area):
-            if area[pair] >= FACING_SHARE * 0.5 * min(self.side_area[pair[0]], self.side_area[pair[1]]):
-                gap, at = self._refine(pair, sorted(best[pair], key=lambda f: f.distance))
-                out.append(Facing(pair, gap, at, area[pair]))
+            if area[pair] >= FACING_SHARE * 0.5 * min(self.walls[pair[0]].area, self.walls[pair[1]].area):
+                gap, at_first = self._least(pair, sorted(best[pair], key=lambda f: f.distance), rim)
+                out.append(Facing(pair, gap, at_first, area[pair]))
         return out
 
-    def _refine(self, pair: tuple[int, int], found: list[Start]) -> tuple[float, tuple[float, float, float]]:
-        """Least ray length near the best samples, and the point on the first wall there."""
+    def _least(self, pair: tuple[int, int], found: list[Start],
+               rim: dict[int, tuple[Places, F64, np.ndarray]]) -> tuple[float, tuple[float, float, float]]:
+        """Least ray length of a pair, inside and along the borders, and the point on the first wall there."""
+        gap, point, foot, wall = self._refine(found)
+        for a, b in dict.fromkeys((pair, pair[::-1])):
+            for from_a in (True, False):
+                # rays from the border of a to b, and rays from b that meet the border of a
+                border = self.walls[a].border
+                if from_a and a in rim:
+                    at, length, met = rim[a]
+                    rays, length, inset = self.from_border(b), np.where(met == b, length, np.inf), INSETS[1]
+                else:
+                    at, rays, inset = border.places(), self.to_border(b, a, gap), 0.0
+                    length, _, _ = rays(border.points(at, inset), border.triangle[at.piece])
+                better = border.least(rays, at, length, inset)
+                if better is not None and better[0] < gap:
+                    gap, point, foot = better
+                    wall = a if from_a else b
+        x, y, z = (float(c) for c in (point if wall == pair[0] else foot))
+        return gap, (x, y, z)
+
+    def _refine(self, found: list[Start]) -> tuple[float, F64, F64, int]:
+        """Least ray length near the best samples, its start and foot, and the wall it leaves."""
         chosen: list[Start] = []
-        result: tuple[float, F64, F64, int] = (np.inf, np.zeros(3), np.zeros(3), pair[0])
+        result: tuple[float, F64, F64, int] = (np.inf, np.zeros(3), np.zeros(3), found[0].wall)
         for start in found:
             if len(chosen) >= STARTS or start.distance > 1.2 * found[0].distance:
                 break
-            pitch = float(np.sqrt(self.side_area[start.wall] / SAMPLES_PER_WALL))
+            pitch = float(np.sqrt(self.walls[start.wall].area / SAMPLES_PER_WALL))
             if any(start.near(c, 4.0 * pitch) for c in chosen):
                 continue
             chosen.append(start)
             distance, point, foot = self._descend(start, 3.0 * pitch)
             if distance < result[0]:
                 result = (distance, point, foot, start.wall)
-        x, y, z = (float(c) for c in (result[1] if result[3] == pair[0] else result[2]))
-        return float(result[0]), (x, y, z)
+        return result
 
     def _descend(self, start: Start, radius: float) -> tuple[float, F64, F64]:
         """Search ever smaller neighbourhoods of a start on the sides of its wall: least length, point, foot."""
@@ -208,11 +332,8 @@ class _Field:
 
     def _side_near(self, start: Start, centre: F64, reach: float) -> tuple[np.ndarray, F64, F64]:
         """Triangles of the sides of a wall within a box, on the side of the start, and their own boxes."""
-        if start.wall not in self.patches:
-            side = np.flatnonzero(self.owner == start.wall)
-            t = self.mesh.triangles[side]
-            self.patches[start.wall] = (side, t.min(axis=1), t.max(axis=1))
-        side, low, high = self.patches[start.wall]
+        mine = self.walls[start.wall]
+        side, low, high = mine.triangles, mine.low, mine.high
         rows = np.arange(len(side))
         for k in range(3):
             rows = rows[(low[rows, k] <= centre[k] + reach) & (high[rows, k] >= centre[k] - reach)]
@@ -230,12 +351,6 @@ def _with_triangles(mesh: TriangleMesh, more: F64, number: int) -> TriangleMesh:
     corner = np.arange(3 * len(more), dtype=np.int32).reshape(-1, 3) + np.int32(len(mesh.vertices))
     return TriangleMesh(np.concatenate([mesh.vertices, more.reshape(-1, 3)]), np.concatenate([mesh.faces, corner]),
                         np.concatenate([mesh.face_ids, np.full(len(more), number, mesh.face_ids.dtype)]))
-
-
-def _rim_nodes(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
-    """Mesh vertices on the B-rep edges of faces."""
-    nodes = [k.nodes for f in faces for k in graph.at[int(f)]]
-    return np.unique(np.concatenate(nodes)) if nodes else np.zeros(0, np.int64)
 
 
 def _points_near(mesh: TriangleMesh, triangles: np.ndarray, on_rim: np.ndarray, centre: F64, radius: float,

@@ -227,7 +227,8 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
         return True
     along = (b - a) / span
     frame = np.column_stack([along, [-along[1], along[0]]])
-    tops, unders = [], []
+    tops: list[F64] = []
+    unders: list[F64] = []
     for border in borders:
         if (border.a in group) != (border.b in group):
             other, own = (border.b, border.na) if border.a in group else (border.a, border.nb)

@@ -16,7 +16,7 @@ import pytest
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeKind
-from zones.channels import find_facings
+from zones.channels import Facing, find_facings
 from zones.facegraph import Link
 from zones.smooth import SmoothFaces
 
@@ -103,15 +103,21 @@ def mesh_of(surfaces: list[tuple[Surface, float]], columns: int, rows: int) -> t
     return mesh, np.concatenate(uv), links
 
 
-def found_gap(surfaces: list[tuple[Surface, float]], sides: list[list[int]], columns: int, rows: int) -> float:
-    """Gap of the one channel that the program finds."""
+def found(surfaces: list[tuple[Surface, float]], sides: list[list[int]], columns: int, rows: int) -> list[Facing]:
+    """Channels that the program finds between sides of walls 1 mm thick."""
     mesh, uv, links = mesh_of(surfaces, columns, rows)
     face_of = mesh.face_ids.astype(np.int64) - 1
     graph: Any = SimpleNamespace(
         mesh=mesh, face_of=face_of, n=len(surfaces), at=links, links=[], skin=1e-6 * 50.0,
+        face=np.arange(len(surfaces)), back=np.full(len(surfaces), -1), inward=np.ones(len(surfaces)),
         fillet=np.zeros(len(surfaces), bool), sliver=np.zeros(len(surfaces), bool),
         area=np.bincount(face_of, weights=mesh.areas), part=SimpleNamespace(uv=uv, chord=0.02, deviation=0.02))
-    channels = find_facings(graph, [np.array(s) for s in sides], np.zeros(len(surfaces), bool))
+    return find_facings(graph, [np.array(s) for s in sides], np.zeros(len(surfaces), bool))
+
+
+def found_gap(surfaces: list[tuple[Surface, float]], sides: list[list[int]], columns: int, rows: int) -> float:
+    """Gap of the one channel that the program finds."""
+    channels = found(surfaces, sides, columns, rows)
     assert len(channels) == 1
     return channels[0].gap_min
 
@@ -145,6 +151,32 @@ def test_gap_of_an_oval_ring_facing_itself(a: float, b: float, lean: float, rows
     side = (oval(a, b, lean), -1.0)
     true = dense_gap(side, side, 0.5)
     assert found_gap([side], [[0]], 64, rows) == pytest.approx(true, rel=4e-4)
+
+
+@pytest.mark.parametrize("rows", [1, 5])
+@pytest.mark.parametrize("lean", [0.0, 0.4, -0.3])
+def test_the_shortest_ray_that_ends_on_a_border(lean: float, rows: int) -> None:
+    """From a round side of radius R about c the ray to q is |q - c| - R long; the other wall begins at x = 26."""
+    def barrel(u: F64, v: F64) -> F64:
+        return np.column_stack([40 * u, np.sqrt(900 - (40 * u - 20) ** 2) - 30, HEIGHT * v])
+
+    def straight(u: F64, v: F64) -> F64:
+        return np.column_stack([26 + 14 * u, 2 + 1.4 * u + lean * v, HEIGHT * v])
+
+    edge = 2.0 + min(lean, 0.0)
+    true = np.hypot(26 - 20, edge + 30) - 30
+    assert found_gap([(barrel, -1.0), (straight, 1.0)], [[0], [1]], 60, rows) == pytest.approx(true, rel=4e-4)
+
+
+def test_a_notch_in_a_side_is_no_channel() -> None:
+    def notched(depth: float, width: float) -> Surface:
+        def at(u: F64, v: F64) -> F64:
+            return np.column_stack([8 * u, -depth * np.exp(-(8 * u - 4) ** 2 / width ** 2), HEIGHT * v])
+        return at
+
+    assert found([(notched(0.6, 0.15), -1.0)], [[0]], 240, 1) == []
+    # deeper than the wall is thick it is a slot between two stretches of it
+    assert len(found([(notched(3.0, 0.6), -1.0)], [[0]], 240, 1)) == 1
 
 
 @pytest.mark.parametrize("k", [0.0, 0.05, 0.2])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
+from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
 from tests.pocket_case import TOOL, block
 from verify.guard import convex_edges, gouge_depths
 from verify.kernels.heights import lowest, overlap
-from verify.kernels.nearest import triangle2
 from verify.model import ProofSetup, StockKind
 from verify.removal import Moves
 from verify.stock import blank, descents, end_radii, run_stock, stock_on_normals

@@ -1,4 +1,4 @@
-"""Distance from points to a mesh over its triangle hierarchy (exact, closed form per triangle)."""
+"""Nearest triangle of a mesh and its distance, over the triangle hierarchy (exact, closed form per triangle)."""
 
 from __future__ import annotations
 
@@ -36,6 +36,29 @@ def triangle2(px, py, pz, t):
 
 
 @njit(cache=True, nogil=True)
+def foot(px, py, pz, t):
+    """The point of a triangle (3, 3) that ``triangle2`` measures to."""
+    p = np.array([px, py, pz])
+    u, v = t[1] - t[0], t[2] - t[0]
+    uu, uv, vv, w = np.dot(u, u), np.dot(u, v), np.dot(v, v), p - t[0]
+    wu, wv, det = np.dot(w, u), np.dot(w, v), uu * vv - uv * uv
+    if det > 0.0:
+        f, g = (wu * vv - wv * uv) / det, (wv * uu - wu * uv) / det
+        if f >= 0.0 and g >= 0.0 and f + g <= 1.0:
+            return t[0] + f * u + g * v
+    best, out = np.inf, t[0].copy()
+    for k in range(3):
+        a, e = t[k], t[(k + 1) % 3] - t[k]
+        length2 = np.dot(e, e)
+        s = min(max(np.dot(p - a, e) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+        q = a + s * e
+        d2 = np.dot(p - q, p - q)
+        if d2 < best:
+            best, out = d2, q
+    return out
+
+
+@njit(cache=True, nogil=True)
 def _box2(lower, upper, px, py, pz):
     x = max(lower[0] - px, 0.0, px - upper[0])
     y = max(lower[1] - py, 0.0, py - upper[1])
@@ -44,12 +67,15 @@ def _box2(lower, upper, px, py, pz):
 
 
 @njit(cache=True, nogil=True)
-def nearest_distances(lower, upper, child, first, size, corners, points, out):
-    """out[i] = distance in mm from points[i] to the mesh; inf for an empty mesh."""
+def nearest_triangles(lower, upper, child, first, size, corners, points, most, out, row, feet):
+    """out[i] = distance in mm from points[i] to the mesh, row[i] the row of the nearest triangle, feet[i] the place.
+
+    most : mm, nothing farther is looked for: inf and -1 then, as for an empty mesh
+    """
     stack = np.empty(128, np.int64)
     for i in range(len(points)):
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        best = np.inf
+        best, found = most * most, -1
         stack[0], depth = 0, 1
         while depth > 0:
             depth -= 1
@@ -59,9 +85,14 @@ def nearest_distances(lower, upper, child, first, size, corners, points, out):
             c = child[node]
             if c < 0:
                 for k in range(first[node], first[node] + size[node]):
-                    best = min(best, triangle2(px, py, pz, corners[k]))
+                    d2 = triangle2(px, py, pz, corners[k])
+                    if d2 < best:
+                        best, found = d2, k
                 continue
             left_near = _box2(lower[c], upper[c], px, py, pz) <= _box2(lower[c + 1], upper[c + 1], px, py, pz)
             stack[depth], stack[depth + 1] = (c + 1, c) if left_near else (c, c + 1)
             depth += 2
-        out[i] = math.sqrt(best)
+        out[i] = math.sqrt(best) if found >= 0 else np.inf
+        row[i] = found
+        if found >= 0:
+            feet[i] = foot(px, py, pz, corners[found])

@@ -1,0 +1,143 @@
+"""Where the sides of walls end: triangles that are no side, borders of sides, and shortest rays on them.
+
+A channel's shortest ray often begins on a border of a side or meets one. There it is looked for along the border, in
+one dimension. A ray that meets a border point q begins at the foot of the perpendicular from q on the other side, so
+these rays are found backwards, from the nearest point of that side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64, TriangleMesh
+from zones.facegraph import FaceGraph, cast
+
+# A face round a wall: over this share of it the material behind ends on the face itself.
+WRAPS = 0.25
+# There a triangle is a side where the material behind is no thicker than this many times the wall and ends square.
+THICKER, BACK_DOT = 2.0, -0.8
+# Points a border is looked at first, at most; the best so many are looked at closer, so often, so much each time.
+MOST, CLOSER, TIMES, FINER = 3000, 6, 5, 8
+
+
+def side_triangles(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
+    """Which triangles are the sides of a wall, (m,) bool: all of its side faces but the ends of a face all round it.
+
+    Where a CAD system merged sides and ends into one face, the ends are where the material behind is as deep as the
+    wall is long.
+
+    faces : 0-based side faces of the wall
+    """
+    mine = np.isin(graph.face, faces)
+    wraps = [f for f in faces.tolist() if (graph.back[graph.face == f] == f).mean() > WRAPS]
+    out = np.isin(graph.face_of, faces)
+    rows = np.flatnonzero(np.isin(graph.face_of, wraps))
+    if len(rows) == 0:
+        return out
+    normal = graph.mesh.normals[rows]
+    depth, hit = cast(graph.tree, graph.mesh.triangles[rows].mean(axis=1), -normal, graph.skin)
+    square = np.einsum("ij,ij->i", graph.mesh.normals[hit], normal) < BACK_DOT
+    out[rows] = (hit >= 0) & square & (depth <= THICKER * np.median(graph.inward[mine]))
+    return out if out.any() else np.isin(graph.face_of, faces)
+
+
+Rays = Callable[[F64, np.ndarray], tuple[F64, F64, F64]]
+"""From points (k, 3) and the triangles they lie on to lengths (inf: no ray), places where rays begin, and feet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places along a border.
+
+    piece : (k,) int, of the border; t : (k,) float64, 0 to 1 along it; half : (k,) float64, to the next place, half way
+    """
+
+    piece: np.ndarray
+    t: F64
+    half: F64
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """The border of the sides of a wall.
+
+    ends     : (m, 2, 3) float64, mm, its straight pieces between mesh nodes
+    middle   : (m, 3) float64, mm, of the side triangle at each
+    triangle : (m,) int, that triangle
+    nodes    : (m, 2) int, mesh vertices at the ends
+    """
+
+    ends: F64
+    middle: F64
+    triangle: np.ndarray
+    nodes: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh, side: np.ndarray) -> Border:
+        """The border of some triangles (k,) of a mesh: their edges that no two of them share."""
+        edges, _, alone = _edges(mesh.faces[side])
+        at = side[alone % len(side)]
+        return cls(mesh.vertices[edges[alone]], mesh.triangles[at].mean(axis=1), at, edges[alone])
+
+    def places(self) -> Places:
+        """Evenly spread places, one or more on each piece."""
+        lengths = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        count = np.maximum(np.ceil(MOST * lengths / max(float(lengths.sum()), 1e-30)), 1.0).astype(np.int64)
+        piece = np.repeat(np.arange(len(count)), count)
+        half = 0.5 / count[piece]
+        within = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+        return Places(piece, (2.0 * within + 1.0) * half, half)
+
+    def points(self, at: Places, inset: float) -> F64:
+        """(k, 3) float64, mm: the places, moved by a share of a triangle into the side."""
+        a, b = self.ends[at.piece, 0], self.ends[at.piece, 1]
+        p = a + at.t[:, None] * (b - a)
+        return np.asarray(p + inset * (self.middle[at.piece] - p))
+
+    def least(self, rays: Rays, at: Places, length: F64, inset: float) -> tuple[float, F64, F64] | None:
+        """The shortest ray at the border: its length, where it begins, its foot; None where there is none.
+
+        at, length : places looked at already and the lengths there, inf for no ray
+        """
+        best: tuple[float, F64, F64] | None = None
+        keep = CLOSER
+        for _ in range(TIMES):
+            order = np.argsort(length, kind="stable")[:keep]
+            order = order[np.isfinite(length[order])]
+            if len(order) == 0:
+                break
+            spread = np.linspace(-1.0, 1.0, 2 * FINER + 1)
+            t = np.clip(at.t[order, None] + at.half[order, None] * spread, 0.0, 1.0).ravel()
+            at = Places(np.repeat(at.piece[order], len(spread)), t, np.repeat(at.half[order] / FINER, len(spread)))
+            length, start, foot = rays(self.points(at, inset), self.triangle[at.piece])
+            k, keep = int(np.argmin(length)), 2
+            if np.isfinite(length[k]) and (best is None or length[k] < best[0]):
+                best = float(length[k]), start[k], foot[k]
+        return best
+
+
+def neighbours(faces: np.ndarray) -> np.ndarray:
+    """The triangles across the edges 01, 12 and 20 of each triangle.
+
+    faces : (k, 3) int, nodes of triangles
+    Returns (k, 3) int64, dimensionless places in ``faces``; -1 where there is none.
+    """
+    edges, key, _ = _edges(faces)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    a, b = order[same], order[same + 1]
+    out, k = np.full(len(edges), -1, np.int64), len(faces)
+    out[a], out[b] = b % k, a % k
+    return np.ascontiguousarray(out.reshape(3, k).T)
+
+
+def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges (3 k, 2) of triangles, edge 01 of all first; a number that equal edges share; those no other equals."""
+    f = faces.astype(np.int64)
+    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    number = edges.min(axis=1) * (int(edges.max(initial=0)) + 1) + edges.max(axis=1)
+    _, first, key, count = np.unique(number, return_index=True, return_inverse=True, return_counts=True)
+    return edges, key.ravel(), np.sort(first[count == 1])
