@@ -123,7 +123,7 @@ def neighbours(faces: np.ndarray) -> np.ndarray:
     """The triangles across the edges 01, 12 and 20 of each triangle.
 
     faces : (k, 3) int, nodes of triangles
-    Returns (k, 3) int64, dimensionless places in ``faces``; -1 where there is none.
+    Returns (k, 3) int64 rows of ``faces``; -1 where there is none.
     """
     edges, key, _ = _edges(faces)
     order = np.argsort(key, kind="stable")
