@@ -156,6 +156,7 @@ def compare_profiles(
     except ImportError:
         return None
     import numpy as np
+    from shapely.geometry import LineString, Point
 
     by_side: dict[tuple[int, int], Any] = {}
     for curve in wall_sections(part, found):
@@ -163,7 +164,8 @@ def compare_profiles(
         if k < 0:
             continue
         points = [np.array(q[:2]) for q in truth["walls"][k]["side_points"]]
-        side = int(np.argmin([np.hypot(*(curve.points - q).T).min() for q in points]))
+        line = LineString(np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points)
+        side = int(np.argmin([line.distance(Point(q)) for q in points]))
         old = by_side.get((k, side))
         if old is None or _length(curve.points) > _length(old.points):
             by_side[k, side] = curve

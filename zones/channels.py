@@ -217,7 +217,7 @@ class _Field:
                 along = way - s[:, None] * normal
                 if turn < FOOT_TURNS - 1:
                     # the foot on the facets is where the facet is square to the way, not the surface
-                    _, place, here = nearest(side.tree, start[rows] + along)
+                    _, place, here = nearest(side.tree, here + along)
             place = side.triangles[place]
             good = (s > self.skin) & (np.linalg.norm(along, axis=1) <= ASKEW * s)
             good &= np.einsum("ij,ij->i", normal, back) < FACING_DOT
