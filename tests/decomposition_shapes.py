@@ -162,6 +162,7 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "web above the floor, level with the tops": (lambda: _web(7, 10), (2, 1, 1)),
     "web on the floor": (lambda: _web(3, 10), (3, 0, 1)),
     "three walls in H": (lambda: _web(3, 14), (3, 0, 1)),
+    "bar against a pier": (lambda: pair().union(box(24, 9, 16, -4, -9, 3)).union(box(3, 9, 3, 19.5, -9, 9)), (2, 1, 1)),
     "web with a gate": (lambda: _web(3, 10).cut(box(10, 3, 3, 6, -6, 4)), (2, 1, 1)),
     "web with a window": (lambda: _web(3, 10).cut(box(10, 3, 3, 6, -6, 6)), (3, 0, 1)),
     "leaning web on the floor": (lambda: pair().union(outline(
