@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -144,14 +144,20 @@ class FreeWall(WallSpec):
     def _loops(self) -> tuple[BSpline, BSpline]:
         return self.loop(0.0), self.loop(1.0)
 
-    def _along_loop(self, side: int, u: F64) -> F64:
-        return np.asarray(2.0 + self._caps[1] - np.asarray(u) if side == LEFT else u)
+    def _along_loop(self, side: int, u: F64) -> tuple[F64, float]:
+        """Parameter of the loop at u of a side, and how fast it goes there."""
+        t = 2.0 + self._caps[1] - np.asarray(u) if side == LEFT else np.asarray(u)
+        return t, -1.0 if side == LEFT else 1.0
+
+    def with_ends(self) -> FreeWall:
+        """The wall with sides that reach round its ends to their middle, where sides and ends are one face."""
+        return _RoundEnded(**{f.name: getattr(self, f.name) for f in fields(self)}) if self.merged else self
 
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface, (n, 3) mm; see WallSpec."""
         if not self.merged:
             return super().side_point(side, u, v)
-        t = self._along_loop(side, u)
+        t, _ = self._along_loop(side, u)
         lo, hi = (k(t) for k in self._loops)
         return np.asarray(lo + (hi - lo) * np.asarray(v)[..., None])
 
@@ -159,7 +165,7 @@ class FreeWall(WallSpec):
         """Partial derivatives of a side by u and by v, two (n, 3) mm; see WallSpec."""
         if not self.merged:
             return super().side_derivatives(side, u, v)
-        t, sign = self._along_loop(side, u), -1.0 if side == LEFT else 1.0
+        t, sign = self._along_loop(side, u)
         (lo, hi), (dlo, dhi) = (k(t) for k in self._loops), (sign * k.derivative()(t) for k in self._loops)
         return np.asarray(dlo + (dhi - dlo) * np.asarray(v)[..., None]), np.asarray(hi - lo)
 
@@ -226,6 +232,17 @@ class FreeWall(WallSpec):
         ends = [cq.Edge.makeLine(cq.Vector(*right(u)), cq.Vector(*left(u))) for u in (1.0, 0.0)]
         ends[1] = cq.Edge.makeLine(cq.Vector(*left(0.0)), cq.Vector(*right(0.0)))
         return cq.Wire.assembleEdges([*there, ends[0], *back, ends[1]])
+
+
+class _RoundEnded(FreeWall):
+    """See ``FreeWall.with_ends``."""
+
+    def _along_loop(self, side: int, u: F64) -> tuple[F64, float]:
+        first, last = self._caps
+        speed = 1.0 + 0.5 * (first + last)
+        if side == LEFT:
+            return 2.0 + last + 0.5 * first - speed * np.asarray(u), -speed
+        return np.mod(-0.5 * first + speed * np.asarray(u), 2.0 + first + last), speed
 
 
 def _loft(wires: list[Any]) -> Any:

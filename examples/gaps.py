@@ -7,7 +7,8 @@ surface the exact foot. Connections are left out, as in the definition of the ga
 A free wall may be closed and may face itself; its rays count where they meet the
 other side within 72 degrees of square (``facing_dot``), and tops and ends of walls stop
 them. The shortest of them may begin on a border of a side, or end on one; both are looked
-for along the borders, the latter backwards from the border point.
+for along the borders, the latter backwards from the border point. Where a wall is one face all
+round, its round ends belong to its sides.
 """
 
 from __future__ import annotations
@@ -76,6 +77,7 @@ def channels(
     exact    : whether the shortest ray is refined between the samples
     Returns Gap per pair with at least 1 % of a side facing, in order of the pair.
     """
+    walls = [w.with_ends() for w in walls]
     found: dict[tuple[int, int], Gap] = {}
     for i in range(len(walls)):
         for side in (LEFT, RIGHT):

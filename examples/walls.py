@@ -111,6 +111,10 @@ class WallSpec:
     def _slopes(self) -> dict[tuple[int, int], BSpline]:
         return {key: rail.derivative() for key, rail in self._rails.items()}
 
+    def with_ends(self) -> WallSpec:
+        """The wall whose sides are what a gap is measured between."""
+        return self
+
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface.
 

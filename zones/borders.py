@@ -1,4 +1,4 @@
-"""Where the sides of walls end: triangles that are no side, borders of sides, and shortest rays on them.
+"""Where the sides of walls end, and shortest rays there.
 
 A channel's shortest ray often begins on a border of a side or meets one. There it is looked for along the border, in
 one dimension. A ray that meets a border point q begins at the foot of the perpendicular from q on the other side, so
@@ -13,35 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
-from zones.facegraph import FaceGraph, cast
 
-# A face round a wall: over this share of it the material behind ends on the face itself.
-WRAPS = 0.25
-# There a triangle is a side where the material behind is no thicker than this many times the wall and ends square.
-THICKER, BACK_DOT = 2.0, -0.8
 # Points a border is looked at first, at most; the best so many are looked at closer, so often, so much each time.
 MOST, CLOSER, TIMES, FINER = 3000, 6, 5, 8
-
-
-def side_triangles(graph: FaceGraph, faces: np.ndarray) -> np.ndarray:
-    """Which triangles are the sides of a wall, (m,) bool: all of its side faces but the ends of a face all round it.
-
-    Where a CAD system merged sides and ends into one face, the ends are where the material behind is as deep as the
-    wall is long.
-
-    faces : 0-based side faces of the wall
-    """
-    mine = np.isin(graph.face, faces)
-    wraps = [f for f in faces.tolist() if (graph.back[graph.face == f] == f).mean() > WRAPS]
-    out = np.isin(graph.face_of, faces)
-    rows = np.flatnonzero(np.isin(graph.face_of, wraps))
-    if len(rows) == 0:
-        return out
-    normal = graph.mesh.normals[rows]
-    depth, hit = cast(graph.tree, graph.mesh.triangles[rows].mean(axis=1), -normal, graph.skin)
-    square = np.einsum("ij,ij->i", graph.mesh.normals[hit], normal) < BACK_DOT
-    out[rows] = (hit >= 0) & square & (depth <= THICKER * np.median(graph.inward[mine]))
-    return out if out.any() else np.isin(graph.face_of, faces)
 
 
 Rays = Callable[[F64, np.ndarray], tuple[F64, F64, F64]]

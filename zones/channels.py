@@ -23,7 +23,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.nearest import nearest
 from geometry.sampling import sample_surface
-from zones.borders import Border, Places, neighbours, side_triangles
+from zones.borders import Border, Places, neighbours
 from zones.facegraph import FaceGraph, cast
 from zones.footprints import cap_footprints
 from zones.kernels.nearby import one_piece
@@ -95,11 +95,10 @@ class _Side:
 
     mesh      : TriangleMesh
     triangles : (k,) int, its side triangles, ascending
-    around    : (n,) int, all triangles of the faces that hold them, ascending
     """
 
-    def __init__(self, mesh: TriangleMesh, triangles: np.ndarray, around: np.ndarray) -> None:
-        self.mesh, self.triangles, self.around = mesh, triangles, around
+    def __init__(self, mesh: TriangleMesh, triangles: np.ndarray) -> None:
+        self.mesh, self.triangles = mesh, triangles
         self.area = float(mesh.areas[triangles].sum())
         self.border = Border.of(mesh, triangles)
         self.rim = np.unique(self.border.nodes)
@@ -126,9 +125,9 @@ class _Side:
         return TriangleTree(TriangleMesh(self.mesh.vertices, faces, self.mesh.face_ids[self.triangles]))
 
     @cached_property
-    def patch(self) -> tuple[np.ndarray, F64]:
-        """(n, 3) int64 neighbours of ``around`` across the edges, -1 where there is none, and (n, 3, 3) corners."""
-        return neighbours(self.mesh.faces[self.around]), np.ascontiguousarray(self.mesh.triangles[self.around])
+    def beside(self) -> np.ndarray:
+        """(k, 3) int64: neighbours across the edges, -1 at the border."""
+        return neighbours(self.mesh.faces[self.triangles])
 
 
 class _Field:
@@ -137,23 +136,19 @@ class _Field:
     def __init__(self, graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> None:
         keep = ~left_out[graph.face_of]
         full, uv = graph.mesh, graph.part.uv
-        owner = np.full(len(full.faces), -1)
-        is_side = np.zeros(graph.n, bool)
+        owner = np.full(graph.n + 1, -1)
         for wall, faces in enumerate(sides):
-            owner[side_triangles(graph, faces)] = wall
-            is_side[faces] = True
-        caps = cap_footprints(graph, left_out, is_side)
+            owner[faces] = wall
+        caps = cap_footprints(graph, left_out, owner[:-1] >= 0)
         self.mesh = _with_triangles(TriangleMesh(full.vertices, full.faces[keep], full.face_ids[keep]), caps,
                                     graph.n + 1)
-        self.owner = np.concatenate([owner[keep], np.full(len(caps), -1)])
+        self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
         self.tree = TriangleTree(self.mesh)
         self.skin = graph.skin
         self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
                                   max(graph.part.chord, graph.part.deviation))
         self.count = len(sides)
-        face = self.mesh.face_ids.astype(np.int64) - 1
-        self.walls = [_Side(self.mesh, np.flatnonzero(self.owner == k), np.flatnonzero(np.isin(face, f)))
-                      for k, f in enumerate(sides)]
+        self.walls = [_Side(self.mesh, np.flatnonzero(self.owner == k)) for k in range(self.count)]
         self.on_rim = np.zeros(len(self.mesh.vertices), bool)
         for mine in self.walls:
             self.on_rim[mine.rim] = True
@@ -192,8 +187,8 @@ class _Field:
             rows = np.flatnonzero((wall == w) & (self.owner[hit] == w) & (near <= self.thickness[w]))
             if len(rows):
                 side, found = self.walls[w], np.zeros(len(rows), bool)
-                one_piece(*side.patch, np.searchsorted(side.around, triangles[rows]),
-                          np.searchsorted(side.around, hit[rows]), points[rows], self.thickness[w], found)
+                one_piece(side.beside, side.corners, np.searchsorted(side.triangles, triangles[rows]),
+                          np.searchsorted(side.triangles, hit[rows]), points[rows], self.thickness[w], found)
                 out[rows] = found
         return out
 
@@ -222,8 +217,9 @@ class _Field:
             good = (s > self.skin) & (np.linalg.norm(along, axis=1) <= ASKEW * s)
             good &= np.einsum("ij,ij->i", normal, back) < FACING_DOT
             good[good] &= ~self._local(start[rows[good]], place[good], foot[rows[good]], triangles[rows[good]])
-            clear, _ = cast(self.tree, start[rows[good]], normal[good], self.skin)
-            good[good] &= clear >= 0.95 * s[good] - self.smooth.tolerance
+            clear, hit = cast(self.tree, start[rows[good]], normal[good], self.skin)
+            through = (hit >= 0) & (np.einsum("ij,ij->i", self.mesh.normals[hit], normal[good]) > 0)
+            good[good] &= ~through & (clear >= (1.0 - ASKEW) * s[good] - self.smooth.tolerance)
             length[rows[good]] = s[good]
             return length, start, foot
 
