@@ -151,7 +151,11 @@ class FreeWall(WallSpec):
 
     def with_ends(self) -> FreeWall:
         """The wall with sides that reach round its ends to their middle, where sides and ends are one face."""
-        return _RoundEnded(**{f.name: getattr(self, f.name) for f in fields(self)}) if self.merged else self
+        return self._whole if self.merged else self
+
+    @cached_property
+    def _whole(self) -> FreeWall:
+        return _RoundEnded(**{f.name: getattr(self, f.name) for f in fields(self)})
 
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface, (n, 3) mm; see WallSpec."""
@@ -183,7 +187,7 @@ class FreeWall(WallSpec):
     def _cut(self, z: float, samples: int) -> Polygon:
         u = np.linspace(0.0, 1.0, samples)
         v = np.full(samples, (z - self.z_floor) / self.height)
-        left, right = (self.side_point(s, u, v)[:, :2] for s in (LEFT, RIGHT))
+        left, right = (self.with_ends().side_point(s, u, v)[:, :2] for s in (LEFT, RIGHT))
         return Polygon(right, [left]) if self.closed else Polygon(np.vstack([left, right[::-1]]))
 
     def side_curve(self, side: int, v: float = 0.5, samples: int = 1001) -> F64:
@@ -236,6 +240,9 @@ class FreeWall(WallSpec):
 
 class _RoundEnded(FreeWall):
     """See ``FreeWall.with_ends``."""
+
+    def with_ends(self) -> FreeWall:
+        return self
 
     def _along_loop(self, side: int, u: F64) -> tuple[F64, float]:
         first, last = self._caps

@@ -225,6 +225,8 @@ def settled(spec: ConnectionSpec, depth: float, rounds: int) -> ConnectionSpec:
         raise LayoutError("ends cannot be buried")
     if spec.width < 0.7 or spec.span[1] - spec.span[0] < 0.05 or spec.void_share < 0.25:
         raise LayoutError("too narrow, no span, or no void below")
+    if not spec.footprint().is_valid:
+        raise LayoutError("its outline crosses itself")
     return spec
 
 

@@ -89,19 +89,34 @@ def _wall(graph: FaceGraph, sheets: Sheets, body: np.ndarray, label: int, name: 
 def _channel_sides(graph: FaceGraph, sheets: Sheets, label: int) -> np.ndarray:
     """Sides of a wall that bound channels: its thin faces without end faces.
 
-    Rays into the end of a bent wall leave by a side, so its end may count as thin. It is an end when it is narrower
-    than the material behind it is deep, and two upright convex edges lead from it to other thin faces of the wall.
+    Rays into the end of a bent wall, or askew into the reveal of an opening, leave by a side, so these may count as
+    thin. An upright face is one of them when two upright convex edges lead from it to other thin faces of the wall, and
+    it is narrower than the material behind it is deep; or those two faces are the two sides of the wall there, and it
+    is no wider than twice the wall's thickness.
     """
     thin = sheets.sides(label)
+    thickness = float(np.median(graph.inward[graph.face_rows(np.isin(np.arange(graph.n), thin))]))
     ends = []
     for f in thin.tolist():
         tall = float(graph.z_range[f, 1] - graph.z_range[f, 0])
-        turns = [k for k in graph.at[f] if k.kind == EdgeKind.CONVEX and k.length >= 0.5 * tall
-                 and sheets.thin[k.other(f)] and sheets.body[k.other(f)] == label]
+        turns = {k.other(f) for k in graph.at[f] if k.kind == EdgeKind.CONVEX and k.length >= 0.5 * tall
+                 and sheets.thin[k.other(f)] and sheets.body[k.other(f)] == label}
         depth = graph.inward[graph.face_rows(np.arange(graph.n) == f)]
-        if len(turns) >= 2 and len(depth) and graph.area[f] < tall * float(np.median(depth)):
+        if len(turns) < 2 or len(depth) == 0:
+            continue
+        wide = graph.area[f] / max(tall, 1e-9)
+        if wide < float(np.median(depth)) or (wide <= 2.0 * thickness and _back_each_other(graph, turns)):
             ends.append(f)
     return thin if len(ends) == len(thin) else np.setdiff1d(thin, ends)
+
+
+def _back_each_other(graph: FaceGraph, faces: set[int]) -> bool:
+    """Whether inward rays from one of the faces end on another of them, half of them or more."""
+    for f in sorted(faces):
+        back = graph.back[graph.face_rows(np.arange(graph.n) == f)]
+        if len(back) and np.isin(back, sorted(faces - {f})).mean() >= 0.5:
+            return True
+    return False
 
 
 def _connections(graph: FaceGraph, bridges: Bridges, name: dict[int, str]) -> tuple[Connection, ...]:
