@@ -30,14 +30,16 @@ TAIL, TAIL_SHARE = 2.0, 0.25
 AROUND = 6.0
 # The path round a fillet is at most this many times its chord.
 DETOUR = 1.25
-# The end of a side is rounded where it turns by this much (rad) within this length of it.
+# The end of a side is rounded where it turns to the right by this much (rad) within the window, on this length of it.
+# A bend of the wall itself does not: its outer side has a radius of a thickness or more, over which the window turns by
+# no more than its own number, and its inner side turns to the left, however sharply.
 CURL_LENGTH, CURL_WINDOW, CURL_TURN = 1.5, 0.25, 0.25
 # Behind the end of a slanting cap a side goes on unbacked, in line within this angle (rad), up to this length.
 GROW_TURN, GROW_LENGTH = 0.1, 3.0
 # Least cosine between a chord and the sides it joins.
 IN_LINE = 0.8
 # Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged, or
-# where a side stays in parts.
+# where a side stays in parts or a ring torn open.
 HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
 NODE_ROOM = 0.01  # of its height: how far from such a height a wall may be cut to keep clear of the nodes of the mesh
 BRIDGED_SHARE = 0.25
@@ -80,7 +82,8 @@ def wall_sections(part: Part, decomposition: Decomposition, height: float | None
     tuple of SideCurve
         By wall, then by centroid. Open walls have two; closed ones two rings. End caps and the roundings of ends are
         left out. Without a given height a wall is cut at 0.6, 0.4, 0.7 or 0.3 of its height instead of the middle
-        where the middle section would leave a side in parts, or be bridges for over a quarter, and another does not.
+        where the middle section would leave a side in parts or a ring torn open, or be bridges for over a quarter, and
+        another does not.
         Points are off the exact surface by at most the deviation of the mesh, bridges over interruptions aside.
     """
     count = max((f.number for f in part.faces), default=0) + 1
@@ -130,7 +133,7 @@ class _Section(Pieces):
         chains = self._joined(self.stretches())
         used = {r for c in chains for r in c.rows}
         chains = self._bridge([self._trimmed(self._grown(c, used)) for c in chains])
-        curves, bridged = [], []
+        curves, bridged, torn = [], [], []
         # Rings within an open wall are bores, upright holes in its material, and no side.
         bored = any(not c.closed for c in chains)
         for chain in chains:
@@ -138,21 +141,24 @@ class _Section(Pieces):
             if curve is not None:
                 curves.append(curve)
                 bridged.append(_lengths(curve)[curve.face[:len(_lengths(curve))] == BRIDGE].sum())
+                torn.append(self._torn(chain))
         total = [float(_lengths(c).sum()) for c in curves]
         least = max(SIDE_LENGTH * self.thick, SIDE_SHARE * max(total, default=0.0))
         kept = [i for i, t in enumerate(total) if t >= least]
         kept.sort(key=lambda i: tuple(np.round(curves[i].points.mean(axis=0) / (1e-3 * self.thick))))
         share = sum(bridged[i] for i in kept) / max(sum(total[i] for i in kept), 1e-30)
-        return [curves[i] for i in kept], self._poor(total, len(kept), share)
+        open_rings = sum(total[i] for i in kept if torn[i])
+        return [curves[i] for i in kept], self._poor(total, len(kept), share, open_rings)
 
-    def _poor(self, total: list[float], kept: int, bridged: float) -> float:
+    def _poor(self, total: list[float], kept: int, bridged: float, torn: float) -> float:
         """2 or more where a side lacks, 1 to 2 where one is in parts, else the share that bridges.
 
         total : mm, length of every curve; kept : those that count as sides; bridged : share of their length
+        torn  : mm, length of the sides that are rings torn open
         """
         if kept < 2:
             return 3.0 - 0.5 * kept
-        parts = sum(t for t in sorted(total)[:-2] if t >= SIDE_LENGTH * self.thick)
+        parts = torn + sum(t for t in sorted(total)[:-2] if t >= SIDE_LENGTH * self.thick)
         return 1.0 + parts / sum(total) if parts else float(bridged)
 
     def _joined(self, stretches: list[list[int]]) -> list[_Chain]:
@@ -233,16 +239,19 @@ class _Section(Pieces):
         """Without the roundings of its ends."""
         if chain.closed:
             return chain
-        lead, trail = self._curl(chain.rows), self._curl(chain.rows[::-1])
+        lead, trail = self._curl(chain.rows, -1), self._curl(chain.rows[::-1], 1)
         return _Chain(chain.rows[lead:len(chain.rows) - trail])
 
-    def _curl(self, rows: list[int]) -> int:
-        """How many pieces from the end on belong to its rounding, the end first."""
+    def _curl(self, rows: list[int], right: int) -> int:
+        """How many pieces from the end on belong to its rounding, the end first.
+
+        right : sign that a turn to the right of the walk has between pieces in the order of ``rows``
+        """
         reach = np.cumsum(self.length[rows])
         near = int(np.searchsorted(reach, CURL_LENGTH * self.thick)) + 2
         if near < 3 or near > len(rows):
             return 0
-        turn = np.abs(turn_between(self.way[rows[:near - 1]], self.way[rows[1:near]]))
+        turn = right * turn_between(self.way[rows[:near - 1]], self.way[rows[1:near]])
         at = reach[:near - 1]
         window = CURL_WINDOW * self.thick
         last = 0
@@ -281,8 +290,16 @@ class _Section(Pieces):
             out.append(chain)
         return out
 
-    def _in_line(self, one: _Chain, two: _Chain) -> float | None:
-        """Length of the chord from the end of one chain to the start of another, None where they are not one side."""
+    def _torn(self, chain: _Chain) -> bool:
+        """Whether a chain is a ring that something interrupts in a bend: its ends face each other, yet not in line."""
+        rows = _Chain([r for r in chain.rows if r >= 0], chain.closed)
+        return self._in_line(rows, rows, 0.0) is not None
+
+    def _in_line(self, one: _Chain, two: _Chain, least: float = IN_LINE) -> float | None:
+        """Length of the chord from the end of one chain to the start of another, None where they are not one side.
+
+        least : cosine of the angle between the chord and either side that is allowed
+        """
         if one.closed or two.closed or not one.rows or not two.rows:
             return None
         p, q = self.b[one.rows[-1]], self.a[two.rows[0]]
@@ -291,7 +308,7 @@ class _Section(Pieces):
             return None
         u = (q - p) / far
         leave, enter = self._heading(one.rows[::-1]), self._heading(two.rows)
-        if min(float(leave @ u), float(enter @ u)) < IN_LINE:
+        if min(float(leave @ u), float(enter @ u)) < least:
             return None
         return far if self._filled(p, q) else None
 

@@ -58,7 +58,34 @@ def _bent_window():
     return plate(80, 60).union(wall.translate((25, 5, 3))).union(box(50, 2, 14, 0, 30, 3))
 
 
+def _hook():
+    """A wall 2 mm thick with a bend near its end: 1 mm of radius inside, 3 mm outside, then 2 mm straight."""
+    import cadquery as cq
+
+    outer, inner = ((30 + r * np.sqrt(0.5), 3 - r * np.sqrt(0.5)) for r in (3.0, 1.0))
+    wall = cq.Workplane().moveTo(0, 0).lineTo(30, 0).threePointArc(outer, (33, 3)).lineTo(33, 5).lineTo(31, 5)
+    wall = wall.lineTo(31, 3).threePointArc(inner, (30, 2)).lineTo(0, 2).close()
+    return plate(80, 60).union(wall.extrude(14).translate((0, 5, 3))).union(box(50, 2, 14, 0, 30, 3))
+
+
+def _held_ring():
+    """A ring 1 mm thick held at mid height by a bar from within and one from without, both in its bends.
+
+    The bars are so wide that the ends they leave of either side of the ring do not lie in line.
+    """
+    import cadquery as cq
+
+    def tube(radius: float, thick: float):
+        round_wall = cq.Workplane().circle(radius + 0.5 * thick).circle(radius - 0.5 * thick)
+        return round_wall.extrude(14).translate((25, 0, 3))
+
+    part = plate(80, 60).union(tube(5, 1)).union(tube(2.6, 0.8)).union(box(50, 2, 14, 0, 12, 3))
+    return part.union(box(2.3, 5, 2, 27.3, -2.5, 9)).union(box(7.6, 8, 2, 21.2, 4.4, 9).cut(
+        cq.Workplane().circle(4.5).extrude(20).translate((25, 0, 0))))
+
+
 OWN = {
+    "held ring": _held_ring,
     "window in a bend": _bent_window,
     "slot": _slot,
     "lens": _lens,
@@ -161,6 +188,22 @@ def test_a_side_in_parts_is_cut_at_another_height() -> None:
     assert len({c.z for c in found}) == 1 and not 8.6 < found[0].z < 11.4
     part, decomposition = made("window in a bend")
     assert len([c for c in wall_sections(part, decomposition, height=10.0) if c.wall == "W1"]) > 2
+
+
+def test_a_ring_torn_open_in_its_bends_is_cut_at_another_height() -> None:
+    found = sorted(curves("held ring"), key=length)
+    assert [c.closed for c in found] == [True, True]
+    assert [length(c) for c in found] == pytest.approx([9 * np.pi, 11 * np.pi], rel=2e-3)
+    part, decomposition = made("held ring")
+    middle = [c for c in wall_sections(part, decomposition, height=10.0) if c.wall == "W1"]
+    assert [c.closed for c in middle] == [False, False]
+
+
+def test_a_tight_bend_at_the_end_of_a_wall_is_no_rounding_of_its_end() -> None:
+    part = to_part(_hook(), chord=0.004)
+    found = [c for c in wall_sections(part, decompose(part)) if c.wall == "W1"]
+    expected = [30 + r * np.pi / 2 + 2 for r in (1.0, 3.0)]
+    assert sorted(length(c) for c in found) == pytest.approx(expected, abs=0.02)
 
 
 def test_sides_end_where_lips_do() -> None:
