@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shapely.errors import GEOSException
 from shapely.geometry import Point
 
 from examples import linear
@@ -136,12 +137,12 @@ def _generator(seed: int, recipe: str) -> np.random.Generator:
 
 
 def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> Layout:
-    reason: LayoutError | None = None
+    reason: Exception | None = None
     for _ in range(DRAWS):
         try:
             layout = RECIPES[recipe](rng, **overrides)
             check(layout)
-        except LayoutError as error:
+        except (LayoutError, GEOSException) as error:  # outlines that touch themselves are no layout either
             reason = error
             continue
         return layout
