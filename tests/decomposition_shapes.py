@@ -141,6 +141,12 @@ def aslant() -> Shape:
     return plate().union(box(50, 2, 14, 0, -5, 3)).union(box(50, 2, 14, 0, 0, 3)).union(bar)
 
 
+def steep() -> Shape:
+    """Two walls 1.5 apart and a bar that rises 3 between them: rays from its underside leave by the back of a wall."""
+    bar = outline("YZ", [(-0.6, 4.8), (2.1, 10.2), (2.1, 11.7), (-0.6, 6.3)], 1.6, (20, 0, 0))
+    return plate().union(box(50, 1.2, 16, 0, -1.2, 3)).union(box(50, 1.2, 16, 0, 1.5, 3)).union(bar)
+
+
 SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "two walls": (pair, (2, 0, 1)),
     "square bar": (_bar, (2, 1, 1)),
@@ -157,6 +163,7 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
         rod((10, -4.6, 10), (16, 0.5, 12), 1.2)).union(rod((10, -4.6, 10), (4, 0.5, 9), 1.2)), (2, 1, 1)),
     "slender fork": (lambda: pair().union(outline("XY", SLENDER_FORK, 2.2, (0, 0, 9))), (2, 1, 1)),
     "short bar aslant between walls": (aslant, (2, 1, 1)),
+    "short steep bar between walls": (steep, (2, 1, 1)),
     "slab": (lambda: pair().union(box(30, 9, 1.5, 10, -9, 8)), (2, 1, 1)),
     "web above the floor": (lambda: _web(7, 9), (2, 1, 1)),
     "web above the floor, level with the tops": (lambda: _web(7, 10), (2, 1, 1)),

@@ -136,27 +136,37 @@ def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray)
     """Join bodies whose inward rays end on each other."""
     rows = np.flatnonzero(thin[graph.face])
     rows = rows[(graph.back[rows] >= 0) & (graph.back_dot[rows] < OPPOSED_DOT)]
-    rows = rows[thin[graph.back[rows]]]
-    mine, other = body[graph.face[rows]], body[graph.back[rows]]
+    rows = rows[_side_like(graph)[graph.back[rows]]]
+    around = _neighbours(graph)
     found: list[tuple[float, int, int, bool]] = []
-    for label in np.unique(mine):
-        of = rows[mine == label]
+    for label in np.unique(body[graph.face[rows]]):
+        faces = thin & (body == label)
+        of = rows[faces[graph.face[rows]]]
         near = of[graph.inward[of] <= BACKED_REACH * np.median(graph.inward[of])]
-        total = graph.samples.area[graph.face_rows(body == label)].sum()
-        seen = {int(facing): float(graph.samples.area[near[body[graph.back[near]] == facing]].sum())
-                for facing in np.unique(other[mine == label]) if facing != label}
-        best = max(seen.values(), default=0.0)
+        total = graph.samples.area[graph.face_rows(faces)].sum()
+        behind = graph.back[near]
+        joined = np.unique(np.concatenate([around[f] for f in np.flatnonzero(faces)])).astype(np.int64)
+        own = faces[behind] | (np.isin(behind, joined) & ~thin[behind])
+        seen = {int(facing): float(graph.samples.area[near[thin[behind] & (body[behind] == facing)]].sum())
+                for facing in np.unique(body[behind[thin[behind]]]) if facing != label}
+        best = max([*seen.values(), float(graph.samples.area[near[own]].sum())])
         found += [(a, int(label), facing, a == best) for facing, a in seen.items() if a >= BACKED_SHARE * total]
     return _join_backed(graph.n, found, _touching_bodies(graph, thin, body))[body]
+
+
+def _neighbours(graph: FaceGraph) -> list[list[int]]:
+    """Faces that each face goes on into across a convex or smooth edge."""
+    return [[k.other(f) for k in graph.at[f] if k.joins] for f in range(graph.n)]
 
 
 def _join_backed(n: int, found: list[tuple[float, int, int, bool]], touching: set[tuple[int, int]]) -> np.ndarray:
     """Labels after joining bodies to what backs them: what backs most of a body first, the rest by area.
 
     A short bar that meets a wall slantwise is seen through its end: some of its rays leave by the far side of the wall.
-    So a body does not join what backs less of it than another, where it meets that in a concave edge.
+    So a body does not join what backs less of it than another, or than it does itself, where it meets that in a
+    concave edge. Its thick faces count for itself: the top of a steep bar backs its underside.
 
-    found    : area seen (mm²), body, body behind it, whether none backs more
+    found    : area seen (mm²), body, body behind it, whether neither another nor the body itself backs more
     touching : pairs of bodies with a concave edge or a fillet between them
     """
     sets = UnionFind(n)
