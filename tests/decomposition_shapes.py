@@ -162,6 +162,8 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "fork of rods": (lambda: pair().union(rod((10, -9, 10), (10, -4.5, 10), 1.5)).union(
         rod((10, -4.6, 10), (16, 0.5, 12), 1.2)).union(rod((10, -4.6, 10), (4, 0.5, 9), 1.2)), (2, 1, 1)),
     "slender fork": (lambda: pair().union(outline("XY", SLENDER_FORK, 2.2, (0, 0, 9))), (2, 1, 1)),
+    "slender fork with an arm at a hub in a wall": (lambda: pair().union(outline(
+        "XY", SLENDER_FORK, 2.2, (0, 0, 9))).union(rod((15.5, 1.5, 0), (15.5, 1.5, 22), 4)), (3, 1, 2)),
     "short bar aslant between walls": (aslant, (2, 1, 1)),
     "short steep bar between walls": (steep, (2, 1, 1)),
     "slab": (lambda: pair().union(box(30, 9, 1.5, 10, -9, 8)), (2, 1, 1)),

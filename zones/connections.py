@@ -266,13 +266,18 @@ def _beside(under: F64, tops: list[F64], void: F64) -> bool:
 
 def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[Border], base: set[int],
              among: set[int]) -> set[int]:
-    """Sheets that meet no base along any edge or fillet and have void below.
+    """Sheets that stand on no base along any edge or fillet and have void below.
 
-    The arms of a slender fork are three such sheets, none of which bridges alone; their common underside has the label
-    of one of them, so a sheet also counts that goes on round an edge into an underside of another.
+    A base that a sheet meets sideways, as the end of a bar meets a hub, does not carry it. The arms of a slender fork
+    are three such sheets, none of which bridges alone; their common underside has the label of one of them, so a sheet
+    also counts that goes on round an edge into an underside of another.
     """
-    pairs = [(b.a, b.b) for b in borders] + [(int(body[k.a]), int(body[k.b])) for k in graph.links]
-    standing = {x for a, b in pairs for x, y in ((a, b), (b, a)) if y in base}
+    standing = {int(body[f]) for k in graph.links for f, g in ((k.a, k.b), (k.b, k.a))
+                if k.kind != EdgeKind.CONCAVE and int(body[g]) in base}
+    for border in borders:
+        for x, y, normals in ((border.a, border.b, border.nb), (border.b, border.a, border.na)):
+            if y in base and float(np.nan_to_num(normals[:, 2]).mean()) > STEEP_NZ:
+                standing.add(x)
     free = among - standing
     under = np.zeros(graph.n, bool)
     for x in free:
