@@ -17,7 +17,7 @@ from shapely.ops import unary_union
 from examples.connections import ConnectionSpec
 from examples.freewall import FreeWall
 from examples.gaps import Gap
-from examples.layout import LayoutError, clear_of, settled
+from examples.layout import HubDisc, LayoutError, Plate, clear_of, settled
 from examples.splines import F64
 from examples.walls import WallSpec
 
@@ -254,11 +254,34 @@ def _fork_buried(
     return True
 
 
+def ends_at_hub(base: Plate | HubDisc, walls: Sequence[WallSpec], spec: Any) -> bool:
+    """Whether the hub hides an end of a connection: outside the hub it does not reach the wall it should end at.
+
+    base, walls : of the layout
+    spec        : ConnectionSpec or ForkSpec
+    """
+    outline = spec.footprint()
+    for level in spec.z_range:
+        hub = base.above_floor(level)
+        if not outline.intersects(hub):
+            continue
+        sections = [w.section(min(max(level, w.z_floor), w.z_top)) for w in (walls[k] for k in set(spec.indices))]
+        cuts = [s.intersection(outline) for s in sections]
+        ends = [g for c in cuts for g in getattr(c, "geoms", [c]) if g.area > 1e-6]
+        free = outline.difference(unary_union([hub, *sections]))
+        pieces = getattr(free, "geoms", [free])
+        if not any(all(piece.distance(end) < 1e-6 for end in ends) for piece in pieces):
+            return True
+    return False
+
+
 def draw_joins(
-    rng: Generator, walls: Sequence[WallSpec], gaps: list[Gap], count: int, kinds: tuple[str, ...]
+    rng: Generator, base: Plate | HubDisc, walls: Sequence[WallSpec], gaps: list[Gap], count: int,
+    kinds: tuple[str, ...],
 ) -> list[Any]:
     """Draw up to ``count`` connections anywhere between the walls, some over each other.
 
+    base : no connection ends at its hub where it should end at a wall
     gaps : true channels; no connection covers the place where one is least
     Returns ConnectionSpec and ForkSpec; fewer than asked only where 30 draws a piece found no room.
     """
@@ -276,7 +299,7 @@ def draw_joins(
             spec = _draw(rng, walls, start, str(rng.choice(kinds)))
         except LayoutError:
             continue
-        if clear_of(spec, out) and not _covers(spec, gaps):
+        if clear_of(spec, out) and not _covers(spec, gaps) and not ends_at_hub(base, walls, spec):
             out.append(spec)
             starts.append(start)
     return out

@@ -44,6 +44,10 @@ class Plate:
         """(n,) bool: whether the base stands above its floor between two points; a plate never does."""
         return np.zeros(len(start), bool)
 
+    def above_floor(self, z: float) -> Polygon:
+        """Plan outline at height z of what stands above the floor, mm; of a plate nothing."""
+        return Polygon()
+
 
 @dataclass(frozen=True)
 class HubDisc:
@@ -82,6 +86,12 @@ class HubDisc:
         limit = self.hub_radius[0] + (self.hub_radius[1] - self.hub_radius[0]) * share
         above = p[..., 2] > self.thickness + self.hub_height
         return np.asarray(((np.hypot(p[..., 0], p[..., 1]) <= limit) & ~above).any(axis=1))
+
+    def above_floor(self, z: float) -> Polygon:
+        """Plan outline of the hub at height z, mm; empty over its top."""
+        share = max((z - self.thickness) / self.hub_height, 0.0)
+        radius = self.hub_radius[0] + (self.hub_radius[1] - self.hub_radius[0]) * share
+        return Point(0, 0).buffer(radius, quad_segs=64) if share <= 1.0 else Polygon()
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ def mixed(
     layout = _rounded_feet(rng, layout)
     check(layout)
     gaps = layout.gaps(n_u=121, n_v=3, exact=False)
-    drawn = draw_joins(rng, layout.walls, gaps, wanted, KINDS)
+    drawn = draw_joins(rng, layout.base, layout.walls, gaps, wanted, KINDS)
     layout = replace(layout, connections=drawn)
     layout = _windows(rng, layout, gaps) if rng.random() < 0.15 else layout
     rounded = round(float(rng.uniform(0.25, 0.4)), 2) if rng.random() < 0.4 else 0.0

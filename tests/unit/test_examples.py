@@ -11,8 +11,8 @@ from examples.demo import write_demo
 from examples.family import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
 from examples.freewall import FreeWall
 from examples.gaps import channels
-from examples.joins import fork, join
-from examples.layout import Layout, LayoutError, Plate, check
+from examples.joins import ends_at_hub, fork, join
+from examples.layout import HubDisc, Layout, LayoutError, Plate, check
 from examples.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
 from examples.walls import LEFT, RIGHT, WallSpec
 
@@ -297,6 +297,21 @@ def test_a_fork_ends_in_every_wall_it_names():
     solid = spec.solid()
     assert solid.isValid() and solid.BoundingBox().zmin == pytest.approx(9.2)
     assert all(solid.intersect(w.solid()).Volume() > 0.5 for w in walls)
+
+
+def test_a_hub_that_hides_an_end_of_a_connection_is_noticed():
+    x = np.linspace(-15, 15, 10)
+    lines = [Profile(None, np.column_stack([x, np.full(10, y)])) for y in (0.0, 8.0)]
+    walls = [FreeWall("straight", p.control, 4.0, 12.0, (2.0, 2.0), profile=p) for p in lines]
+    spec = join(walls, 0, LEFT, 0.5, "bar", (9.0, 9.0), width=2.0, depth=2.0)
+
+    def hub(radius: float, height: float) -> HubDisc:
+        return HubDisc(30.0, 4.0, (radius, radius), height)
+
+    assert not ends_at_hub(Plate((-20, -20, 20, 20), 4.0), walls, spec)
+    assert ends_at_hub(hub(3.0, 8.0), walls, spec)
+    assert not ends_at_hub(hub(3.0, 3.0), walls, spec), "the bar passes over the hub"
+    assert not ends_at_hub(hub(0.5, 8.0), walls, spec), "the hub is within the wall"
 
 
 def test_joins_find_the_other_stretch_of_the_same_wall():
