@@ -20,6 +20,9 @@ from zones.walls import NO_WALL, SEAT, Sheets
 
 # Normals of a body along the border it shares with a wall differ by more than 60 degrees where it ends there.
 END_DOT = 0.5
+# A bar over the corner of a wall shows two normals of the wall, but all round its own: the one with the wider spread of
+# normals (the lesser cosine, up to this) ends at the other.
+CORNER_SLACK = 0.25
 # Void: the next material below lies deeper than this share of the part's height.
 VOID_SHARE = 0.01
 # The underside of a body is what looks down by more than this; leaning ribs do so too, but have floor contact.
@@ -147,25 +150,32 @@ def _ends(graph: FaceGraph, group: list[int], borders: list[Border], walls: set[
     """Places where a group of bodies ends at walls, each a connected run of borders."""
     mine = set(group)
     out = []
-    touching: dict[int, list[tuple[F64, np.ndarray]]] = {}
+    touching: dict[int, list[tuple[F64, F64, np.ndarray]]] = {}
     for border in borders:
-        for x, w, normals in ((border.a, border.b, border.na), (border.b, border.a, border.nb)):
+        sides = (border.a, border.na), (border.b, border.nb)
+        for (x, own), (w, other) in (sides, sides[::-1]):
             if x in mine and w in walls and w not in mine:
-                touching.setdefault(w, []).append((normals, border.nodes))
+                touching.setdefault(w, []).append((own, other, border.nodes))
     for wall in sorted(touching):
-        for cluster in _connected_runs(touching[wall]):
-            normals = np.concatenate([touching[wall][i][0] for i in cluster])
-            normals = normals[np.isfinite(normals).all(axis=1)]
-            if len(normals) and float((normals @ normals.T).min()) < END_DOT:
-                out.append(End(wall, np.concatenate([touching[wall][i][1] for i in cluster])))
+        runs = touching[wall]
+        for cluster in _connected_runs([nodes for _, _, nodes in runs]):
+            spread, foreign = (_least_dot(np.concatenate([runs[i][k] for i in cluster])) for k in (0, 1))
+            if spread < min(END_DOT, foreign + CORNER_SLACK):
+                out.append(End(wall, np.concatenate([runs[i][2] for i in cluster])))
     return out
 
 
-def _connected_runs(runs: list[tuple[F64, np.ndarray]]) -> list[list[int]]:
-    """Runs that share a mesh vertex, as lists of indices."""
+def _least_dot(normals: F64) -> float:
+    """Least cosine between any two unit normals, (k, 3) float64; 1 where none is finite."""
+    normals = normals[np.isfinite(normals).all(axis=1)]
+    return float((normals @ normals.T).min()) if len(normals) else 1.0
+
+
+def _connected_runs(runs: list[np.ndarray]) -> list[list[int]]:
+    """Runs of mesh vertices that share one, as lists of indices."""
     sets = UnionFind(len(runs))
     owner: dict[int, int] = {}
-    for i, (_, nodes) in enumerate(runs):
+    for i, nodes in enumerate(runs):
         for node in nodes.tolist():
             sets.union(owner.setdefault(node, i), i)
     label = sets.labels()
