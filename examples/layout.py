@@ -124,11 +124,15 @@ class WindowSpec:
         """Whether the opening passes the wall cleanly and leaves all else, and every least gap, alone."""
         outline = self.footprint()
         around = outline.buffer(1.0)
+        corners = list(outline.exterior.coords)
+        near, far = LineString(corners[:2]), LineString(corners[2:4])
         for z in self.z:
-            cut = self.wall.section(z).intersection(outline)
-            rest = self.wall.section(z).difference(outline)
+            section = self.wall.section(z)
+            rest = section.difference(outline)
             pieces = 1 if self.wall.closed else 2
-            if cut.geom_type != "Polygon" or len(getattr(rest, "geoms", [rest])) != pieces:
+            if section.intersection(outline).geom_type != "Polygon" or len(getattr(rest, "geoms", [rest])) != pieces:
+                return False
+            if section.intersects(near) or section.intersects(far):
                 return False
         others = [w for k, w in enumerate(layout.walls) if k != self.index]
         if any(w.section(z).intersects(outline.buffer(0.2)) for w in others for z in self.z):

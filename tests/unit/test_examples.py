@@ -6,13 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from shapely.geometry import Polygon, box
 
 from examples.demo import write_demo
 from examples.family import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
 from examples.freewall import FreeWall
 from examples.gaps import channels
 from examples.joins import ends_at_hub, fork, join
-from examples.layout import HubDisc, Layout, LayoutError, Plate, check
+from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
 from examples.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
 from examples.walls import LEFT, RIGHT, WallSpec
 
@@ -312,6 +313,27 @@ def test_a_hub_that_hides_an_end_of_a_connection_is_noticed():
     assert ends_at_hub(hub(3.0, 8.0), walls, spec)
     assert not ends_at_hub(hub(3.0, 3.0), walls, spec), "the bar passes over the hub"
     assert not ends_at_hub(hub(0.5, 8.0), walls, spec), "the hub is within the wall"
+
+
+class Corner:
+    """A square wall round nothing, stood in for where only its plan matters; u is the place along its lower leg."""
+
+    closed, thickness = True, (2.0, 2.0)
+
+    def section(self, z: float) -> Polygon:
+        return box(0, 0, 20, 20).difference(box(2, 2, 18, 18))
+
+    def axis_point(self, u: float, z: float) -> np.ndarray:
+        return np.array([20.0 * u, 1.0])
+
+    def plan_normal(self, u: np.ndarray) -> np.ndarray:
+        return np.array([[0.0, 1.0]])
+
+
+@pytest.mark.parametrize(("u", "width", "passes"), [(0.5, 4.0, True), (0.5, 17.0, False), (0.12, 4.0, False)])
+def test_an_opening_goes_all_the_way_through_its_wall(u, width, passes):
+    window = WindowSpec(0, Corner(), u, width, (5.0, 8.0))
+    assert window.fits(Layout("", Plate((-5, -5, 25, 25), 4.0), [Corner()], []), []) == passes
 
 
 def test_joins_find_the_other_stretch_of_the_same_wall():
