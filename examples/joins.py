@@ -254,8 +254,9 @@ def _fork_buried(
     return True
 
 
-def ends_at_hub(base: Plate | HubDisc, walls: Sequence[WallSpec], spec: Any) -> bool:
-    """Whether the hub hides an end of a connection: outside the hub it does not reach the wall it should end at.
+def within_hub(base: Plate | HubDisc, walls: Sequence[WallSpec], spec: Any) -> bool:
+    """Whether the hub swallows a connection: outside the hub it does not reach the wall it should end at, or more than
+    half of what shows between the walls lies within the hub, which makes it a swelling of the hub.
 
     base, walls : of the layout
     spec        : ConnectionSpec or ForkSpec
@@ -268,7 +269,10 @@ def ends_at_hub(base: Plate | HubDisc, walls: Sequence[WallSpec], spec: Any) -> 
         sections = [w.section(min(max(level, w.z_floor), w.z_top)) for w in (walls[k] for k in set(spec.indices))]
         cuts = [s.intersection(outline) for s in sections]
         ends = [g for c in cuts for g in getattr(c, "geoms", [c]) if g.area > 1e-6]
-        free = outline.difference(unary_union([hub, *sections]))
+        between = outline.difference(unary_union(sections))
+        free = between.difference(hub)
+        if free.area < 0.5 * between.area:
+            return True
         pieces = getattr(free, "geoms", [free])
         if not any(all(piece.distance(end) < 1e-6 for end in ends) for piece in pieces):
             return True
@@ -281,7 +285,7 @@ def draw_joins(
 ) -> list[Any]:
     """Draw up to ``count`` connections anywhere between the walls, some over each other.
 
-    base : no connection ends at its hub where it should end at a wall
+    base : its hub swallows no connection and no end of one
     gaps : true channels; no connection covers the place where one is least
     Returns ConnectionSpec and ForkSpec; fewer than asked only where 30 draws a piece found no room.
     """
@@ -299,7 +303,7 @@ def draw_joins(
             spec = _draw(rng, walls, start, str(rng.choice(kinds)))
         except LayoutError:
             continue
-        if clear_of(spec, out) and not _covers(spec, gaps) and not ends_at_hub(base, walls, spec):
+        if clear_of(spec, out) and not _covers(spec, gaps) and not within_hub(base, walls, spec):
             out.append(spec)
             starts.append(start)
     return out

@@ -12,7 +12,7 @@ from examples.demo import write_demo
 from examples.family import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
 from examples.freewall import FreeWall
 from examples.gaps import channels
-from examples.joins import ends_at_hub, fork, join
+from examples.joins import fork, join, within_hub
 from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
 from examples.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
 from examples.walls import LEFT, RIGHT, WallSpec
@@ -300,19 +300,28 @@ def test_a_fork_ends_in_every_wall_it_names():
     assert all(solid.intersect(w.solid()).Volume() > 0.5 for w in walls)
 
 
-def test_a_hub_that_hides_an_end_of_a_connection_is_noticed():
+def test_a_hub_that_swallows_a_connection_or_an_end_of_it_is_noticed():
     x = np.linspace(-15, 15, 10)
-    lines = [Profile(None, np.column_stack([x, np.full(10, y)])) for y in (0.0, 8.0)]
-    walls = [FreeWall("straight", p.control, 4.0, 12.0, (2.0, 2.0), profile=p) for p in lines]
+
+    def straight(y: float, thickness: float) -> FreeWall:
+        line = Profile(None, np.column_stack([x, np.full(10, y)]))
+        return FreeWall("straight", line.control, 4.0, 12.0, (thickness, thickness), profile=line)
+
+    walls = [straight(y, 2.0) for y in (0.0, 8.0)]
     spec = join(walls, 0, LEFT, 0.5, "bar", (9.0, 9.0), width=2.0, depth=2.0)
 
     def hub(radius: float, height: float) -> HubDisc:
         return HubDisc(30.0, 4.0, (radius, radius), height)
 
-    assert not ends_at_hub(Plate((-20, -20, 20, 20), 4.0), walls, spec)
-    assert ends_at_hub(hub(3.0, 8.0), walls, spec)
-    assert not ends_at_hub(hub(3.0, 3.0), walls, spec), "the bar passes over the hub"
-    assert not ends_at_hub(hub(0.5, 8.0), walls, spec), "the hub is within the wall"
+    assert not within_hub(Plate((-20, -20, 20, 20), 4.0), walls, spec)
+    assert within_hub(hub(3.0, 8.0), walls, spec)
+    assert not within_hub(hub(3.0, 3.0), walls, spec), "the bar passes over the hub"
+    assert not within_hub(hub(0.5, 8.0), walls, spec), "the hub is within the wall"
+
+    pair = [straight(y, 6.0) for y in (-4.0, 4.0)]
+    beside = join(pair, 0, LEFT, 19.0 / 30.0, "bar", (9.0, 9.0), width=2.0, depth=2.0)
+    assert within_hub(hub(3.0, 8.0), pair, beside), "three quarters of the bar lie within the hub"
+    assert not within_hub(hub(2.0, 8.0), pair, beside), "a quarter of the bar lies within the hub"
 
 
 class Corner:
