@@ -6,7 +6,7 @@ Every part is made, read and decomposed in a child process with a time limit; wh
 folder under the name of recipe, seed and a digest of the sources it depends on, so a broken run goes on where it
 stopped and a changed program is asked again. Compared with the truth: number of walls, which wall is which, walls of
 every connection, least gap of primary channels (2 %), profile type of every wall side. Each part that is not all right
-gets a picture and a line of cause data. Seeds below 30000 are for work on the program, 30000 to 30299 for the score.
+gets a picture and a line of cause data. Seeds below 31000 are for work on the program, 31000 to 31299 for the score.
 """
 
 from __future__ import annotations
