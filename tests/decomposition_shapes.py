@@ -147,6 +147,12 @@ def steep() -> Shape:
     return plate().union(box(50, 1.2, 16, 0, -1.2, 3)).union(box(50, 1.2, 16, 0, 1.5, 3)).union(bar)
 
 
+def steeper() -> Shape:
+    """Two walls 1.5 mm apart and a bar that climbs 4.4 mm between them: its underside looks like a side of a wall."""
+    bar = outline("YZ", [(-0.6, 3.7), (2.1, 11.6), (2.1, 14.2), (-0.6, 6.3)], 3.5, (20, 0, 0))
+    return plate().union(box(50, 1.2, 16, 0, -1.2, 3)).union(box(50, 1.2, 16, 0, 1.5, 3)).union(bar)
+
+
 def at_corners() -> Shape:
     """Two leaning walls and two bars, one over the other, that end round the corners at the ends of the walls."""
     walls = [outline("YZ", [(y, 3), (y + 2, 3), (y + 4, 17), (y + 2, 17)], 50, (0, 0, 0)) for y in (-13, 0)]
@@ -173,6 +179,7 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
         "XY", SLENDER_FORK, 2.2, (0, 0, 9))).union(rod((15.5, 1.5, 0), (15.5, 1.5, 22), 4)), (3, 1, 2)),
     "short bar aslant between walls": (aslant, (2, 1, 1)),
     "short steep bar between walls": (steep, (2, 1, 1)),
+    "short bar steeper than that": (steeper, (2, 1, 1)),
     "bars round the corners of leaning walls": (at_corners, (2, 2, 1)),
     "slab": (lambda: pair().union(box(30, 9, 1.5, 10, -9, 8)), (2, 1, 1)),
     "web above the floor": (lambda: _web(7, 9), (2, 1, 1)),

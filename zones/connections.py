@@ -15,7 +15,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import EdgeKind
-from zones.facegraph import STEEP_NZ, FaceGraph, UnionFind, cast
+from zones.facegraph import STEEP_NZ, FaceGraph, UnionFind, cast, connected_runs
 from zones.walls import NO_WALL, SEAT, Sheets
 
 # Normals of a body along the border it shares with a wall differ by more than 60 degrees where it ends there.
@@ -158,7 +158,7 @@ def _ends(graph: FaceGraph, group: list[int], borders: list[Border], walls: set[
                 touching.setdefault(w, []).append((own, other, border.nodes))
     for wall in sorted(touching):
         runs = touching[wall]
-        for cluster in _connected_runs([nodes for _, _, nodes in runs]):
+        for cluster in connected_runs([nodes for _, _, nodes in runs]):
             spread, foreign = (_least_dot(np.concatenate([runs[i][k] for i in cluster])) for k in (0, 1))
             if spread < min(END_DOT, foreign + CORNER_SLACK):
                 out.append(End(wall, np.concatenate([runs[i][2] for i in cluster])))
@@ -169,17 +169,6 @@ def _least_dot(normals: F64) -> float:
     """Least cosine between any two unit normals, (k, 3) float64; 1 where none is finite."""
     normals = normals[np.isfinite(normals).all(axis=1)]
     return float((normals @ normals.T).min()) if len(normals) else 1.0
-
-
-def _connected_runs(runs: list[np.ndarray]) -> list[list[int]]:
-    """Runs of mesh vertices that share one, as lists of indices."""
-    sets = UnionFind(len(runs))
-    owner: dict[int, int] = {}
-    for i, nodes in enumerate(runs):
-        for node in nodes.tolist():
-            sets.union(owner.setdefault(node, i), i)
-    label = sets.labels()
-    return [np.flatnonzero(label == k).tolist() for k in np.unique(label)]
 
 
 def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:

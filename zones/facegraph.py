@@ -84,6 +84,17 @@ class UnionFind:
         return np.array([self.find(i) for i in range(len(self.parent))], dtype=np.int64)
 
 
+def connected_runs(runs: list[np.ndarray]) -> list[list[int]]:
+    """Runs of mesh vertices that share one, as lists of indices."""
+    sets = UnionFind(len(runs))
+    owner: dict[int, int] = {}
+    for i, nodes in enumerate(runs):
+        for node in nodes.tolist():
+            sets.union(owner.setdefault(node, i), i)
+    label = sets.labels()
+    return [np.flatnonzero(label == k).tolist() for k in np.unique(label)]
+
+
 class FaceGraph:
     """Measured faces of a part and the links between them.
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import EdgeKind
-from zones.facegraph import FaceGraph, Link, UnionFind
+from zones.facegraph import FaceGraph, Link, UnionFind, connected_runs
 
 THIN_SHARE = 0.5
 OPPOSED_DOT = -0.5
@@ -132,61 +132,48 @@ def _join_across_edges(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
     return sets.labels()
 
 
+def _spans(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
+    """(n,) int: label of the span that each face belongs to, ``NO_WALL`` for all other faces.
+
+    A span is material that touches nothing but sides of thin bodies, in two places or more: faces that go on into each
+    other across convex and smooth edges, whose concave edges and fillets lead to thin faces only. What shows behind it
+    is the far side of what it ends at, however steep or short it is.
+    """
+    sets = UnionFind(graph.n)
+    for link in graph.links:
+        if link.joins and not (graph.fillet[link.a] or graph.fillet[link.b]):
+            sets.union(link.a, link.b)
+    lump = sets.labels()
+    contacts: dict[int, list[tuple[bool, np.ndarray]]] = {}
+    for link in graph.links:
+        for f, g in ((link.a, link.b), (link.b, link.a)):
+            if graph.fillet[f] or lump[f] == lump[g]:
+                continue
+            beyond = [k.other(g) for k in graph.at[g]] if graph.fillet[g] else [g]
+            beyond = [h for h in beyond if not graph.fillet[h] and lump[h] != lump[f]]
+            contacts.setdefault(int(lump[f]), []).append((bool(thin[beyond].all()), link.nodes))
+    spans = [k for k, at in contacts.items() if all(thin_there for thin_there, _ in at)
+             and len(connected_runs([nodes for _, nodes in at])) >= 2]
+    return np.where(np.isin(lump, spans) & ~graph.fillet, lump, NO_WALL)
+
+
 def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Join bodies whose inward rays end on each other."""
+    """Join bodies whose inward rays end on each other; nothing joins a span but what is of it."""
     rows = np.flatnonzero(thin[graph.face])
     rows = rows[(graph.back[rows] >= 0) & (graph.back_dot[rows] < OPPOSED_DOT)]
     rows = rows[_side_like(graph)[graph.back[rows]]]
-    around = _neighbours(graph)
-    found: list[tuple[float, int, int, bool]] = []
+    span = _spans(graph, thin)
+    sets = UnionFind(graph.n)
     for label in np.unique(body[graph.face[rows]]):
         faces = thin & (body == label)
         of = rows[faces[graph.face[rows]]]
         near = of[graph.inward[of] <= BACKED_REACH * np.median(graph.inward[of])]
+        near = near[thin[graph.back[near]] & (span[graph.back[near]] == span[faces].max())]
+        seen = np.bincount(body[graph.back[near]], weights=graph.samples.area[near], minlength=graph.n)
         total = graph.samples.area[graph.face_rows(faces)].sum()
-        behind = graph.back[near]
-        joined = np.unique(np.concatenate([around[f] for f in np.flatnonzero(faces)])).astype(np.int64)
-        own = faces[behind] | (np.isin(behind, joined) & ~thin[behind])
-        seen = {int(facing): float(graph.samples.area[near[thin[behind] & (body[behind] == facing)]].sum())
-                for facing in np.unique(body[behind[thin[behind]]]) if facing != label}
-        best = max([*seen.values(), float(graph.samples.area[near[own]].sum())])
-        found += [(a, int(label), facing, a == best) for facing, a in seen.items() if a >= BACKED_SHARE * total]
-    return _join_backed(graph.n, found, _touching_bodies(graph, thin, body))[body]
-
-
-def _neighbours(graph: FaceGraph) -> list[list[int]]:
-    """Faces that each face goes on into across a convex or smooth edge."""
-    return [[k.other(f) for k in graph.at[f] if k.joins] for f in range(graph.n)]
-
-
-def _join_backed(n: int, found: list[tuple[float, int, int, bool]], touching: set[tuple[int, int]]) -> np.ndarray:
-    """Labels after joining bodies to what backs them: what backs most of a body first, the rest by area.
-
-    A short bar that meets a wall slantwise is seen through its end: some of its rays leave by the far side of the wall.
-    So a body does not join what backs less of it than another, or than it does itself, where it meets that in a
-    concave edge. Its thick faces count for itself: the top of a steep bar backs its underside.
-
-    found    : area seen (mm²), body, body behind it, whether neither another nor the body itself backs more
-    touching : pairs of bodies with a concave edge or a fillet between them
-    """
-    sets = UnionFind(n)
-    near: dict[int, set[int]] = {}
-    for a, b in touching:
-        near.setdefault(a, set()).add(b)
-    for _, a, b, most in sorted(found, key=lambda f: (not f[3], -f[0], f[1], f[2])):
-        if most or all(sets.find(x) != sets.find(b) for x in near.get(a, ())):
-            sets.union(a, b)
-    return sets.labels()
-
-
-def _touching_bodies(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> set[tuple[int, int]]:
-    """Pairs of thin bodies, both ways round, that meet in a concave edge or through a fillet."""
-    near = _concave_neighbours(graph, thin, body)
-    out = {(int(body[f]), g) for f in np.flatnonzero(thin) for g in near[f]}
-    for fillet in np.flatnonzero(graph.fillet):
-        bodies = {int(body[k.other(int(fillet))]) for k in graph.at[fillet] if thin[k.other(int(fillet))]}
-        out |= {(a, b) for a in bodies for b in bodies if a != b}
-    return out | {(b, a) for a, b in out}
+        for facing in np.flatnonzero(seen >= BACKED_SHARE * total):
+            sets.union(int(label), int(facing))
+    return sets.labels()[body]
 
 
 def _continue_across_junctions(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
