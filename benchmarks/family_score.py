@@ -25,6 +25,8 @@ from typing import Any
 
 CHORD = 0.004
 GAP_TOLERANCE = 0.02
+NARROW = 12.0
+"""mm; up to this the least gaps of neighbouring walls are drawn, wider ones come about past the ends of others."""
 NEAR = 0.1
 """mm; a truth side point belongs to the found wall whose side faces come this near."""
 SOURCES = {"make": ["examples"], "judge": ["examples", "geometry", "zones"]}
@@ -126,24 +128,27 @@ def match_walls(part: Any, found: Any, walls: list[dict[str, Any]], causes: list
 
 
 def compare_gaps(found: Any, place: dict[str, int], truth: dict[str, Any], causes: list[str]) -> list[int]:
-    """Right and total of the primary gaps."""
+    """Right and total of the primary gaps, then of those among them that are no wider than ``NARROW``."""
     measured: dict[tuple[int, ...], float] = {}
     for c in found.channels:
         pair = tuple(sorted(place[w] for w in c.walls))
         measured[pair] = min(c.gap_min, measured.get(pair, c.gap_min))
-    right = total = 0
+    out = [0, 0, 0, 0]
     for channel in truth["channels"]:
         if not channel["primary"]:
             continue
-        total += 1
         true, gap = channel["gap_min"], measured.get(tuple(sorted(channel["walls"])))
-        if gap is not None and abs(gap - true) <= GAP_TOLERANCE * true:
-            right += 1
-        else:
+        right = gap is not None and abs(gap - true) <= GAP_TOLERANCE * true
+        out[0] += right
+        out[1] += 1
+        if true <= NARROW:
+            out[2] += right
+            out[3] += 1
+        if not right:
             said = "not found" if gap is None else f"{gap:.4f}"
             where = "on the border" if channel["border"] else "inside"
             causes.append(f"gap of walls {channel['walls']} {said}, true {true:.4f} at {channel['at']} {where}")
-    return [right, total]
+    return out
 
 
 def compare_profiles(
@@ -229,7 +234,8 @@ def table(results: list[dict[str, Any]]) -> str:
     both = sum(r["walls"] and r["connections"] for r in judged)
     lines.append(f"{'both':24}{both:6} of {len(results)}")
     gaps = [r["gaps"] for r in judged]
-    lines.append(f"{'primary gaps':24}{sum(g[0] for g in gaps):6} of {sum(g[1] for g in gaps)}")
+    for name, k in (("primary gaps", 0), (f"  up to {NARROW:g} mm", 2)):
+        lines.append(f"{name:24}{sum(g[k] for g in gaps):6} of {sum(g[k + 1] for g in gaps)}")
     types: dict[str, list[int]] = {}
     for r in judged:
         for name, (right, total) in (r["profiles"] or {}).items():

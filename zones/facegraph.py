@@ -85,7 +85,10 @@ class UnionFind:
 
 
 def connected_runs(runs: list[np.ndarray]) -> list[list[int]]:
-    """Runs of mesh vertices that share one, as lists of indices."""
+    """Runs of mesh vertices that share one, as lists of indices.
+
+    runs : k arrays (m,) int, vertices of the mesh
+    """
     sets = UnionFind(len(runs))
     owner: dict[int, int] = {}
     for i, nodes in enumerate(runs):
