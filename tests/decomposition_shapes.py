@@ -153,6 +153,18 @@ def steeper() -> Shape:
     return plate().union(box(50, 1.2, 16, 0, -1.2, 3)).union(box(50, 1.2, 16, 0, 1.5, 3)).union(bar)
 
 
+def both_sides() -> Shape:
+    """A plate with two walls above, two in line with them below, and a bar on each side."""
+    above = box(50, 2, 14, 0, -10, 3).union(box(50, 2, 14, 0, 0, 3)).union(box(3, 9, 3, 10, -9, 9))
+    return plate().union(above).union(above.mirror("XY").translate((0, 0, 3)))
+
+
+def far_leaning() -> Shape:
+    """Two walls that lean 40 degrees."""
+    one = outline("YZ", [(-10, 3), (-7.4, 3), (4.3, 17), (1.7, 17)], 50, (0, 0, 0))
+    return plate(60, 60).union(one).union(one.translate((0, 12, 0)))
+
+
 def at_corners() -> Shape:
     """Two leaning walls and two bars, one over the other, that end round the corners at the ends of the walls."""
     walls = [outline("YZ", [(y, 3), (y + 2, 3), (y + 4, 17), (y + 2, 17)], 50, (0, 0, 0)) for y in (-13, 0)]
@@ -179,6 +191,8 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
         "XY", SLENDER_FORK, 2.2, (0, 0, 9))).union(rod((15.5, 1.5, 0), (15.5, 1.5, 22), 4)), (3, 1, 2)),
     "short bar aslant between walls": (aslant, (2, 1, 1)),
     "short steep bar between walls": (steep, (2, 1, 1)),
+    "walls above and below a plate": (both_sides, (4, 2, 2)),
+    "walls that lean 40 degrees": (far_leaning, (2, 0, 1)),
     "short bar steeper than that": (steeper, (2, 1, 1)),
     "bars round the corners of leaning walls": (at_corners, (2, 2, 1)),
     "slab": (lambda: pair().union(box(30, 9, 1.5, 10, -9, 8)), (2, 1, 1)),

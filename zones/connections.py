@@ -88,6 +88,7 @@ def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
     floating = {x for x in np.unique(body).tolist() if x != NO_WALL and x not in base}
     void = {x: _void_points(graph, body, x) for x in floating}
     floors = {x for x in floating - thin if len(void[x]) == 0 and _looks_up(graph, body == x)}
+    floors |= {x for x in floating - thin if _carries(borders, x, thin) and not _ends(graph, [x], borders, thin)}
     base, floating = base | floors, floating - floors
     bridging = set()
     for x in sorted(floating):
@@ -187,6 +188,13 @@ def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
         if counts.sum() >= 0.1 * (mine == wall).sum():
             out |= {int(x) for x, c in zip(labels, counts, strict=True) if c >= 0.5 * counts.sum()}
     return out - set(sheets.labels)
+
+
+def _carries(borders: list[Border], x: int, thin: set[int]) -> bool:
+    """Whether a thin body stands on a body: their border shows the upper side of that body."""
+    sides = [own for b in borders for own, mine, other in ((b.na, b.a, b.b), (b.nb, b.b, b.a))
+             if mine == x and other in thin]
+    return any(float(np.nan_to_num(own[:, 2]).mean()) > STEEP_NZ for own in sides)
 
 
 def _void_rows(graph: FaceGraph, body: np.ndarray, x: int) -> np.ndarray:

@@ -20,6 +20,8 @@ from zones.walls import SEAT, Sheets, find_sheets
 # Part of its side area that must be steep for a thin body to be a wall: the blades of an inducer twist from upright
 # at the hub to lying at the tip, so most of their area may be less steep.
 STEEP_SHARE = 0.25
+LEAN_NZ = 0.70710678
+"""Sides lean up to 45 degrees, the same limit that parts waterlines from projected passes."""
 
 
 def decompose(part: Part) -> Decomposition:
@@ -38,7 +40,8 @@ def decompose(part: Part) -> Decomposition:
     sheets = find_sheets(graph)
     bridges = find_bridges(graph, sheets)
     bridging = {x for group in bridges.connections for x in group}
-    wall_labels = [x for x in sheets.labels if x not in bridging and _stands(graph, sheets, bridges, x)]
+    standing = [x for x in sheets.labels if x not in bridging and _stands(graph, bridges, x)]
+    wall_labels = [x for x in standing if _is_upright(graph, sheets, x)]
     wall_labels.sort(key=lambda x: _place(graph, np.flatnonzero(bridges.body == x)))
     walls = tuple(_wall(graph, sheets, bridges.body, x, f"W{i}") for i, x in enumerate(wall_labels, 1))
     name = {x: w.id for x, w in zip(wall_labels, walls, strict=True)}
@@ -52,15 +55,19 @@ def decompose(part: Part) -> Decomposition:
         for i, f in enumerate(find_facings(graph, sides, left_out), 1))
     roles = _roles(graph, bridges, set(wall_labels), set(connection_faces))
     seat = tuple(int(f) + 1 for f in np.flatnonzero(graph.seat))
-    return Decomposition(walls, connections, channels, roles, seat, _warnings(graph, walls))
+    lying = np.flatnonzero(np.isin(bridges.body, [x for x in standing if x not in wall_labels]))
+    return Decomposition(walls, connections, channels, roles, seat, _warnings(graph, walls, lying))
 
 
-def _stands(graph: FaceGraph, sheets: Sheets, bridges: Bridges, label: int) -> bool:
-    """Whether a thin body holds enough steep area and stands on the base, the seat, or a floor."""
+def _is_upright(graph: FaceGraph, sheets: Sheets, label: int) -> bool:
+    """Whether a thin body holds enough steep area to be a wall."""
     sides = sheets.sides(label)
-    steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= STEEP_NZ)[sides]
-    if (graph.area[sides] * steep).sum() < STEEP_SHARE * graph.area[sides].sum():
-        return False
+    steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= LEAN_NZ)[sides]
+    return bool((graph.area[sides] * steep).sum() >= STEEP_SHARE * graph.area[sides].sum())
+
+
+def _stands(graph: FaceGraph, bridges: Bridges, label: int) -> bool:
+    """Whether a thin body stands on the base, the seat, or a floor."""
     for link in graph.links:
         for f, g in ((link.a, link.b), (link.b, link.a)):
             if bridges.body[f] == label and (graph.seat[g] or int(bridges.body[g]) in bridges.base):
@@ -156,8 +163,12 @@ def _roles(graph: FaceGraph, bridges: Bridges, walls: set[int], connections: set
     return out
 
 
-def _warnings(graph: FaceGraph, walls: tuple[Wall, ...]) -> tuple[str, ...]:
+def _warnings(graph: FaceGraph, walls: tuple[Wall, ...], lying: np.ndarray) -> tuple[str, ...]:
+    """Sentences for the report; lying: (k,) int, 0-based faces of thin bodies that lean too far to be walls."""
     out = []
+    if len(lying):
+        names = ", ".join(f"F{f + 1}" for f in lying[:10])
+        out.append(f"thin material that leans more than 45 degrees is no wall but free surface: {names}")
     slivers = [f"F{f + 1}" for f in np.flatnonzero(graph.sliver)]
     if slivers:
         out.append(f"{len(slivers)} sliver faces take no part in the search for walls: {', '.join(slivers[:10])}")

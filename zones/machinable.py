@@ -30,19 +30,21 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
                      excluded: set[int], directions: ArrayLike = UP) -> set[int]:
     """Numbers of the faces of the machinable area Ma.
 
-    By default every face of which some access direction sees at least ``SEEN_SHARE``, without the seat; else the
-    faces asked for. The share keeps the answer from hanging on one facet of rounding at the rim of an underside.
+    By default every face of which some access direction sees at least ``SEEN_SHARE``; the seat only if an access
+    looks at it from within 45 degrees, for then the part lies turned over. Else the faces asked for. The share keeps
+    the answer from hanging on one facet of rounding at the rim of an underside.
 
     samples    : of all faces, in the frame of the directions
     directions : (d, 3) float64, unit, from the tool tip to the spindle
     """
     total = np.bincount(samples.face, weights=samples.area)
+    least = np.where(np.isin(samples.face, list(decomposition.seat)), STEEP, SEEN)
     chosen: set[int] = set()
     for direction in np.asarray(directions, dtype=np.float64):
-        seen = samples.area * (samples.normals @ direction > SEEN)
+        seen = samples.area * (samples.normals @ direction > least)
         part = np.bincount(samples.face, weights=seen, minlength=len(total))
         chosen |= {int(f) for f in np.flatnonzero((part > 0) & (part >= SEEN_SHARE * total))}
-    return (chosen - set(decomposition.seat) if wanted is None else set(wanted)) - excluded
+    return (chosen if wanted is None else set(wanted)) - excluded
 
 
 def forms_of(normals: F64) -> NDArray[np.object_]:
