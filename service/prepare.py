@@ -177,7 +177,20 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
         progress("zones", 0.14 + 0.08 * (k + 1) / len(rotations))
     zoning = build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels))
     progress("zones", 0.25)
-    return Prepared(setup, part, tuple(views), decomposition, zoning, lift, (*part.warnings, *decomposition.warnings))
+    warnings = (*part.warnings, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
+    return Prepared(setup, part, tuple(views), decomposition, zoning, lift, warnings)
+
+
+def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tuple[str, ...]:
+    """A sentence where the first access, which walls are found along, shows none but another one does."""
+    if decomposition.walls:
+        return ()
+    for access in setup.access[1:]:
+        count = len(decompose(turned(part, access_rotation(access.direction))).walls)
+        if count:
+            return (f"walls are found along the first access, {setup.access[0].id}, and none stands along it; along "
+                    f"{access.id} {count} do: name {access.id} first",)
+    return ()
 
 
 def _view(setup: Setup, k: int, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,

@@ -72,3 +72,15 @@ def test_a_program_is_proved_along_its_own_access(frame: Path, job: tuple[Path, 
     text = (out / "program.A2.linuxcnc.ngc").read_text()
     assert chain.verify_program(frame, setup, text, quiet, "A2")["findings"] == []
     assert chain.verify_program(frame, setup, text, quiet, "A1")["findings"] != []
+
+
+def test_a_first_access_along_which_no_wall_stands_is_said(tmp_path: Path) -> None:
+    part = cq.Workplane().box(30, 20, 3).union(cq.Workplane().box(26, 2, 12).translate((0, 0, 7)))
+    path = tmp_path / "wall.step"
+    cq.exporters.export(part, str(path))
+    askew, upright = {"id": "A1", "direction": [0, 0.8, 0.6]}, {"id": "A2", "direction": [0, 0, 1]}
+    for order, said in (([askew, upright], True), ([upright | {"id": "A1"}, askew | {"id": "A2"}], False)):
+        order[1] = order[1] | {"work_offset": "G55"}
+        report = chain.zones_only(path, parse_setup(json.dumps(SETUP | {"access": order})), quiet)
+        assert any("name A2 first" in w for w in report["part"]["warnings"]) == said
+        assert bool(report["walls"]) != said
