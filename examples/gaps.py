@@ -39,6 +39,9 @@ STARTS = 4
 """Places on a free wall where the search for the shortest ray begins; one at each height, for it may end at a hub."""
 BORDER_PLACES = 161
 """Places on each border of a side from which, and to which, rays are looked for first."""
+EDGE = 1e-9
+BACKWARDS = 1e-6
+"""mm; a ray found backwards may meet a side that much before the border it was found from."""
 LID_SKIN = 0.01
 """mm; tops and ends stop a ray only when that far before its end, and its own wall's that far behind its beginning."""
 SKIN = 1e-3
@@ -100,7 +103,8 @@ def _facing(
     u, v = (g.ravel() for g in grid)
     origin, first, reach = _cast(walls, i, side, u, v, blocked)
     du, dv = walls[i].side_derivatives(side, u, v)
-    weight = (1.0 - low) * np.linalg.norm(np.cross(du, dv), axis=1) / ((n_u - 1) * (n_v - 1))
+    share = np.outer(*(np.where(np.isin(np.arange(n), (0, n - 1)), 0.5, 1.0) / (n - 1) for n in (n_u, n_v)))
+    weight = (1.0 - low) * np.linalg.norm(np.cross(du, dv), axis=1) * share.ravel()
     out = []
     near = {i, *np.unique(first[np.isfinite(reach)]).tolist()} if walls[i].sees_itself else None
     for j in np.unique(first[np.isfinite(reach)]):
@@ -218,8 +222,9 @@ def _on_borders(
             good &= s < gap
             rows = np.flatnonzero(good)
             if len(rows):
-                _, seen, far = _cast(walls, i, side, u[rows], v[rows], None, 1.2 * gap + 1.0, near)
-                good[rows] = (seen == j) | (far >= s[rows] - 1e-6)
+                _, far, _ = _met(walls, i, start[rows], normal[rows], 1.2 * gap + 1.0, near)
+                good[rows] = far >= s[rows] - BACKWARDS
+                good[rows] &= ~_stopped(walls, i, start[rows], normal[rows], s[rows], 1.2 * gap + 1.0, near)
                 if blocked is not None:
                     good[rows] &= ~blocked(start[rows], start[rows] + 0.999 * s[rows, None] * normal[rows])
             length[near_enough] = np.where(good, s, np.inf)
@@ -303,26 +308,45 @@ def _cast(
     among    : walls that are looked at, all when None
     """
     origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
-    distance = np.full((len(walls), len(u)), np.inf)
+    first, reach, facing = _met(walls, i, origin, normal, farthest, among)
+    reach = np.where(facing, reach, np.inf)
+    hit = np.flatnonzero(np.isfinite(reach))
+    if walls[i].sees_itself and len(hit):
+        stopped = _stopped(walls, i, origin[hit], normal[hit], reach[hit], farthest, among)
+        reach[hit[stopped]] = np.inf
+        hit = hit[~stopped]
+    if blocked is not None and len(hit):
+        reach[hit[blocked(origin[hit], origin[hit] + normal[hit] * reach[hit, None])]] = np.inf
+    return origin, first, reach
+
+
+def _met(walls: Sequence[WallSpec], i: int, origin: F64, normal: F64, farthest: float, among: set[int] | None,
+         ) -> tuple[np.ndarray, F64, np.ndarray]:
+    """The wall whose side rays meet first, how far that is (inf: none) and whether that side faces them."""
+    distance = np.full((len(walls), len(origin)), np.inf)
+    faces = np.zeros((len(walls), len(origin)), bool)
     for j, other in enumerate(walls):
         if (j != i or other.sees_itself) and (among is None or j in among):
             if other.sees_itself and _apart(origin, other) > farthest:
                 continue
-            for facing in (LEFT, RIGHT):
-                distance[j] = np.minimum(distance[j], _ray_to_side(origin, normal, other, facing))
-    first = np.argmin(distance, axis=0)
-    reach = distance[first, np.arange(len(u))]
-    hit = np.flatnonzero(np.isfinite(reach))
-    for k, wall in enumerate(walls) if walls[i].sees_itself else ():
-        if len(hit) and (among is None or k in among or _apart(origin[hit], wall) <= farthest):
-            lid = _lid(wall)
-            least = LID_SKIN if k == i else 1e-9
-            met = _first_triangle(origin[hit], normal[hit], lid, least, reach[hit] - LID_SKIN)
-            reach[hit[met]] = np.inf
-            hit = hit[~met]
-    if blocked is not None and len(hit):
-        reach[hit[blocked(origin[hit], origin[hit] + normal[hit] * reach[hit, None])]] = np.inf
-    return origin, first, reach
+            for side in (LEFT, RIGHT):
+                s, facing = _ray_to_side(origin, normal, other, side)
+                faces[j] = np.where(s < distance[j], facing, faces[j])
+                distance[j] = np.minimum(distance[j], s)
+    first, column = np.argmin(distance, axis=0), np.arange(len(origin))
+    return first, distance[first, column], faces[first, column]
+
+
+def _stopped(walls: Sequence[WallSpec], i: int, origin: F64, normal: F64, reach: F64, farthest: float,
+             among: set[int] | None) -> np.ndarray:
+    """(n,) bool: whether rays from a side of wall i, ``reach`` mm long, meet the top or an end of a wall before."""
+    out = np.zeros(len(origin), bool)
+    for k, wall in enumerate(walls):
+        rows = np.flatnonzero(~out)
+        if len(rows) and (among is None or k in among or _apart(origin[rows], wall) <= farthest):
+            out[rows] = _first_triangle(origin[rows], normal[rows], _lid(wall), LID_SKIN if k == i else 1e-9,
+                                        reach[rows] - LID_SKIN)
+    return out
 
 
 @lru_cache(maxsize=256)
@@ -361,11 +385,11 @@ def _first_triangle(p: F64, d: F64, triangles: F64, least: float, most: F64) -> 
                 continue
             wx, wy, wz = p[i, 0] - a[0], p[i, 1] - a[1], p[i, 2] - a[2]
             f = (wx * hx + wy * hy + wz * hz) / det
-            if f < 0.0 or f > 1.0:
+            if f < -EDGE or f > 1.0 + EDGE:  # a ray along the floor meets the lower edge of an end
                 continue
             qx, qy, qz = wy * e1z - wz * e1y, wz * e1x - wx * e1z, wx * e1y - wy * e1x
             g = (d[i, 0] * qx + d[i, 1] * qy + d[i, 2] * qz) / det
-            if g < 0.0 or f + g > 1.0:
+            if g < -EDGE or f + g > 1.0 + EDGE:
                 continue
             s = (e2x * qx + e2y * qy + e2z * qz) / det
             if least < s < most[i]:
@@ -381,8 +405,11 @@ def _apart(origin: F64, wall: WallSpec) -> float:
     return float(np.hypot(*np.maximum(0.0, np.maximum([x0, y0] - high, low - [x1, y1]))))
 
 
-def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
-    """Distance along rays to one side of a wall; inf where the ray misses it or comes from behind."""
+def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> tuple[F64, np.ndarray]:
+    """Distance along rays to one side of a wall, inf where the ray misses it, and whether the side faces the ray.
+
+    A ray that only grazes a side ends there all the same.
+    """
     grid = np.linspace(0.0, 1.0, wall.segments + 1)
     s, u = np.full(len(origin), np.inf), np.zeros(len(origin))
     levels = np.round(origin[:, 2], 6)
@@ -396,11 +423,10 @@ def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> F64:
             trace = wall.side_point(side, grid, np.full(len(grid), share))[:, :2]
             s[rows], u[rows] = _plan_hit(origin[rows, :2], normal[rows, :2], trace)
     rows = np.flatnonzero(np.isfinite(s))
-    if not len(rows):
-        return s
-    out = np.full(len(origin), np.inf)
-    out[rows] = _refine(origin[rows], normal[rows], wall, side, s[rows], u[rows])
-    return out
+    out, facing = np.full(len(origin), np.inf), np.zeros(len(origin), bool)
+    if len(rows):
+        out[rows], facing[rows] = _refine(origin[rows], normal[rows], wall, side, s[rows], u[rows])
+    return out, facing
 
 
 def _plan_hit(p: F64, d: F64, line: F64) -> tuple[F64, F64]:
@@ -440,7 +466,7 @@ def _first_crossing(p: F64, d: F64, line: F64, side: int, skin: float) -> tuple[
     return far, at
 
 
-def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64) -> F64:
+def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64) -> tuple[F64, np.ndarray]:
     v = (origin[:, 2] - wall.z_floor) / wall.height
     for _ in range(12):
         u = np.mod(u, 1.0) if wall.closed else u
@@ -453,5 +479,6 @@ def _refine(origin: F64, normal: F64, wall: WallSpec, side: int, s: F64, u: F64)
             break
     missed = np.linalg.norm(r, axis=1) > 1e-7
     outside = (u < -1e-9) | (u > 1 + 1e-9) | (v < -1e-9) | (v > 1 + 1e-9)
-    facing = (wall.side_normal(side, np.clip(u, 0, 1), v) * normal).sum(axis=1) < wall.facing_dot
-    return np.where(missed | outside | ~facing | (s <= (SKIN if wall.sees_itself else 0)), np.inf, s)
+    dot = (wall.side_normal(side, np.clip(u, 0, 1), v) * normal).sum(axis=1)
+    missed |= outside | (dot >= 0.0) | (s <= (SKIN if wall.sees_itself else 0))
+    return np.where(missed, np.inf, s), dot < wall.facing_dot

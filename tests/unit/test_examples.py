@@ -276,6 +276,19 @@ def test_gap_of_nested_rings_and_of_a_ring_with_itself():
     assert found[1, 1] == pytest.approx(2 * np.hypot(*inner.side_curve(LEFT).T).min(), abs=1e-2)
 
 
+def test_a_wall_that_rays_only_graze_stops_them():
+    def straight(a: tuple[float, float], b: tuple[float, float]) -> FreeWall:
+        line = Profile(None, np.linspace(a, b, 10))
+        return FreeWall("straight", line.control, 4.0, 10.0, (2.0, 2.0), profile=line)
+
+    pair = [straight((-15, 0), (15, 0)), straight((-15, 18), (15, 18))]
+    across = straight((-1, 4), (2, 14))
+    free, shaded = (channels(walls, n_u=601, n_v=3)[0] for walls in (pair, [*pair, across]))
+    shadow = np.ptp(np.concatenate([across.side_curve(s)[:, 0] for s in (LEFT, RIGHT)]))
+    assert free.walls == shaded.walls == (0, 1)
+    assert free.area - shaded.area == pytest.approx(2 * 10.0 * shadow, rel=0.03)
+
+
 @pytest.mark.parametrize("options", [{}, {"strips": 4}, {"merged": True}])
 def test_free_walls_are_valid_whatever_their_faces(options):
     profile = draw_open(np.random.default_rng(1), "C2", 45.0)
