@@ -1,7 +1,9 @@
 """Whether reach is right: every sample of a part asked of ``zones.reach`` and of a dense cloud of points.
 
-Run from the root of the checkout: ``python benchmarks/brute_samples.py [RECIPE:SEED ...] [--json FILE]``. Without names
-30 parts of the family are taken. The brute force shares nothing with the planner but the reader of STEP files:
+Run from the root of the checkout: ``python benchmarks/brute_samples.py [RECIPE:SEED ...] [--json FILE]``, or with
+``PART.step:SETUP.json`` for a name. Without names 30 parts of the family are taken. Reach is asked with the normals the
+planner gives its samples; the brute force has its own, those of the CAD faces at the foot of each sample, and shares
+nothing with the planner but the reader of STEP files. So a normal of the planner that keeps a tool out counts as wrong:
 
 1. The surface becomes a *cloud*: on every triangle rows along its longest edge, ``SPACING`` apart along a row and 0.7
    of that between rows, and points ``SPACING`` apart along sharp edges. No point of the mesh is farther than
@@ -46,7 +48,7 @@ import numpy as np  # noqa: E402
 from numba import njit, prange  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from benchmarks.brute_reach import machinable, scattered  # noqa: E402
+from benchmarks.brute_reach import kernel_normals, machinable, scattered  # noqa: E402
 
 F64 = NDArray[np.float64]
 BOOL = NDArray[np.bool_]
@@ -366,6 +368,14 @@ def compare(cloud: Cloud, solid: Solid, said: dict[str, BOOL], points: F64, norm
     return out
 
 
+def planned_normals(mesh: Any, points: F64, triangles: NDArray[np.int64]) -> F64:
+    """Normals (n, 3) the planner would give points (n, 3) mm on (n,) triangles."""
+    from geometry.sampling import SurfaceSamples, with_surface_normals
+
+    here = SurfaceSamples(points, mesh.normals[triangles], np.ones(len(points)), mesh.face_ids[triangles], triangles)
+    return with_surface_normals(here, mesh).normals
+
+
 def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, normals: F64, lift: float,
                   allowance: float, cusp: float) -> dict[str, BOOL]:
     """What ``zones.reach.touchable`` says of samples (n, 3) mm, with and without its play."""
@@ -392,13 +402,15 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     part = load(path, setup)
     quality = setup.quality
     lift = max(0.1 * quality.scallop_height_mm, 1.5 * part.chord)
-    points, normals = scattered(part.mesh, machinable(part.mesh), count)
+    points, triangles = scattered(part.mesh, machinable(part.mesh), count)
+    normals = kernel_normals(part, path, setup)(points, triangles)
+    planned = planned_normals(part.mesh, points, triangles)
     tree, cloud, clear = TriangleTree(part.mesh), cloud_of(part.mesh), clearances(setup)
     out: dict[str, Any] = {"lift_mm": lift, "band_mm": band_of(lift),
                            "cloud": len(cloud.points), "tools": {}, "places": []}
     union = {k: np.zeros(len(points), bool) for k in ("said", "played", "yes", "fair")}
     for tool in tool_bodies(setup):
-        said = said_by_reach(tree, part, tool, clear, points, normals, lift, 0.0, quality.scallop_height_mm)
+        said = said_by_reach(tree, part, tool, clear, points, planned, lift, 0.0, quality.scallop_height_mm)
         solid = solid_of(tool, clear)
         found = compare(cloud, solid, said, points, normals, lift, quality.scallop_height_mm)
         out["tools"][tool.id] = {k: float(found[k].mean()) for k in COLUMNS}
@@ -435,10 +447,11 @@ def main() -> None:
     print("| part | " + " | ".join(head) + " | s |\n|" + "---|" * (len(head) + 2), flush=True)
     every = {}
     for name in args.parts:
-        recipe, seed = name.split(":")
+        first, second = name.split(":")
         began = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
-            step, _, setup = make_part(int(seed), recipe).write(folder)
+            made = not second.endswith(".json")
+            step, setup = make_part(int(second), first).write(folder)[::2] if made else (Path(first), Path(second))
             every[name] = examine(step, setup, args.samples)
         print(row_of(name, every[name], time.perf_counter() - began), flush=True)
         if args.json is not None:

@@ -154,7 +154,9 @@ def shuffled(part: Any, seed: int) -> Any:
     order = rng.permutation(len(part.mesh.faces))
     ids = np.array([new[i] for i in part.mesh.face_ids.tolist()], np.int32)
     uv = None if part.uv is None else part.uv[order]
-    mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[order], ids[order])
+    corners = part.mesh.corner_normals
+    mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[order], ids[order],
+                        None if corners is None else corners[order])
     return replace(part, faces=faces, edges=tuple(edges[i] for i in rng.permutation(len(edges))), mesh=mesh, uv=uv)
 
 

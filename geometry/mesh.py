@@ -20,11 +20,14 @@ class TriangleMesh:
     faces    : (m, 3) int32, indices into ``vertices``, counter-clockwise seen from outside
     face_ids : (m,) int32, number of the B-rep face of each triangle, 1-based (face ``F12`` is 12);
                zeros where the mesh has no B-rep
+    corner_normals : (m, 3, 3) float64, unit outward normals of the exact surface at the corners of every triangle, on
+               its own face; NaN where the surface has none. None for a mesh without B-rep
     """
 
     vertices: F64
     faces: I32
     face_ids: I32 = field(default=None)  # type: ignore[assignment,arg-type]
+    corner_normals: F64 | None = None
 
     def __post_init__(self) -> None:
         v = np.ascontiguousarray(self.vertices, dtype=np.float64)
@@ -38,6 +41,10 @@ class TriangleMesh:
         ids = np.zeros(len(f), np.int32) if self.face_ids is None else np.ascontiguousarray(self.face_ids, np.int32)
         if ids.shape != (len(f),):
             raise ValueError(f"face_ids must have shape ({len(f)},), got {ids.shape}")
+        corners = None if self.corner_normals is None else np.ascontiguousarray(self.corner_normals, np.float64)
+        if corners is not None and corners.shape != (len(f), 3, 3):
+            raise ValueError(f"corner_normals must have shape ({len(f)}, 3, 3), got {corners.shape}")
+        object.__setattr__(self, "corner_normals", corners)
         object.__setattr__(self, "vertices", v)
         object.__setattr__(self, "faces", f)
         object.__setattr__(self, "face_ids", ids)
@@ -77,4 +84,5 @@ class TriangleMesh:
     def transformed(self, matrix: F64) -> TriangleMesh:
         """The mesh moved by a rigid (4, 4) matrix."""
         m = np.asarray(matrix, dtype=np.float64)
-        return TriangleMesh(self.vertices @ m[:3, :3].T + m[:3, 3], self.faces, self.face_ids)
+        normals = None if self.corner_normals is None else self.corner_normals @ m[:3, :3].T
+        return TriangleMesh(self.vertices @ m[:3, :3].T + m[:3, 3], self.faces, self.face_ids, normals)

@@ -76,7 +76,8 @@ class EdgeInfo:
 class Part:
     """A solid, ready to plan, in the setup frame (Z up, mm).
 
-    mesh      : TriangleMesh, chord within ``chord`` and angle within ``angle`` of the exact surface
+    mesh      : TriangleMesh, chord within ``chord`` and angle within ``angle`` of the exact surface, with the normals
+                of that surface at the corners
     faces     : FaceInfo per face, numbers 1..n in order
     edges     : EdgeInfo
     volume    : mm³ of the exact solid
@@ -115,11 +116,12 @@ class Part:
         }
         sizes = np.array([len(e.points) for e in self.edges], dtype=np.int64)
         points: NDArray[np.float64] = np.concatenate([e.points for e in self.edges]) if self.edges else np.zeros((0, 3))
-        uv: dict[str, Any] = {} if self.uv is None else {"uv": self.uv}
+        optional: dict[str, Any] = {"uv": self.uv, "corner_normals": self.mesh.corner_normals}
+        optional = {name: values for name, values in optional.items() if values is not None}
         out = io.BytesIO()
         np.savez(out, vertices=self.mesh.vertices, triangles=self.mesh.faces, face_ids=self.mesh.face_ids,
                  bounds=self.bounds, edge_sizes=sizes, edge_points=points,
-                 meta=np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8), **uv)
+                 meta=np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8), **optional)
         return out.getvalue()
 
     @classmethod
@@ -133,7 +135,8 @@ class Part:
                 EdgeInfo(tuple(e["faces"]), EdgeKind(e["kind"]), e["length"], e["angle"], pts[cuts[i]:cuts[i + 1]])
                 for i, e in enumerate(meta["edges"])
             )
-            mesh = TriangleMesh(z["vertices"], z["triangles"], z["face_ids"])
+            mesh = TriangleMesh(z["vertices"], z["triangles"], z["face_ids"],
+                                z["corner_normals"] if "corner_normals" in z else None)
             bounds = z["bounds"]
             uv = z["uv"] if "uv" in z else None
         return cls(mesh, tuple(FaceInfo(**f) for f in meta["faces"]), edges, meta["volume"], bounds, meta["unit"],

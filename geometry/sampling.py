@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.mesh import F64, I32, TriangleMesh
+
+# Normals of facet and surface that differ by more (cosine): the facet is a sliver or folded, the surface singular.
+BELIEVED_DOT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +107,41 @@ def sample_borders(mesh: TriangleMesh, spacing: float, inset: float, triangles: 
     points = on + inward * np.minimum(inset / np.maximum(length, 1e-12), 0.3)
     return SurfaceSamples(np.ascontiguousarray(points), np.ascontiguousarray(mesh.normals[tri[row]]),
                           np.zeros(len(row)), mesh.face_ids[tri[row]], tri[row].astype(np.int32))
+
+
+def with_surface_normals(samples: SurfaceSamples, mesh: TriangleMesh) -> SurfaceSamples:
+    """The same samples with the normals of the exact surface instead of those of their facets.
+
+    samples : SurfaceSamples of ``mesh``; their places stay on the facets, which are what a tool is held against
+    mesh    : TriangleMesh; without corner normals the samples come back as they are
+
+    Returns
+    -------
+    SurfaceSamples
+        The normals at the three corners, weighted by how near the sample is to each. Error: second order in the size of
+        the facet, and on arcs third; a facet's own normal is off by half the turn across it. The facet's normal stays
+        where a corner has none, or the two differ by more than 60 degrees: such a facet is no picture of the surface.
+    """
+    if mesh.corner_normals is None or not len(samples):
+        return samples
+    t = mesh.triangles[samples.triangle]
+    share = _barycentric(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0], samples.points - t[:, 0])
+    normals = np.einsum("ij,ijk->ik", share, mesh.corner_normals[samples.triangle])
+    length = np.linalg.norm(normals, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normals /= length[:, None]
+        good = np.einsum("ij,ij->i", normals, samples.normals) > BELIEVED_DOT
+    return replace(samples, normals=np.ascontiguousarray(np.where(good[:, None], normals, samples.normals)))
+
+
+def _barycentric(u: F64, v: F64, w: F64) -> F64:
+    """Shares (n, 3) of the corners a, a + u, a + v of triangles in the points a + w, not below 0; all (n, 3)."""
+    uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
+    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    det = np.maximum(uu * vv - uv * uv, 1e-300)
+    second = np.clip((wu * vv - wv * uv) / det, 0.0, 1.0)
+    third = np.clip((wv * uu - wu * uv) / det, 0.0, 1.0 - second)
+    return np.stack([1.0 - second - third, second, third], axis=1)
 
 
 def joined(parts: list[SurfaceSamples]) -> SurfaceSamples:

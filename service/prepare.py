@@ -14,7 +14,7 @@ from geometry.errors import SetupError
 from geometry.frames import Placement
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
-from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface
+from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
 from geometry.step import read_part
 from geometry.toolbody import ToolBody
 from geometry.trim import FacePatch
@@ -219,7 +219,8 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
     """What zones are built of and passes are measured at.
 
     Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
-    every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them.
+    every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them. Normals are those
+    of the exact surface: beside those of facets a tool would stand so far aside that it does not fit into a round.
 
     directions : (d, 3) float64, unit, of the accesses, in the frame of the part
     """
@@ -233,7 +234,7 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
         density = max(PLANNING_DENSITY * thin, min(LEAST_SAMPLES / max(area, 1e-9), MOST_DENSITY))
         sets.append(sample_surface(part.mesh, density, seed=int(face), triangles=mine))
     sets.append(sample_borders(part.mesh, BORDER_SPACING, BORDER_INSET, triangles))
-    return joined(sets)
+    return with_surface_normals(joined(sets), part.mesh)
 
 
 def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> np.ndarray:

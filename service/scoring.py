@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.keyed import KeyedPoints
-from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.prepare import Prepared, machinable_triangles
 from toolpath.plan import Checks, Plan
 from zones.machinable import forms_of
@@ -80,7 +80,8 @@ def score(ready: Prepared) -> Score:
     first = ready.views[0]
     directions = np.array([v.direction @ first.rotation.T for v in ready.views])
     triangles = machinable_triangles(first.part, ready.decomposition, ready.setup, directions)
-    dense = sample_surface(first.part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles)
+    mesh = first.part.mesh
+    dense = with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
     zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))
     own = first.label(dense)
     for view in ready.views:

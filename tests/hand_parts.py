@@ -110,6 +110,39 @@ def dome(radius: float = 15.0, size: float = 12.0, n: int = 60) -> TriangleMesh:
     return slope_field(lambda x, y: np.sqrt(radius**2 - x**2 - y**2) - radius, size, n)
 
 
+def bent_strip(radius: float, chord: float, *, hollow: bool = True, upright: bool = True, length: float = 3.0,
+               span: float = math.pi / 2, seed: int = 0) -> TriangleMesh:
+    """A strip of a cylinder round the axis through the origin, with the exact normals at its corners; face 1.
+
+    hollow  : the material is outside, else inside
+    upright : axis along z, strip from z = 0 up and symmetric to x; else axis along x and the strip below (hollow) or
+              above it (not), symmetric to z
+    chord   : mm, no facet is farther off; the facets are of uneven width
+    """
+    rng = np.random.default_rng(seed)
+    widest = 2.0 * math.acos(1.0 - chord / radius)
+    share = np.cumsum(np.concatenate([[0.0], rng.uniform(0.5, 1.0, max(2, math.ceil(1.4 * span / widest)))]))
+    angle = span * (share / share[-1] - 0.5)
+    assert np.diff(angle).max() <= widest
+    way = np.stack([np.cos(angle), np.sin(angle)], 1)
+    n, out = len(angle), np.zeros((2, len(angle), 3))
+    normal = out.copy()
+    if upright:
+        out[..., :2], out[1, :, 2] = radius * way, length
+        normal[..., :2] = -way if hollow else way
+    else:
+        down = np.stack([way[:, 1], -way[:, 0] if hollow else way[:, 0]], 1)
+        out[..., 1:], out[1, :, 0] = radius * down, length
+        normal[..., 1:] = -down if hollow else down
+    k = np.arange(n - 1)
+    faces = np.concatenate([np.stack([k, k + 1, n + k + 1], 1), np.stack([k, n + k + 1, n + k], 1)])
+    corners = normal.reshape(-1, 3)[faces]
+    mesh = TriangleMesh(out.reshape(-1, 3), faces, np.ones(len(faces), np.int32), corners)
+    against = np.einsum("ij,ij->i", mesh.normals, corners.mean(axis=1)) < 0
+    faces[against] = faces[against][:, ::-1]
+    return TriangleMesh(mesh.vertices, faces, mesh.face_ids, normal.reshape(-1, 3)[faces])
+
+
 def ball(diameter: float = 4.0, id: str = "T1", **changes) -> ToolBody:
     """A ball-end tool with a thin neck and a shank that reaches nothing, unless told otherwise."""
     return tool(diameter, diameter / 2, id, **changes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -22,6 +22,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.occ.deviation import face_deviations, node_gaps
 from geometry.occ.holes import extend_parameters, fill_slivers
 from geometry.occ.mending import mend_faces
+from geometry.occ.normals import corner_normals
 from geometry.occ.topology import Shape, faces_of
 from geometry.occ.triangulating import FaceMesh, triangulate
 
@@ -42,7 +43,7 @@ WELD = 1e-7
 class SolidMesh:
     """Mesh of a solid with the links back to the B-rep.
 
-    mesh      : TriangleMesh, STEP coordinates (mm), faces numbered from 1
+    mesh      : TriangleMesh, STEP coordinates (mm), faces numbered from 1, with the exact normals at its corners
     uv        : (m, 3, 2) float64, surface parameters of the corners of its triangles, see ``Part.uv``
     faces     : FaceMesh per B-rep face
     edge_nodes: per edge in kernel order, (k,) indices into ``mesh.vertices`` along the edge; empty when degenerate
@@ -104,6 +105,7 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
             warnings.append(f"{holes} sliver holes that the CAD kernel left in the mesh were closed")
     if open_edges:
         warnings.append(f"{open_edges} edges of the mesh are not shared by exactly two triangles")
+    mesh = replace(mesh, corner_normals=corner_normals(shapes, mesh.face_ids, uv))
     return SolidMesh(mesh, uv, faces, edge_nodes, deviation, chord, warnings)
 
 

@@ -47,7 +47,9 @@ def shuffled(part: Part, seed: int) -> tuple[Part, dict[int, int]]:
              for e in part.edges]
     order = rng.permutation(len(part.mesh.faces))
     ids = np.array([new_of_old[i] for i in part.mesh.face_ids.tolist()], np.int32)
-    mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[order], ids[order])
+    corners = part.mesh.corner_normals
+    mesh = TriangleMesh(part.mesh.vertices, part.mesh.faces[order], ids[order],
+                        None if corners is None else corners[order])
     uv = None if part.uv is None else part.uv[order]
     edges = [edges[i] for i in rng.permutation(len(edges))]
     other = replace(part, faces=tuple(faces), edges=tuple(edges), mesh=mesh, uv=uv)

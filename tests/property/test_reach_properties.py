@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
-from geometry.sampling import sample_surface
+from geometry.sampling import sample_surface, with_surface_normals
 from tests.hand_parts import (
     SHORT_TOOLS,
     ball,
+    bent_strip,
     blocks,
     box_mesh,
     dome,
@@ -156,3 +157,62 @@ def test_a_fixture_over_a_floor_takes_what_it_covers():
     assert before[under].mean() > 0.7 and not after[under].any()
     far = p[:, 0] < 3.0
     assert (before[far] == after[far]).all()
+
+
+CHORD = 0.003
+
+
+def share_reached(mesh, body, exact=True):
+    """Share of the samples of a strip, its rim included, that a tool touches within 1.5 chords of the mesh."""
+    s = sample_surface(mesh, 60.0, seed=3)
+    if exact:
+        s = with_surface_normals(s, mesh)
+    field = TipField(TriangleTree(mesh), body, Clearances(), mesh.bounds, MARGIN, lattice_step(body))
+    return touchable(field, s.points, s.normals, 1.5 * CHORD)[1].mean()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["ball", "flat", "bull"])
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_cutter_thinner_than_a_round_reaches_it_whole(seed, kind, upright):
+    if kind == "flat" and not upright:
+        pytest.skip("a sharp end reaches slopes at steps only")
+    rng = np.random.default_rng(seed)
+    radius = rng.uniform(0.8, 9.0)
+    mesh = bent_strip(radius, CHORD, upright=upright, seed=seed)
+    # up to the play a tool must have beside a wall, half of it on either side
+    for thick in (0.3, 0.6, 0.8, 0.95, (radius - 0.11) / radius):
+        if thick > (radius - 0.11) / radius:
+            continue
+        r = thick * radius
+        body = tool(2 * r, {"ball": r, "flat": 0.0, "bull": 0.4 * r}[kind], shank=2 * r)
+        # of a trough a bull's flat bottom reaches what its corner fits into
+        if kind == "bull" and not upright:
+            continue
+        assert share_reached(mesh, body) == 1.0, (radius, thick)
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_normals_of_facets_keep_a_cutter_out_of_a_round(upright):
+    """The sideways shift of the contact, R delta, brings the axis nearer to the wall than the lift makes up for."""
+    mesh, body = bent_strip(5.0, CHORD, upright=upright), ball(8.0, shank=8.0)
+    assert share_reached(mesh, body, exact=False) < 0.9
+    assert share_reached(mesh, body) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("upright", [True, False])
+def test_any_cutter_reaches_a_bulge_whole(seed, upright):
+    radius = np.random.default_rng(seed).uniform(0.3, 4.0)
+    mesh = bent_strip(radius, CHORD, hollow=False, upright=upright, seed=seed)
+    for r in (0.5, 3.0, 10.0):
+        assert share_reached(mesh, ball(2 * r, shank=2 * r)) == 1.0, (radius, r)
+        if upright:
+            assert share_reached(mesh, tool(2 * r, 0.0, shank=2 * r)) == 1.0, (radius, r)
+
+
+def test_a_cutter_thicker_than_a_round_reaches_its_ends_only():
+    """It passes within the lift of the round up to the angle a, (R - radius)(1 - cos a) = lift, and a facet."""
+    mesh = bent_strip(5.0, CHORD)
+    ends = 2 * (math.acos(1 - (1.5 + 1.0) * CHORD / 1.0) + 2 * math.acos(1 - CHORD / 5.0))
+    assert share_reached(mesh, tool(12.0, 0.0, shank=12.0)) < ends / (math.pi / 2)

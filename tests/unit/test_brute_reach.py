@@ -58,9 +58,9 @@ def test_what_a_ball_leaves_within_the_scallop_is_clean():
 def test_holder_keeps_a_short_tool_out():
     """A holder 3 mm above the tip and wider than the pocket stops 2 mm above the floor."""
     mesh = block().mesh
-    found = brute_reach.brute_reach(mesh, setup("flat", holder_gap=3.0), STEP)
-    chosen = brute_reach.machinable(mesh)
-    points, _ = brute_reach.scattered(mesh, chosen, len(found.touched))
+    given = setup("flat", holder_gap=3.0)
+    samples = brute_reach.drawn(mesh, given)
+    found, points = brute_reach.brute_reach(mesh, given, STEP, samples), samples.points
     inside = (np.abs(points[:, 0]) <= 10.001) & (np.abs(points[:, 1]) <= 6.001)
     assert not found.touched[inside & (points[:, 2] < -3.1)].any()
     assert found.touched[inside & (points[:, 2] > -2.9) & (points[:, 2] < -0.1)].mean() > 0.6

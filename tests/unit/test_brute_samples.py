@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from scipy.spatial import cKDTree
 
 from benchmarks import brute_samples as brute
 from geometry.bvh import TriangleTree
+from geometry.frames import Placement
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment
-from tests.hand_parts import as_part, ball, low_walls, slope_field, tool
+from tests.hand_parts import as_part, ball, bent_strip, low_walls, slope_field, tool
+from tests.step_files import write_step
 from zones.reach import Clearances
 
 CLEAR = Clearances()
@@ -81,7 +84,8 @@ HOLDER = (HolderSegment(8, 12, 4), HolderSegment(12, 12, 10))
 def test_reach_is_right_on_two_walls_and_a_lie_is_seen(body, monkeypatch):
     monkeypatch.setattr(brute, "SPACING", 0.08)
     mesh = low_walls()
-    points, normals = brute.scattered(mesh, brute.machinable(mesh), 2500)
+    points, triangles = brute.scattered(mesh, brute.machinable(mesh), 2500)
+    normals = mesh.normals[triangles]  # facets are what these walls are
     cloud, solid = brute.cloud_of(mesh, 0.08), brute.solid_of(body, CLEAR)
     args, level = (points, normals, LIFT), normals[:, 2] > brute.LEVEL
     said = brute.said_by_reach(TriangleTree(mesh), as_part(mesh), body, CLEAR, *args, 0.0, 0.0)
@@ -93,3 +97,34 @@ def test_reach_is_right_on_two_walls_and_a_lie_is_seen(body, monkeypatch):
     thick = replace(body, diameter=body.diameter + 0.6, corner_radius=body.corner_radius + 0.3)
     lie = brute.said_by_reach(TriangleTree(mesh), as_part(mesh), thick, CLEAR, *args, 0.0, 0.0)
     assert brute.compare(cloud, solid, lie, *args, 0.0)["cutter wrong"].mean() > 0.005
+
+
+def test_normals_that_keep_a_tool_out_count_as_wrong():
+    """A ball of 4 mm in a round of 2.5: right with the planner's normals; with those of facets not, and it shows."""
+    mesh, body = bent_strip(2.5, 0.003, upright=False, length=4.0), ball(4.0)
+    points, triangles = brute.scattered(mesh, np.arange(len(mesh.faces)), 1500)
+    true = np.column_stack([np.zeros(len(points)), -points[:, 1:]])
+    true /= np.linalg.norm(true, axis=1)[:, None]
+    cloud, solid, lift = brute.cloud_of(mesh, 0.04), brute.solid_of(body, CLEAR), 0.0045
+    wrong = []
+    for normals in (brute.planned_normals(mesh, points, triangles), mesh.normals[triangles]):
+        said = brute.said_by_reach(TriangleTree(mesh), as_part(mesh), body, CLEAR, points, normals, lift, 0.0, 0.0)
+        wrong.append(brute.compare(cloud, solid, said, points, true, lift, 0.0)["cutter wrong"].mean())
+    assert wrong[0] == 0.0 and wrong[1] > 0.1
+
+
+def test_the_kernel_gives_the_normals_of_the_faces(tmp_path):
+    cq = pytest.importorskip("cadquery")
+    from geometry.occ.loading import load_part
+
+    path = write_step(cq.Workplane().box(12, 12, 5).faces(">Z").workplane().hole(8), tmp_path / "a.step")
+    setup = SimpleNamespace(placement=SimpleNamespace(origin_mm=(0, 0, 1), z_axis=(0, 0, 1), x_axis=(1, 0, 0)),
+                            part=SimpleNamespace(solid=None))
+    part = load_part(path, placement=Placement((0, 0, 1), (0, 0, 1), (1, 0, 0)), chord=0.01)
+    points, triangles = brute.scattered(part.mesh, np.arange(len(part.mesh.faces)), 2000)
+    got = brute.kernel_normals(part, path, setup)(points, triangles)
+    hole = np.hypot(points[:, 0], points[:, 1]) < 4.001
+    hole &= np.abs(part.mesh.normals[triangles][:, 2]) < 0.5
+    flat = points[hole, :2] / np.linalg.norm(points[hole, :2], axis=1)[:, None]
+    assert hole.any() and np.abs(got[hole] + np.column_stack([flat, np.zeros(hole.sum())])).max() < 1e-9
+    assert np.abs(got - part.mesh.normals[triangles])[~hole].max() < 1e-9

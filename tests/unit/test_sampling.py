@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh import TriangleMesh
-from geometry.sampling import sample_surface
+from geometry.sampling import joined, sample_borders, sample_surface, with_surface_normals
+from tests.hand_parts import bent_strip
 
 
 @pytest.mark.parametrize("corner", [0, 1, 2])
@@ -20,3 +21,53 @@ def test_every_part_of_a_triangle_has_its_share(corner):
     for t in (0.2, 0.5, 0.8):
         share = (1.0 - t) ** 2
         assert (weight > t).mean() == pytest.approx(share, abs=4.0 * np.sqrt(share * (1 - share) / len(samples)))
+
+
+def test_normals_are_those_of_the_surface():
+    for hollow in (True, False):
+        mesh = bent_strip(4.0, 0.004, hollow=hollow)
+        s = sample_surface(mesh, 200.0, seed=1)
+        true = (-1.0 if hollow else 1.0) * s.points / np.hypot(s.points[:, 0], s.points[:, 1])[:, None]
+        true[:, 2] = 0.0
+        got = with_surface_normals(s, mesh)
+        assert np.abs(got.normals - true).max() < 1e-5 < 1e-2 < np.abs(s.normals - true).max()
+        assert np.linalg.norm(got.normals, axis=1) == pytest.approx(1.0)
+        assert (got.points == s.points).all() and (got.area == s.area).all() and (got.triangle == s.triangle).all()
+
+
+def test_normals_turn_with_the_mesh():
+    mesh = bent_strip(4.0, 0.01)
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]], [3, 2, 1]
+    turned = mesh.transformed(matrix)
+    a, b = (with_surface_normals(sample_surface(m, 20.0, seed=1), m) for m in (mesh, turned))
+    assert b.normals == pytest.approx(a.normals @ matrix[:3, :3].T, abs=1e-9)
+
+
+def test_the_normal_of_the_facet_stays_where_the_surface_has_none_or_another():
+    mesh = bent_strip(4.0, 0.01)
+    plain = TriangleMesh(mesh.vertices, mesh.faces, mesh.face_ids)
+    s = sample_surface(mesh, 20.0, seed=1)
+    assert with_surface_normals(s, plain) is s
+    corners = mesh.corner_normals.copy()
+    corners[0, 1], corners[1] = np.nan, -corners[1]
+    corners[2] = [[1.0, 0, 0], [-0.5, 0.75**0.5, 0], [-0.5, -(0.75**0.5), 0]]
+    got = with_surface_normals(s, TriangleMesh(mesh.vertices, mesh.faces, mesh.face_ids, corners))
+    kept = (got.normals == s.normals).all(axis=1)
+    assert set(s.triangle[kept].tolist()) == {0, 1, 2} and not np.isnan(got.normals).any()
+    with pytest.raises(ValueError):
+        TriangleMesh(mesh.vertices, mesh.faces, mesh.face_ids, corners[:-1])
+
+
+def test_a_sample_on_a_border_has_the_normal_of_its_own_face():
+    """Two strips of different radius that meet at a right angle: along the common border each keeps its own."""
+    mesh = bent_strip(4.0, 0.01)
+    k = len(mesh.vertices)
+    other = bent_strip(2.0, 0.01)
+    both = TriangleMesh(np.vstack([mesh.vertices, other.vertices]), np.vstack([mesh.faces, other.faces + k]),
+                        np.repeat([1, 2], [len(mesh.faces), len(other.faces)]).astype(np.int32),
+                        np.concatenate([mesh.corner_normals, other.corner_normals]))
+    s = joined([sample_surface(both, 20.0, seed=1), sample_borders(both, 0.1, 0.0, np.arange(len(both.faces)))])
+    got = with_surface_normals(s, both)
+    radius = np.where(got.face == 1, 4.0, 2.0)
+    assert got.normals[:, :2] == pytest.approx(-got.points[:, :2] / radius[:, None], abs=6e-3)
