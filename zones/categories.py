@@ -15,12 +15,15 @@ import shapely
 from geometry.mesh import F64
 from zones.planview import ChannelPlan
 from zones.profiles import Level, Profile, classify
+from zones.regions import base_of, connections_of, place_of
 from zones.sections import SideCurve
-from zones.strips import FACING_SHARE
+from zones.strips import FACING_SHARE, PITCH, runs_of, spread
 
 RANK = {Level.SIMPLE: 0, Level.MEDIUM: 1, Level.HIGH: 2}
 NEAR = 0.05  # mm round a footprint within which a side counts as touched
 LEAST_POINTS = 4
+LOOK = 0.1  # mm off a side where its place is looked up
+ELSEWHERE = 0.02  # of a side in other places, up to which it is not cut: its ends stand at other walls
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +65,28 @@ class Categories:
         return tuple(SideProfile(c.wall, c, classify(c.points, c.closed)) for c in self.plan.curves)
 
     def of(self, region: str) -> Category:
-        """Category of a region, by its name: 'H1', 'W2', 'C1', 'H1 over C2', 'floor'."""
+        """Category of a region, by its name: 'H1', 'H1.2', 'W2', 'C1', 'H1 over C2', 'floor'."""
         if region not in self.known:
-            base, connections = region.split()[0], [w for w in region.split() if w.startswith("C")]
-            sides = self._touched(base, connections) if connections else self._of_base(base)
+            base, place, connections = base_of(region), place_of(region), connections_of(region)
+            sides = self._touched(base, connections) if connections else self._of_place(base, place)
             self.known[region] = Category(tuple(sorted(sides, key=lambda s: (
                 -RANK[s.profile.level], -len(s.profile.bends), s.wall, s.profile.type or ""))))
         return self.known[region]
+
+    def _of_place(self, base: str, place: int) -> list[SideProfile]:
+        """The sides of a base; of one that goes on into other places the longest stretch in this one."""
+        out = []
+        for s in self._of_base(base):
+            points, normals = spread(s.curve.points, s.curve.closed, PITCH)
+            here = self.plan.parting.beside(base, place, points + LOOK * normals)
+            if (here < 0).mean() <= ELSEWHERE:
+                out.append(s)
+                continue
+            runs = runs_of(["" if k < 0 else "in" for k in here.tolist()], s.curve.closed)
+            stretch = max(runs, key=lambda run: int(here[run].sum()), default=[])
+            if here[stretch].sum() >= LEAST_POINTS:
+                out.append(SideProfile(s.wall, s.curve, classify(points[stretch], False)))
+        return out
 
     def _of_base(self, base: str) -> list[SideProfile]:
         return [s for k, s in enumerate(self.whole) if self._is_of(k, base)]

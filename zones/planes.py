@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zones.machinable import Form
+from zones.regions import base_of
 from zones.sight import Sight
 
 PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids
@@ -63,7 +64,7 @@ def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> d
     for cell in np.unique(code[stopped]).tolist():
         plane = float(sight.samples.points[stopped[code[stopped] == cell], 2].max()) + PLANE_MARGIN
         own = sight.view.labels.regions[cell]
-        out[cell] = snapped(plane, sight.bands.get(base, ())) if own.kind == "SCZ" else plane
+        out[cell] = snapped(plane, sight.bands.get(base_of(base), ())) if own.kind == "SCZ" else plane
     return out
 
 

@@ -3,7 +3,7 @@
 1. Every side of a wall is cut at mid height (``zones.sections``): its trace.
 2. Level rays from the traces sweep strips (``zones.strips``).
 3. The strips a pair of walls sends to each other are one area, the channel.
-4. A footprint is what the faces of a connection cover, seen along the access.
+4. A footprint is what the faces of a connection and its fillets cover, seen along the access.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.part import Part
+from zones.faces import connection_faces, face_bases
 from zones.model import Decomposition
+from zones.parting import Parting
 from zones.planmap import Area, PlanMap
 from zones.sections import SideCurve, wall_sections
 from zones.strips import CLEAR, RayIndex, side_rays
@@ -42,6 +44,7 @@ class ChannelPlan:
     faced    : per curve the share of its length that faces each channel
     rays     : where the rays of all curves start and what they belong to
     shadows  : footprints of the connections by id
+    parting  : in which of its places a point of a region lies
     """
 
     plan: PlanMap
@@ -54,6 +57,7 @@ class ChannelPlan:
     faced: tuple[dict[str, float], ...]
     rays: RayIndex
     shadows: dict[str, shapely.Geometry]
+    parting: Parting
 
     @staticmethod
     def of(part: Part, decomposition: Decomposition) -> ChannelPlan:
@@ -77,8 +81,11 @@ class ChannelPlan:
             wall[list(w.sides)] = k
         height = np.array([_cut_height(w.id, curves, 0.5 * (w.z_bottom + w.z_top)) for w in d.walls])
         gap = np.array([min((c.gap_min for c in d.channels if w.id in c.walls), default=np.inf) for w in d.walls])
+        drawn = {a.name: a.shape for a in areas}
+        heights = dict(zip([w.id for w in d.walls], height.tolist(), strict=True))
+        parting = Parting.of(part, d, face_bases(part, d), heights, {n: drawn[n] for n in names}, curves)
         return ChannelPlan(plan, names, curves, of_wall, wall, height, gap, tuple(f.faced for f in found),
-                           RayIndex.of(d, curves, found, names), {a.name: a.shape for a in shadows})
+                           RayIndex.of(d, curves, found, names), {a.name: a.shape for a in shadows}, parting)
 
     def channel_of(self, points: F64, normals: F64, face: NDArray[np.int32]) -> NDArray[np.int64]:
         """(n,) row in ``names`` of the channel that each point of a wall side faces, -1 for none.
@@ -124,8 +131,8 @@ class ChannelPlan:
 
 
 def footprints(part: Part, decomposition: Decomposition) -> list[Area]:
-    """What each connection covers in plan, seen along +Z of the frame of the part."""
-    return [Area(c.id, _shadow(part, c.faces)) for c in decomposition.connections]
+    """What each connection covers in plan with its fillets, seen along +Z of the frame of the part."""
+    return [Area(c, _shadow(part, faces)) for c, faces in connection_faces(part, decomposition).items()]
 
 
 def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:

@@ -2,7 +2,8 @@
 
 A region is a channel, the outside of a wall, a connection, wall tops, floor or free surface. The cells of the plan
 view (``zones.planmap``) decide which channel a point of a wall side faces, and whether it lies under or over the
-footprint of a connection: then it is SCZI, else SCZ.
+footprint of a connection: then it is SCZI, else SCZ. A region in several places, between which walls stand, is a region
+for each (``zones.parting``).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.rays import first_hits
+from zones.faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.planmap import PlanMap
 from zones.planview import ChannelPlan, footprints
@@ -29,16 +31,23 @@ class Region:
 
     base  : 'H1' a channel, 'W1' the outside of a wall, 'C1' a connection, 'top', 'floor' or 'free'
     over  : connections that lie below the point; under : those that lie above it; along the access
+    place : which of the places of the base, 1, 2 ...; 0 the open one, or the only one (``zones.parting``)
     """
 
     base: str
     over: tuple[str, ...] = ()
     under: tuple[str, ...] = ()
+    place: int = 0
+
+    @property
+    def ground(self) -> str:
+        """The base with its place: 'H1', or 'H1.2' where it has several."""
+        return f"{self.base}.{self.place}" if self.place else self.base
 
     @property
     def name(self) -> str:
-        """'H1', or 'H1 over C1', or 'floor under C1 C2'."""
-        words = [self.base]
+        """'H1', or 'H1.2 over C1', or 'floor under C1 C2'."""
+        words = [self.ground]
         for word, ids in (("over", self.over), ("under", self.under)):
             if ids:
                 words += [word, *ids]
@@ -54,6 +63,21 @@ class Region:
     def kind(self) -> str:
         """'SCZI' on, under or over a connection, else 'SCZ'."""
         return "SCZI" if self.connections else "SCZ"
+
+
+def base_of(name: str) -> str:
+    """The base in the name of a region: 'H1' of 'H1.2 over C1'."""
+    return name.split()[0].split(".")[0]
+
+
+def place_of(name: str) -> int:
+    """The place in the name of a region: 2 of 'H1.2 over C1', 0 where it names none."""
+    return int(name.split()[0].partition(".")[2] or 0)
+
+
+def connections_of(name: str) -> list[str]:
+    """The connections in the name of a region: C1 and C2 of 'H1 over C1 C2', C1 of 'C1'."""
+    return [w for w in name.split() if w.startswith("C")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,20 +105,6 @@ class Labels:
         return Labels(regions, np.array([place[base[int(f)]] for f in face], dtype=np.int64))
 
 
-def face_bases(part: Part, decomposition: Decomposition) -> dict[int, str]:
-    """Base region of every face number by its role alone: sides of walls are their wall's outside."""
-    base: dict[int, str] = {}
-    for w in decomposition.walls:
-        base.update(dict.fromkeys(w.faces, "top"))
-        base.update(dict.fromkeys(w.sides, w.id))
-    for c in decomposition.connections:
-        base.update(dict.fromkeys(c.faces, c.id))
-    for info in part.faces:
-        role = decomposition.face_role.get(info.number, "free")
-        base.setdefault(info.number, "floor" if role in ("floor", "base") else "free")
-    return base
-
-
 class Regioner:
     """Labels points of a part as one access direction sees it.
 
@@ -115,7 +125,7 @@ class Regioner:
         self.table = np.full(max(self.base, default=0) + 1, -1, np.int64)
         self.table[list(self.base)] = [place[b] for b in self.base.values()]
         self.of_channel = np.array([place[c] for c in channels.names], dtype=np.int64)
-        self.trees = {c.id: TriangleTree(_only(part, c.faces)) for c in decomposition.connections}
+        self.trees = {c: TriangleTree(_only(part, own)) for c, own in connection_faces(part, decomposition).items()}
 
     def of(self, points: F64, normals: F64, face: NDArray[np.int32], first: tuple[F64, F64] | None = None) -> Labels:
         """Labels of points of the surface.
@@ -129,10 +139,12 @@ class Regioner:
         channel = self.channels.channel_of(*there, face)
         base = np.where(channel >= 0, self.of_channel[channel] if len(self.of_channel) else base, base)
         over, under = self._stack(points, normals, base, bases)
-        code, example = _distinct(base, over, under)
+        place = self.channels.parting.of_points(*there, base, bases)
+        code, example = _distinct(base, place, over, under)
         ids = [c.id for c in self.connections]
         regions = tuple(Region(bases[base[k]], tuple(c for c, on in zip(ids, over[k], strict=True) if on),
-                               tuple(c for c, on in zip(ids, under[k], strict=True) if on)) for k in example.tolist())
+                               tuple(c for c, on in zip(ids, under[k], strict=True) if on), int(place[k]))
+                        for k in example.tolist())
         return Labels(regions, code)
 
     def _stack(self, points: F64, normals: F64, base: NDArray[np.int64],
@@ -152,10 +164,10 @@ class Regioner:
         return covered & ~under, under
 
 
-def _distinct(base: NDArray[np.int64], over: NDArray[np.bool_],
+def _distinct(base: NDArray[np.int64], place: NDArray[np.int64], over: NDArray[np.bool_],
               under: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number of each distinct combination (n,), in order of base and connections, and a row that has it."""
-    key = base
+    """Number of each distinct combination (n,), in order of base, place and connections, and a row that has it."""
+    key = base * (int(place.max(initial=0)) + 1) + place
     for k in range(over.shape[1]):
         key = 3 * key + over[:, k] + 2 * under[:, k]
         if k % 16 == 15:  # before the numbers grow too long

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from zones.faces import connection_faces
 from zones.machinable import LEVEL, Form, forms_of
 from zones.model import Decomposition
 from zones.reach import touchable
@@ -45,9 +46,9 @@ def preference(tool: ToolBody, form: Form) -> tuple[float, float, float]:
 def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list[tuple[float, float]]]:
     """Heights, mm, between which each connection stands in a view, by the channels and walls it bridges."""
     out: dict[str, list[tuple[float, float]]] = {}
-    mesh = view.part.mesh
+    mesh, spans = view.part.mesh, connection_faces(view.part, decomposition)
     for c in decomposition.connections:
-        z = mesh.triangles[np.isin(mesh.face_ids, c.faces)][:, :, 2]
+        z = mesh.triangles[np.isin(mesh.face_ids, spans[c.id])][:, :, 2]
         if not z.size:
             continue
         for h in decomposition.channels:
@@ -76,9 +77,9 @@ class Sight:
         return sorted(self.view.fields, key=lambda t: (*preference(self.view.fields[t].tool, form), t))
 
     def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, Form, NDArray[np.int64]]]:
-        """Base region, form and samples of what is to be shared out, in a fixed order."""
+        """Base region with its place, form and samples of what is to be shared out, in a fixed order."""
         labels = self.view.labels
-        base = np.array([r.base for r in labels.regions], dtype=object)[labels.code]
+        base = np.array([r.ground for r in labels.regions], dtype=object)[labels.code]
         out = []
         for name in sorted(set(base[rows].tolist())):
             for form in Form:

@@ -152,7 +152,7 @@ def _side(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: dict[
     length = np.where(np.isfinite(far), far, 0.0)
     _bridge(named, length, shapely.contains_xy(holes, start[:, 0], start[:, 1]), curve.closed)
     foot = start + length[:, None] * normal
-    runs = [run for run in _runs(named, curve.closed) if len(run) > 1]
+    runs = [run for run in runs_of(named, curve.closed) if len(run) > 1]
     return SideRays(start, normal, named, [Strip(named[run[0]], start[run], foot[run]) for run in runs])
 
 
@@ -173,7 +173,7 @@ def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool
                 length[k] = ends[0] + (ends[1] - ends[0]) * j / (len(between) + 1)
 
 
-def _runs(names: Sequence[str], closed: bool) -> list[list[int]]:
+def runs_of(names: Sequence[str], closed: bool) -> list[list[int]]:
     """Runs of equal names that are not empty, in order; round the end where the curve is closed."""
     runs: list[list[int]] = []
     for k, name in enumerate(names):

@@ -26,7 +26,7 @@ from zones.machinable import Form
 from zones.model import Decomposition
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach import TipField
-from zones.regions import Region
+from zones.regions import base_of
 from zones.sight import Sight
 from zones.view import View
 
@@ -43,7 +43,7 @@ class ZoneArea:
     id      : 'Z3'
     access  : 'A1'
     region  : 'C2' a connection, 'H1' a channel, 'W1' the outside of a wall, 'top', 'floor' or 'free'; 'H1 over C2'
-              where the zone is only such a cell
+              where the zone is only such a cell, 'H1.2' where the region has several places
     merged  : names of the SCZI cells that were joined to it
     samples : (k,) indices into the samples of the machinable area
     tips    : (k, 3) float64, an admissible tip for each
@@ -155,7 +155,7 @@ def _stage(zone: ZoneArea) -> int:
     """Tops and connections before walls, walls before floors: nothing is undercut while it still stands."""
     if zone.form is Form.STEEP:
         return 1
-    return 2 if zone.region.split()[0] == "floor" else 0
+    return 2 if base_of(zone.region) == "floor" else 0
 
 
 @dataclass
@@ -203,7 +203,7 @@ def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form) -> lis
     """One zone where the tool cuts the plain cells of the region too, else one for each cell."""
     labels = sight.view.labels
     cells = np.unique(labels.code[take.rows]).tolist()
-    plain = [c for c in cells if labels.regions[c] == Region(base)]
+    plain = [c for c in cells if labels.regions[c].name == base]
     parts = [(base, cells)] if plain else [(labels.regions[c].name, [c]) for c in cells]
     out = []
     for name, codes in parts:

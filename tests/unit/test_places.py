@@ -1,0 +1,112 @@
+"""One zone is one connected place in plan: pockets apart are regions apart, whatever bridges them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+
+from geometry.part import Part
+from geometry.sampling import SurfaceSamples, sample_surface
+from tests.decomposition_shapes import box, to_part
+from zones.categories import Categories
+from zones.decompose import decompose
+from zones.model import Decomposition
+from zones.places import MATERIAL, LevelPlaces, standing
+from zones.planview import ChannelPlan
+from zones.regions import Labels, Region, Regioner, base_of, connections_of, place_of
+
+pytest.importorskip("cadquery")
+
+
+def tray(webs, *, bar=False):
+    """A box 60 x 40 with sides 2 thick and 20 high on a floor at 4, webs across it at x, each with its height."""
+    part = box(60, 40, 24, 0, 0, 0).cut(box(56, 36, 20, 2, 2, 4))
+    for x, height in webs:
+        part = part.union(box(2, 37, height + 1, x, 1.5, 3))
+    return part.union(box(3, 37, 3, 10, 1.5, 14)) if bar else part
+
+
+@cache
+def measured(webs, bar=False) -> tuple[Part, Decomposition, ChannelPlan, SurfaceSamples, Labels]:
+    part = to_part(tray(webs, bar=bar))
+    d = decompose(part)
+    plan = ChannelPlan.of(part, d)
+    samples = sample_surface(part.mesh, 6.0, seed=4)
+    return part, d, plan, samples, Regioner(part, d, plan).of(samples.points, samples.normals, samples.face)
+
+
+def spans(names, samples, web) -> dict[str, bool]:
+    """By region: whether it has points on both sides of the plane x = web between its walls and on its floor."""
+    inner = (samples.points[:, 0] > 2.5) & (samples.points[:, 0] < 57.5) & (samples.points[:, 1] > 1.99)
+    inner &= (samples.points[:, 1] < 38.01) & (samples.points[:, 2] < 23.99)
+    return {n: bool(np.ptp(np.sign(samples.points[(names == n) & inner, 0] - web)) > 1)
+            for n in set(names[inner].tolist()) if n != "top"}
+
+
+def test_pockets_apart_are_regions_apart():
+    *_, plan, samples, labels = measured(((29.0, 20.0),))
+    names = labels.names
+    assert not any(spans(names, samples, 30.0).values())
+    grounds = {r.ground for r in labels.regions}
+    assert {g for g in grounds if g.startswith("floor")} >= {"floor.1", "floor.2"}
+    per = {b: sorted(g for g in grounds if base_of(g) == b and g.startswith("H")) for b in plan.names}
+    assert per == {"H1": ["H1.1", "H1.2"], "H2": ["H2.1", "H2.2"]}
+    # numbered from left to right, and both pockets of one size
+    place = np.array([r.place for r in labels.regions])[labels.code]
+    wall = np.char.startswith(names.astype(str), "H")
+    assert samples.points[place == 1, 0].max() < 30 < samples.points[place == 2, 0].min()
+    sizes = [samples.area[wall & (place == k)].sum() for k in (1, 2)]
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.01) and sizes[0] == pytest.approx(2 * (27 + 36) * 20, rel=0.02)
+
+
+def test_a_rib_below_the_level_of_the_channel_parts_nothing():
+    _, d, plan, samples, labels = measured(((29.0, 3.0),))
+    assert [c.walls for c in d.channels] == [("W1", "W1")]
+    assert {r.ground for r in labels.regions} == {"H1", "W1", "floor", "top"}
+    assert spans(labels.names, samples, 30.0) == {"H1": True, "floor": True}
+
+
+def test_a_bar_parts_nothing():
+    *_, one = measured(((29.0, 20.0),))
+    *_, two = measured(((29.0, 20.0),), True)
+    assert any(r.connections for r in two.regions)
+    inside = ({r.ground for r in found.regions if r.base[0] in "Hf"} for found in (one, two))
+    assert next(inside) == next(inside)
+
+
+def test_three_pockets_each_have_their_own_profile():
+    *_, plan, _, labels = measured(((19.0, 20.0), (39.0, 20.0)))
+    found = Categories(plan)
+    grounds = {r.ground for r in labels.regions if r.base.startswith("H")}
+    assert sorted(place_of(g) for g in grounds) == [0, 0, 0, 1, 2, 3]
+    for g in grounds:
+        assert all(not s.profile.closed for s in found.of(g).sides)  # no pocket has the whole ring
+
+
+def test_names_say_base_place_and_connections():
+    r = Region("H1", ("C2",), ("C10", "C3"), 2)
+    assert r.name == "H1.2 over C2 under C10 C3" and r.ground == "H1.2"
+    assert (base_of(r.name), place_of(r.name), connections_of(r.name)) == ("H1", 2, ["C2", "C10", "C3"])
+    assert Region("floor").name == "floor" and place_of("floor") == 0 and connections_of("C1") == ["C1"]
+
+
+def test_places_share_edges_not_points():
+    # two squares of air that touch in a corner of a chequered block
+    block = shapely.union_all([shapely.box(0, 0, 9, 9).difference(shapely.box(1, 1, 8, 8)),
+                               shapely.box(1, 1, 4, 4), shapely.box(4, 4, 8, 8)])
+    places = LevelPlaces.of(block)
+    a, b, outside, inside = places.at(np.array([[6.0, 2.0], [2.0, 6.0], [-3.0, 4.0], [2.0, 2.0]])).tolist()
+    assert {a, b} == {1, 2} and outside == 0 and inside == MATERIAL
+    assert b == 1  # it begins farther left
+    assert places.nearest(np.array([[2.0, 3.9]]), (1, 2)).tolist() == [1]
+
+
+def test_what_stands_above_a_level():
+    # an upright triangle roof: z from 0 at x = 0 to 10 at x = 10
+    roof = np.array([[[0.0, 0, 0], [10, 0, 10], [10, 5, 10]], [[0, 0, 0], [10, 5, 10], [0, 5, 0]]])
+    for level in (2.0, 7.0):
+        assert standing(roof, level).area == pytest.approx(5 * (10 - level), abs=0.03)
+    assert standing(roof, 11.0).is_empty

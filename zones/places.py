@@ -1,0 +1,114 @@
+"""Places of the plan view: where a tool may go at a level without being lifted over what stands there.
+
+What stands above a level, connections left out, covers part of the plan. The rest falls into the cells of a plan map
+(``zones.planmap``), trapezoids joined across the edges they share: these are the places of the level. Two that touch
+in a point are two. A connection does not part a place, for what it stops below goes on above it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.part import Part
+from zones.planmap import Area, PlanMap
+
+MATERIAL = -1  # number of what lies under something that stands above the level
+OPEN = 0  # number of the place outside all that stands
+NARROW = 0.05  # mm: half the diameter of the thinnest tool that is ever asked for; narrower is no place
+FACES_UP = 1e-6  # n_z above: a triangle that covers part of the plan
+STEP = 1e-3  # mm, levels nearer than this are one
+
+
+@dataclass(frozen=True, eq=False)
+class LevelPlaces:
+    """The places of one level.
+
+    plan   : PlanMap of what stands above it
+    number : (cells,) int64, place of each cell, ``OPEN``, 1, 2 ... from left to right, or ``MATERIAL``
+    """
+
+    plan: PlanMap
+    number: NDArray[np.int64]
+
+    @staticmethod
+    def of(standing: shapely.Geometry) -> LevelPlaces:
+        """The places left by what covers ``standing`` (polygons, mm)."""
+        plan = PlanMap.of([Area("material", standing)])
+        number = np.full(len(plan.over), MATERIAL, np.int64)
+        number[0] = OPEN
+        count = 0
+        for k in np.flatnonzero(~plan.over[:, 0]).tolist():
+            if k and not plan.map.outline(plan.faces, k).buffer(-NARROW).is_empty:
+                count += 1
+                number[k] = count
+        return LevelPlaces(plan, number)
+
+    def at(self, xy: F64) -> NDArray[np.int64]:
+        """(n,) number of the place at each of xy (n, 2) mm, or ``MATERIAL``."""
+        cell = self.plan.cell_at(xy)
+        return np.where(cell >= 0, self.number[cell], OPEN)
+
+    @cached_property
+    def outlines(self) -> dict[int, shapely.Geometry]:
+        """Polygons of the places by number, mm."""
+        cells = np.flatnonzero(self.number != MATERIAL)
+        return {int(self.number[k]): self.plan.map.outline(self.plan.faces, int(k)) for k in cells.tolist()}
+
+    def nearest(self, xy: F64, of: tuple[int, ...]) -> NDArray[np.int64]:
+        """(n,) which of the places named is nearest to each of xy (n, 2) mm."""
+        away = shapely.STRtree([self.outlines[k] for k in of])
+        return np.array(of, dtype=np.int64)[away.nearest(shapely.points(xy))]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """The places of a part at any level.
+
+    triangles : (n, 3, 3) float64, mm, what faces up, without connections
+    """
+
+    triangles: F64
+    known: dict[int, LevelPlaces] = field(default_factory=dict)
+
+    @staticmethod
+    def of(part: Part, spans: Iterable[int]) -> Places:
+        """Of a part, mm, the access along +Z; ``spans`` are the faces of its connections with their fillets."""
+        mesh = part.mesh
+        keep = (mesh.normals[:, 2] > FACES_UP) & ~np.isin(mesh.face_ids, list(spans))
+        return Places(np.asarray(mesh.triangles[keep]))
+
+    def at_level(self, level: float) -> LevelPlaces:
+        """The places at a level, mm."""
+        key = round(level / STEP)
+        if key not in self.known:
+            self.known[key] = LevelPlaces.of(standing(self.triangles, key * STEP))
+        return self.known[key]
+
+
+def standing(triangles: F64, level: float) -> shapely.Geometry:
+    """What triangles (n, 3, 3), mm, cover in plan with the part of them above ``level``, mm."""
+    above = triangles[:, :, 2] > level
+    count = above.sum(axis=1)
+    pieces = [triangles[count == 3]]
+    for left, lone in ((1, above), (2, ~above)):  # one corner above, or one below
+        some = triangles[count == left]
+        turn = (lone[count == left].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.take_along_axis(some, turn[:, :, None], axis=1).transpose(1, 0, 2)
+        p, q = _cut(a, b, level), _cut(a, c, level)
+        pieces.append(np.stack([a, p, q] if left == 1 else [p, b, c, q], axis=1))
+    rings = [shapely.polygons(np.concatenate([s, s[:, :1]], axis=1)[:, :, :2]) for s in pieces if len(s)]
+    shapes = np.concatenate(rings) if rings else np.zeros(0, object)
+    return shapely.union_all(shapes[shapely.area(shapes) > 1e-9]).buffer(STEP, join_style="mitre")
+
+
+def _cut(a: F64, b: F64, level: float) -> F64:
+    """Where the lines from a to b (n, 3) pass a level."""
+    t = (level - a[:, 2]) / (b[:, 2] - a[:, 2])
+    return np.asarray(a + t[:, None] * (b - a))
