@@ -23,6 +23,7 @@ from geometry.part import Part
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
+from zones.faces import connection_of
 from zones.machinable import SEEN
 from zones.model import Decomposition
 from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
@@ -136,7 +137,7 @@ def _reasons(few: SurfaceSamples, fields: dict[str, TipField], part: Part, tree:
     n = len(few)
     reason = np.full(n, "", dtype=object)
     need: Needs = [{} for _ in range(n)]
-    owner = {f: c.id for c in decomposition.connections for f in c.faces}
+    owner = connection_of(part, decomposition)
     up = np.tile(np.array([0.0, 0.0, 1.0]), (n, 1))
     _, above = first_hits(tree, few.points + 0.02 * few.normals, up, 1e-4, 1e6)
     above = np.asarray(above)
