@@ -71,7 +71,8 @@ def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
     profile = zone.category.profile
     return {"id": zone.id, "kind": zone.kind, "profile": str(profile.type) if profile and profile.type else None,
             "level": str(profile.level) if profile else None, "profiles": _profiles(zone),
-            "open": is_open(zone, view.fields[zone.tool.id]), "region": zone.region, "merged": list(zone.merged),
+            "open": is_open(zone, view.fields[zone.tool.id], ready.samples.area),
+            "region": zone.region, "merged": list(zone.merged),
             "form": str(zone.form), "faces": faces(zone.faces), "access": zone.access, "tool": zone.tool.id,
             "axis": [r(v, 9) for v in view.direction.tolist()], "depth_mm": [r(zone.top), r(zone.bottom)],
             "approach": _cone(ready, zone), "cutting_plane_mm": r(zone.plane),

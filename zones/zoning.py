@@ -24,6 +24,7 @@ from geometry.toolbody import ToolBody
 from zones.categories import Categories, Category
 from zones.machinable import Form
 from zones.model import Decomposition
+from zones.openness import OPEN_SHARE, open_share
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach import TipField
 from zones.regions import base_of
@@ -259,15 +260,14 @@ def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: Form, got: f
             "limit": round(least, 3)}
 
 
-def is_open(zone: ZoneArea, field: TipField) -> bool:
-    """Whether passes can leave the zone: at its deepest tips the free region leads out of the part.
+def is_open(zone: ZoneArea, field: TipField, area: F64 | None = None) -> bool:
+    """Whether passes can leave the zone: over nearly all its area the tool can go out of the part at its level.
 
-    A zone with walls or connections all round is closed.
+    area : (n,) float64, mm², of all samples of the machinable area; those of the zone count alike where None
+
+    Passes along steep area stay at one height, so there the level is that of each tip; others follow the surface, so
+    it is that of the highest. A zone with walls or connections all round some of it is closed.
     """
-    from scipy import ndimage
-
-    deep = zone.tips[zone.tips[:, 2] <= np.quantile(zone.tips[:, 2], 0.1) + 1e-9]
-    labels, _ = ndimage.label(field.height <= float(deep[:, 2].max()) + 1e-3)
-    border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
-    inside = labels[field.lattice.cells(deep[:, :2])]
-    return bool(np.isin(inside[inside > 0], border[border > 0]).mean() > 0.5) if (inside > 0).any() else False
+    level = zone.tips[:, 2] if zone.form is Form.STEEP else zone.tips[:, 2].max()
+    weight = np.ones(len(zone.samples)) if area is None else area[zone.samples]
+    return open_share(field, zone.tips, level, weight) > OPEN_SHARE
