@@ -50,18 +50,21 @@ def _open(view: View, samples: SurfaceSamples) -> NDArray[np.bool_]:
 
 
 def cone_of(ready: Prepared, zone: ZoneArea) -> Cone | None:
-    """The approach cone of a zone with its tool, in the setup frame; None where no single axis gets all of it."""
+    """The approach cone of a zone with its tool, in the setup frame, round or beside the axis it was cut from.
+
+    It holds that axis. None where not even that gets 98 % of the area that was asked.
+    """
     view = ready.view(zone.access)
-    rows = zone.samples[view.samples.area[zone.samples] > 0]
+    rows = np.flatnonzero(view.samples.area[zone.samples] > 0)
     if len(rows) > CONE_SAMPLES:
         rows = np.sort(np.random.default_rng(CONE_SEED).choice(rows, CONE_SAMPLES, replace=False))
     if not len(rows):
         return None
-    few = view.samples.subset(rows)
+    few = view.samples.subset(zone.samples[rows])
     directions = directions_over_hemisphere(CONE_DIRECTIONS)
     got = approach(view.obstacles, zone.tool, clearances(ready.setup), few.points, few.normals, directions,
-                   ready.lift, ready.setup.quality.stock_allowance_mm)
-    cone = zone_cone(got, few.area, directions)
+                   ready.lift, ready.setup.quality.stock_allowance_mm, zone.tips[rows])
+    cone = zone_cone(got, few.area, directions, holds_first=True)
     return None if cone is None else Cone(view.back(cone.axis), cone.half_angle, cone.share, cone.resolution)
 
 

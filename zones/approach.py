@@ -77,7 +77,8 @@ def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
 
 
 def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: ArrayLike, normals: ArrayLike,
-             directions: ArrayLike, lift: float, allowance: float = 0.0) -> NDArray[np.bool_]:
+             directions: ArrayLike, lift: float, allowance: float = 0.0,
+             tips: ArrayLike | None = None) -> NDArray[np.bool_]:
     """Which tool axes bring the cutting part to which samples without entering anything.
 
     tree       : TriangleTree of part and fixtures
@@ -88,6 +89,8 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     directions : (d, 3) float64, tool axes from the tip to the spindle
     lift       : mm, distance along the normal within which a touch counts
     allowance  : mm, material to leave on the part: the assembly is grown by it all round
+    tips       : (n, 3) float64, mm, of ``zones.reach.touchable``: where the tool touches each sample along the first
+                 direction; they are tried as well
 
     Returns
     -------
@@ -98,7 +101,8 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     -----
     Contact as in ``zones.reach.contact_tips``, in the frame of the axis: the highest tip that touches. Lower ones touch
     with the flank, but what blocks the highest blocks them too. No sideways play is asked for. Under a flat end a
-    sample whose normal is the axis is tried from 17 positions.
+    sample whose normal is the axis is tried from 17 positions. Reach also aims it at free places near by, on the
+    lattice of the upright tool; that is why its tips are taken over.
     """
     p, n = finite_points(points, 3, "points"), finite_points(normals, 3, "normals")
     frames, bodies = axis_frames(directions), assembly(tool, clear, allowance)
@@ -107,6 +111,10 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     for lo in range(0, len(p), step):
         rows = slice(lo, lo + step)
         out[rows] = _reached(tree, tool, frames, bodies, p[rows], n[rows], lift + allowance)
+    if tips is not None and len(frames):
+        known = finite_points(tips, 3, "tips") @ frames[0].T + [0.0, 0.0, LEVEL_TOLERANCE]
+        todo = np.flatnonzero(~out[:, 0] & (n @ frames[0, 2] > SEEN))
+        out[todo, 0] = ~blocked_along(tree, frames, np.zeros(len(todo), np.int64), known[todo], bodies)
     return out
 
 
@@ -151,17 +159,19 @@ def resolution_of(directions: ArrayLike) -> float:
     return float(np.arccos(np.clip(-hull.equations[:, 3].max(), -1.0, 1.0)))
 
 
-def zone_cone(reachable: NDArray[np.bool_], area: F64, directions: ArrayLike, share: float = 0.98) -> Cone | None:
+def zone_cone(reachable: NDArray[np.bool_], area: F64, directions: ArrayLike, share: float = 0.98,
+              holds_first: bool = False) -> Cone | None:
     """Largest circular cone of axes by each of which nearly all of a zone is reached.
 
     reachable  : (n, d) bool, as of ``approach``
     area       : (n,) float64, mm², of each sample
     directions : (d, 3) float64; where none points down, what points down counts as not reaching
     share      : of the area, what an axis has to reach to count
+    holds_first : the largest of the cones that hold the first direction; that one alone where it has no room round it
 
     Returns
     -------
-    Cone, or None where no direction reaches as much.
+    Cone, or None where no direction reaches as much, with ``holds_first`` where the first does not.
 
     Notes
     -----
@@ -173,10 +183,10 @@ def zone_cone(reachable: NDArray[np.bool_], area: F64, directions: ArrayLike, sh
     unit, weight = _units(directions), np.asarray(area, dtype=np.float64)
     got = weight @ np.asarray(reachable, dtype=np.float64) / max(float(weight.sum()), 1e-300)
     good = got >= share - 1e-12
-    if not good.any():
+    if not (good[:1] if holds_first else good).any():
         return None
     spacing = resolution_of(unit)
-    axis, room = _widest(unit, good, spacing)
+    axis, room = _widest(unit, good, spacing, unit[0] if holds_first else None)
     inside = good & (unit @ axis >= math.cos(min(room + ROUNDING, math.pi)))
     least = float(got[inside].min()) if inside.any() else float(got[good].max())
     return Cone(axis, room, least, spacing)
@@ -190,13 +200,20 @@ def _upper(unit: F64) -> bool:
     return bool((unit[:, 2] > -ROUNDING).all())
 
 
-def _widest(unit: F64, good: NDArray[np.bool_], spacing: float) -> tuple[F64, float]:
-    """Axis and half angle of the widest cone: the best of evenly spread axes, then steps that halve."""
+def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None) -> tuple[F64, float]:
+    """Axis and half angle of the widest cone: the best of evenly spread axes, then steps that halve.
+
+    held : (3,) an axis it has to hold, or None
+    """
     bad, upper = unit[~good], _upper(unit)
     if not len(bad) and not upper:
         return np.array([0.0, 0.0, 1.0]), math.pi
 
     def room(axes: F64) -> F64:
+        out = free(axes)
+        return out if held is None else np.where(np.arccos(np.clip(axes @ held, -1.0, 1.0)) <= out, out, -math.inf)
+
+    def free(axes: F64) -> F64:
         out = np.full(len(axes), math.inf)
         for at in range(0, len(axes), 1000) if len(bad) else ():
             cosine = np.clip((axes[at:at + 1000] @ bad.T).max(axis=1), -1.0, 1.0)
@@ -216,8 +233,8 @@ def _widest(unit: F64, good: NDArray[np.bool_], spacing: float) -> tuple[F64, fl
             best, width = candidate, wider
         else:
             step *= 0.5
-    if width <= 0.0:  # no room round any: the direction that is farthest from failing ones
-        best, width = _first(unit[good], room(unit[good]))
+    if width <= 0.0:  # no room round any: the axis to hold, or the direction that is farthest from failing ones
+        best, width = (held, 0.0) if held is not None else _first(unit[good], free(unit[good]))
     return best, max(width, 0.0)
 
 

@@ -145,6 +145,47 @@ def test_upright_it_is_what_reach_says_without_play(body):
         assert (got & ~by_tool).mean() < (0.15 if body.shank_diameter > body.diameter else 1e-9)
 
 
+@pytest.mark.parametrize("body", [tool(2.0, 0.0), tool(3.0, 0.0, neck=3.0, shank=4.0), tool(2.4, 0.4), ball(2.0)],
+                         ids=["flat", "flat with a shank", "bull", "ball"])
+@pytest.mark.parametrize("mesh", [low_walls(), terraces([0, 3, 9, 12], [0, 3, 9, 12], [[5] * 3, [5, 2, 5], [5] * 3])],
+                         ids=["walls", "pocket"])
+def test_the_tips_of_reach_count_along_the_first_direction(mesh, body):
+    """What reach aims a flat bottom at is not lost, so the axis an area was cut from reaches all of it."""
+    s = sample_surface(mesh, 8.0, seed=2)
+    for allowance in (0.0, 0.1):
+        field = field_of(mesh, body, allowance, CLEAR)
+        by_cutter, by_tool, tips = touchable(field, s.points, s.normals, LIFT)
+        mine = s.subset(by_tool)
+        got = approach(field.tree, body, CLEAR, mine.points, mine.normals, directions_over_hemisphere(40), LIFT,
+                       allowance, tips[by_tool])
+        assert len(mine) > 50 and got[:, 0].all()
+        # a tip that is not free counts for nothing
+        rest = s.subset(~by_cutter)
+        low = np.column_stack([rest.points[:, :2], np.full(len(rest), -1.0)])
+        plain, wrong = (approach(field.tree, body, CLEAR, rest.points, rest.normals, [UP], LIFT, allowance, t)
+                        for t in (None, low))
+        np.testing.assert_array_equal(plain, wrong)
+
+
+def test_a_cone_that_holds_the_first_direction():
+    d = directions_over_hemisphere(2000)
+    spacing = resolution_of(d)
+    # a cone of 0.5 rad whose axis leans by 0.3 holds +Z; one that leans by 0.6 does not
+    for lean, half in ((0.3, 0.5), (0.6, 0.5)):
+        good = d @ leaning(lean) > math.cos(half)
+        good[0] = True
+        free, held = (zone_cone(good[None], np.ones(1), d, holds_first=h) for h in (False, True))
+        assert abs(free.half_angle - half) <= spacing
+        assert math.acos(min(float(held.axis @ UP), 1.0)) <= held.half_angle + 1e-9
+        assert held.half_angle <= free.half_angle + 1e-9
+        assert (held.half_angle > half - 2 * spacing) == (lean < half)
+    good[0] = False
+    assert zone_cone(good[None], np.ones(1), d, holds_first=True) is None
+    # nothing but the first: it is the cone
+    lone = zone_cone((np.arange(len(d)) == 0)[None], np.ones(1), d, holds_first=True)
+    assert lone.half_angle == 0.0 and (lone.axis == UP).all() and lone.share == 1.0
+
+
 def test_a_level_place_under_a_flat_end_is_tried_off_the_axis():
     """0.3 mm beside a wall a flat end of 4 mm stands with its axis 2 mm away, whichever way the part lies."""
     mesh = terraces([0, 10, 20], [-10, 10], [[2.0, 8.0]])
