@@ -200,7 +200,7 @@ def zone_table(step: Path, setup: dict[str, Any]) -> dict[tuple[str, str, str], 
     for z in ready.zones:
         area = float(ready.samples.area[z.samples].sum())
         if area >= ZONE_LEAST:
-            kind = " ".join(w[0] if w[0] in "HWC" else w for w in z.region.split())
+            kind = " ".join(w[0] if w[0] in "HWC" else w.split(".")[0] for w in z.region.split())
             key = (kind, str(z.form), z.tool.id)
             out[key] = out.get(key, 0.0) + area
     return out

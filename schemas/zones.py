@@ -90,8 +90,9 @@ class ZoneFacts(ReportModel):
                                                      "or no wall.")] = None
     level: Annotated[Level | None, Field(description="Complexity of the profile; null: no wall.")] = None
     profiles: Annotated[list[SideProfile], Field(description="The sides of walls the zone lies on.")] = []
-    open: Annotated[bool | None, Field(description="Passes can leave the zone at its deepest.")] = None
-    region: Annotated[str | None, Field(examples=["H1", "H1 over C2", "W1", "C2", "top", "floor", "free"])] = None
+    open: Annotated[bool | None, Field(description="Passes can leave the zone sideways at their level.")] = None
+    region: Annotated[str | None, Field(examples=["H1", "H1.2", "H1 over C2", "W1", "C2", "top", "floor",
+                                                  "free"])] = None
     merged: Annotated[list[str], Field(description="Cells over or under connections that were joined to it.")] = []
     form: Literal["level", "shallow", "steep"] | None = None
     faces: list[Any] = []
