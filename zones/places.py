@@ -24,6 +24,7 @@ OPEN = 0  # number of the place outside all that stands
 NARROW = 0.05  # mm: half the diameter of the thinnest tool that is ever asked for; narrower is no place
 FACES_UP = 1e-6  # n_z above: a triangle that covers part of the plan
 STEP = 1e-3  # mm, levels nearer than this are one
+NOTHING = shapely.Polygon()
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +39,14 @@ class LevelPlaces:
     number: NDArray[np.int64]
 
     @staticmethod
-    def of(standing: shapely.Geometry) -> LevelPlaces:
-        """The places left by what covers ``standing`` (polygons, mm)."""
+    def of(standing: shapely.Geometry, spans: shapely.Geometry = NOTHING) -> LevelPlaces:
+        """The places left by what covers ``standing`` (polygons, mm); what lies all under ``spans`` is none."""
         plan = PlanMap.of([Area("material", standing)])
         number = np.full(len(plan.over), MATERIAL, np.int64)
         number[0] = OPEN
         count = 0
         for k in np.flatnonzero(~plan.over[:, 0]).tolist():
-            if k and not plan.map.outline(plan.faces, k).buffer(-NARROW).is_empty:
+            if k and not plan.map.outline(plan.faces, k).difference(spans).buffer(-NARROW).is_empty:
                 count += 1
                 number[k] = count
         return LevelPlaces(plan, number)
@@ -72,23 +73,26 @@ class Places:
     """The places of a part at any level.
 
     triangles : (n, 3, 3) float64, mm, what faces up, without connections
+    spans     : what connections cover in plan, mm; where they end at a leaning wall there is a hole in what it covers
     """
 
     triangles: F64
+    spans: shapely.Geometry
     known: dict[int, LevelPlaces] = field(default_factory=dict)
 
     @staticmethod
     def of(part: Part, spans: Iterable[int]) -> Places:
         """Of a part, mm, the access along +Z; ``spans`` are the faces of its connections with their fillets."""
         mesh = part.mesh
-        keep = (mesh.normals[:, 2] > FACES_UP) & ~np.isin(mesh.face_ids, list(spans))
-        return Places(np.asarray(mesh.triangles[keep]))
+        up, span = mesh.normals[:, 2] > FACES_UP, np.isin(mesh.face_ids, list(spans))
+        covered = standing(mesh.triangles[up & span], -np.inf)
+        return Places(np.asarray(mesh.triangles[up & ~span]), covered.buffer(NARROW))
 
     def at_level(self, level: float) -> LevelPlaces:
         """The places at a level, mm."""
         key = round(level / STEP)
         if key not in self.known:
-            self.known[key] = LevelPlaces.of(standing(self.triangles, key * STEP))
+            self.known[key] = LevelPlaces.of(standing(self.triangles, key * STEP), self.spans)
         return self.known[key]
 
 

@@ -10,7 +10,7 @@ import shapely
 
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, sample_surface
-from tests.decomposition_shapes import box, to_part
+from tests.decomposition_shapes import box, outline, plate, to_part
 from zones.categories import Categories
 from zones.decompose import decompose
 from zones.model import Decomposition
@@ -102,6 +102,17 @@ def test_places_share_edges_not_points():
     assert {a, b} == {1, 2} and outside == 0 and inside == MATERIAL
     assert b == 1  # it begins farther left
     assert places.nearest(np.array([[2.0, 3.9]]), (1, 2)).tolist() == [1]
+
+
+def test_where_a_web_ends_at_leaning_walls_is_no_place():
+    # the walls lean away from each other, so the end of the web is a hole in what they cover
+    walls = [outline("YZ", [(y, 3), (y + 2, 3), (y + 2 + s, 17), (y + s, 17)], 50, (0, 0, 0))
+             for y, s in ((-13, -6), (0, 6))]
+    part = to_part(plate(60, 60).union(walls[0]).union(walls[1]).union(box(12, 20.6, 4, 18, -15.8, 10)))
+    d = decompose(part)
+    assert len(d.connections) == 1
+    plan = ChannelPlan.of(part, d)
+    assert all(r.own == (0,) and set(r.places.outlines) == {0} for r in plan.parting.regions.values())
 
 
 def test_what_stands_above_a_level():
