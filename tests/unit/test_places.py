@@ -108,7 +108,7 @@ def test_where_a_web_ends_at_leaning_walls_is_no_place():
     # the walls lean away from each other, so the end of the web is a hole in what they cover
     walls = [outline("YZ", [(y, 3), (y + 2, 3), (y + 2 + s, 17), (y + s, 17)], 50, (0, 0, 0))
              for y, s in ((-13, -6), (0, 6))]
-    part = to_part(plate(60, 60).union(walls[0]).union(walls[1]).union(box(12, 20.6, 4, 18, -15.8, 10)))
+    part = to_part(plate(60, 60).union(walls[0]).union(walls[1]).union(box(12, 20.6, 3, 18, -15.8, 11)))
     d = decompose(part)
     assert len(d.connections) == 1
     plan = ChannelPlan.of(part, d)
