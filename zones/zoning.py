@@ -7,13 +7,14 @@
    down to the cutting plane where its shank or holder first meets the surroundings (the neck rule, cell by cell);
    what lies deeper, or where it does not fit, is left to the next tool. What no other tool takes either is then given
    to the stoutest one that stands clear of it, below its cutting plane or not.
-4. Samples of one region, form, tool and view are one zone. A cell under or over a connection joins the zone of its
+4. What is left of many regions is pooled: a tool that has a zone anyway, or gets enough of it all, takes its share.
+5. Samples of one region, form, tool and view are one zone. A cell under or over a connection joins the zone of its
    channel or wall where the same tool gets there from the same side; else it is a zone of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -31,8 +32,13 @@ from zones.regions import base_of
 from zones.sight import Sight
 from zones.view import View
 
+# What a tool has to gain to be used in a region, whatever the size of that: 1 mm² is 25 planning samples, on which an
+# area is known to a fifth; where samples stand wider, 25 of them. It is also what a tool to buy has to gain.
 LEAST_ZONE_MM2 = 1.0
-LEAST_ZONE_SHARE = 0.002
+CERTAIN = 25
+# What a tool that is used anyway has to gain for one more zone: a way there but no change; five samples.
+LEAST_PART_MM2 = 0.2
+THERE = 5
 SMALL_REGION_MM2 = 30.0  # a region this small gets one tool, not a tool change for every corner
 ONE_TOOL_SHARE = 0.97
 
@@ -131,7 +137,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
                 for zone in _split(sight, members, base, form):
                     taken[zone.samples] = True
                     found.append(zone)
-    found = _joined(found, views)
+    found = _joined([*found, *_gleaned(sights, found, taken)], views)
     if categories is not None:
         found = [replace(z, category=categories.of(z.region)) for z in found]
     place = {v.id: k for k, v in enumerate(views)}
@@ -168,10 +174,55 @@ class _Take:
     tried: tuple[dict[str, object], ...]
 
 
+def least_area(area: F64, worth: float, samples: int) -> float:
+    """What a tool has to gain of some samples, mm²: ``worth``, and no less than so many samples stand for.
+
+    area : (n,) float64, mm², what each stands for; 0 on borders
+    """
+    inner = area[area > 0]
+    return max(worth, samples * float(inner.mean())) if len(inner) else worth
+
+
+def _gleaned(sights: Sequence[Sight], found: Sequence[ZoneArea], taken: NDArray[np.bool_]) -> list[ZoneArea]:
+    """Zones of what was too little region by region; ``taken`` is kept up to date.
+
+    Tools that have a zone in a view come first, for they are in the spindle anyway; then those that gain enough of all
+    regions together, the stoutest first.
+    """
+    out: list[ZoneArea] = []
+    for sight in sights:
+        here = [z for z in found if z.access == sight.view.id]
+        used = {z.tool.id for z in here}
+        order = sight.order(Form.STEEP)
+        for tid in [*(t for t in order if t in used), *(t for t in order if t not in used)]:
+            own = {(z.region, z.form) for z in here if z.tool.id == tid}
+            parts = _parts(sight, sight.gets(tid) & ~taken, own)
+            rows = np.concatenate([members for *_, members in parts]) if parts else np.zeros(0, np.int64)
+            area = sight.samples.area[rows]
+            if tid not in used and float(area.sum()) < least_area(area, LEAST_ZONE_MM2, CERTAIN):
+                continue
+            taken[rows] = True
+            for base, form, members in parts:
+                out.extend(_zones_of(sight, tid, _Take(members, {}, ()), base, form, (base, form) in own))
+    return out
+
+
+def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Form]]
+           ) -> list[tuple[str, Form, NDArray[np.int64]]]:
+    """Groups of (n,) bool samples that are worth a zone to a tool in use; whatever adds to one of its ``own`` is."""
+    out = []
+    for base, form, members in sight.groups(rows):
+        area = sight.samples.area[members]
+        least = 0.0 if (base, form) in own else least_area(area, LEAST_PART_MM2, THERE)
+        if float(area.sum()) > 0.0 and float(area.sum()) >= least:
+            out.append((base, form, members))
+    return out
+
+
 def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> list[ZoneArea]:
     left = members
     area = sight.samples.area
-    least = max(LEAST_ZONE_MM2, LEAST_ZONE_SHARE * float(area[members].sum()))
+    least = least_area(area[members], LEAST_ZONE_MM2, CERTAIN)
     tried: list[dict[str, object]] = []
     out: dict[str, _Take] = {}
     order = sight.order(form)
@@ -200,16 +251,16 @@ def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> l
     return [z for tid, t in out.items() for z in _zones_of(sight, tid, t, base, form)]
 
 
-def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form) -> list[ZoneArea]:
-    """One zone where the tool cuts the plain cells of the region too, else one for each cell."""
+def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form, has_plain: bool = False) -> list[ZoneArea]:
+    """One zone where the tool cuts the plain cells of the region too (or has them already), else one for each cell."""
     labels = sight.view.labels
     cells = np.unique(labels.code[take.rows]).tolist()
     plain = [c for c in cells if labels.regions[c].name == base]
-    parts = [(base, cells)] if plain else [(labels.regions[c].name, [c]) for c in cells]
+    parts = [(base, cells)] if plain or has_plain else [(labels.regions[c].name, [c]) for c in cells]
     out = []
     for name, codes in parts:
         rows = take.rows[np.isin(labels.code[take.rows], codes)]
-        kind = "SCZI" if base.startswith("C") or not plain else "SCZ"
+        kind = "SCZI" if base.startswith("C") or not (plain or has_plain) else "SCZ"
         planes = {labels.regions[c].name: take.planes[c] for c in codes if c in take.planes}
         merged = tuple(sorted(labels.regions[c].name for c in codes if labels.regions[c].name != name))
         out.append(_zone(sight, tid, rows, kind, name, form, planes, merged, take.tried))
@@ -225,8 +276,9 @@ def _zone(sight: Sight, tid: str, rows: NDArray[np.int64], kind: str, name: str,
 
 
 def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
-    """Zones of one view, region, form and tool made one: the second round may add to what the first one took."""
+    """Zones of one view, region, form and tool made one: later rounds may add to what the first one took."""
     heights = {v.id: v.samples.points[:, 2] for v in views}
+    names = {v.id: v.labels.names for v in views}
     face = views[0].samples.face
     groups: dict[tuple[str, str, Form, str], list[ZoneArea]] = {}
     for z in zones:
@@ -238,9 +290,12 @@ def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
             rows = np.concatenate([z.samples for z in same])
             order = np.argsort(rows, kind="stable")
             h = heights[access][rows]
+            keeps = not any(z.planes or first.below_plane(names[access][z.samples], heights[access][z.samples]).any()
+                            for z in same[1:])
             first = replace(first, samples=rows[order], tips=np.vstack([z.tips for z in same])[order],
                             faces=tuple(int(f) for f in np.unique(face[rows])), top=float(h.max()),
-                            bottom=float(h.min()), planes={}, merged=tuple(sorted({m for z in same for m in z.merged})))
+                            bottom=float(h.min()), planes=first.planes if keeps else {},
+                            merged=tuple(sorted({m for z in same for m in z.merged})))
         out.append(first)
     return out
 

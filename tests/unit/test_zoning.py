@@ -9,9 +9,10 @@ from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
 from zones.machinable import Form, forms_of, machinable_faces
 from zones.model import Connection, Decomposition
-from zones.regions import Labels, face_bases
+from zones.reach import touchable
+from zones.regions import Labels, Region, face_bases
 from zones.sight import able, preference
-from zones.zoning import build_zones, is_open
+from zones.zoning import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
 
 NOTHING = Decomposition((), (), ())
 
@@ -153,3 +154,54 @@ def test_open_and_closed_zones():
     pocket = terraces([0, 4, 16, 20], [0, 4, 16, 20], [[8, 8, 8], [8, 2, 8], [8, 8, 8]])
     _, fields, zones = zones_of(pocket, [ball(4)], faces={face_at(pocket, (10, 10, 2), (0, 0, 1))})
     assert not is_open(zones[0], fields["T1"])
+
+
+def pocket(size: float):
+    """A square pocket 6 deep with sharp corners in a block."""
+    a, b = 10.0, 10.0 + size
+    return terraces([0, a, b, b + a], [0, a, b, b + a], [[8, 8, 8], [8, 2, 8], [8, 8, 8]])
+
+
+@pytest.mark.parametrize("size", [60.0, 300.0])
+def test_the_corners_of_a_floor_are_no_less_worth_in_a_large_pocket(size):
+    mesh = pocket(size)
+    floor = {face_at(mesh, (10 + size / 2, 10 + size / 2, 2), (0, 0, 1))}
+    samples, _, zones = zones_of(mesh, [tool(25.0, 0.0, "T1"), tool(8.0, 0.0, "T2")], faces=floor,
+                                 density=min(20.0, 1e5 / size ** 2))
+    assert [z.tool.id for z in zones] == ["T1", "T2"]
+    left_by = [4 * (1 - np.pi / 4) * (d / 2) ** 2 for d in (25.0, 8.0)]  # in four square corners
+    assert samples.area[zones[1].samples].sum() == pytest.approx(left_by[0] - left_by[1], rel=0.1)
+
+
+def test_what_is_too_little_in_each_region_is_pooled():
+    # four corners, each a region of its own: 0.6 mm² in each are too little for a zone, 2.4 mm² are worth a tool
+    mesh = pocket(40.0)
+    samples = samples_of(mesh, 60.0, {face_at(mesh, (30, 30, 2), (0, 0, 1))})
+    tools = [tool(4.0, 0.0, "T1"), tool(2.0, 0.0, "T2")]
+    fields = {t.id: field_of(mesh, t) for t in tools}
+    side = (samples.points[:, :2] > 30).astype(int)
+    quarter = side[:, 0] + 2 * side[:, 1]
+
+    def held(rows):
+        few, code = samples.subset(rows), quarter[rows].astype(np.int64)
+        view = view_of(as_part(mesh), few, fields, labels=Labels(tuple(Region(f"W{k}") for k in range(4)), code))
+        found = build_zones([view], NOTHING, 0.02, 0.002).zones
+        return {z.region: float(few.area[z.samples].sum()) for z in found if z.tool.id == "T2"}
+
+    apiece = (1 - np.pi / 4) * (2.0 ** 2 - 1.0 ** 2)
+    assert apiece < LEAST_ZONE_MM2 < 4 * apiece
+    assert held(np.flatnonzero(quarter == 0)) == {}
+    got = held(np.arange(len(samples)))
+    assert set(got) == {"W0", "W1", "W2", "W3"} and sum(got.values()) == pytest.approx(4 * apiece, rel=0.1)
+
+
+def test_no_tool_that_is_used_leaves_what_is_worth_a_zone():
+    samples, fields, zones = zones_of(walls(), [ball(4, "T1"), tool(3, 0, "T2")], density=40.0)
+    taken = np.zeros(len(samples), bool)
+    taken[np.concatenate([z.samples for z in zones])] = True
+    for t in {z.tool.id for z in zones}:
+        gets = touchable(fields[t], samples.points, samples.normals, 0.002)[1] & able(fields[t].tool, samples.normals,
+                                                                                    0.02)
+        for form in Form:
+            rows = gets & ~taken & (forms_of(samples.normals) == form)
+            assert samples.area[rows].sum() <= LEAST_PART_MM2
