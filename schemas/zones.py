@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from schemas.base import ReportModel
+from schemas.tools import Tool
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Level = Literal["simple", "medium", "high"]
@@ -150,8 +151,10 @@ class ProposedTool(ReportModel):
     stickout_mm: float
     slenderness: Annotated[float, Field(description="Neck length over diameter.")]
     instead_of: Annotated[str | None, Field(description="Tool at hand with the same cutter.")] = None
+    like: Annotated[str | None, Field(description="Tool at hand whose holder it was measured with.")] = None
     access: str
-    area_mm2: Annotated[float, Field(description="Of the remainder, what it takes.")]
+    area_mm2: Annotated[float, Field(description="Of the remainder, what zones with it hold.")]
+    tool: Annotated[Tool | None, Field(description="The same as an entry for tools of the setup, complete.")] = None
 
 
 class Proposal(ReportModel):
@@ -159,8 +162,8 @@ class Proposal(ReportModel):
 
     tools: list[ProposedTool]
     emptied_mm2: float
-    stays_mm2: Annotated[dict[str, float], Field(description="By reason: undercut, sharp corner, slender, pass, "
-                                                             "too little.")]
+    stays_mm2: Annotated[dict[str, float], Field(description="By reason: undercut, fixture, sharp corner, slender, "
+                                                             "pass, too little.")]
 
 
 class Zones(ReportModel):

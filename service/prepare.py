@@ -193,6 +193,20 @@ def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tupl
     return ()
 
 
+def tip_field(setup: Setup, part: Part, rotation: F64, obstacles: TriangleTree, bounds: F64,
+              body: ToolBody) -> TipField:
+    """Tip limits of a tool along an access, over the part, the room beside it and the blank.
+
+    part                  : Part in the setup frame
+    rotation              : (3, 3) from there into the access frame
+    obstacles, bounds     : TriangleTree of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
+    """
+    box = stock_box(setup, part)
+    box = None if box is None else turned_box(box, rotation)
+    return TipField(obstacles, body, clearances(setup), bounds, _room(body, bounds, box, setup), lattice_step(body),
+                    setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
+
+
 def _view(setup: Setup, k: int, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
           decomposition: Decomposition, channels: ChannelPlan) -> View:
     """The k-th access: the part turned into its frame, tip limits of all tools, regions of the samples."""
@@ -203,11 +217,7 @@ def _view(setup: Setup, k: int, part: Part, rotation: F64, first: F64, samples: 
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         obstacles = TriangleTree(obstacle_mesh(part, setup).transformed(matrix))
-    box = stock_box(setup, part)
-    box = None if box is None else turned_box(box, rotation)
-    fields = {b.id: TipField(obstacles, b, clearances(setup), here.bounds, _room(b, here.bounds, box, setup),
-                             lattice_step(b), setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
-              for b in tool_bodies(setup)}
+    fields = {b.id: tip_field(setup, part, rotation, obstacles, here.bounds, b) for b in tool_bodies(setup)}
     seen = turned_samples(samples, rotation @ first.T)
     regioner = Regioner(here, decomposition, channels, first=k == 0)
     there = None if k == 0 else (samples.points, samples.normals)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import Setup, setup_sha256
-from service import advice
+from service import advice, offers
 from service.prepare import Prepared
 from service.version import VERSION
 from toolpath.motion import Motion, Workingstep
@@ -116,7 +116,7 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
     first = ready.views[0]
     items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift)
     return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(ready, items),
-            "proposal": advice.as_dict(advice.proposals(ready))}
+            "proposal": offers.as_dict(ready.setup, offers.offers(ready))}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
@@ -153,7 +153,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
-        "proposal": advice.as_dict(advice.proposals(ready)), "findings": findings,
+        "proposal": offers.as_dict(ready.setup, offers.offers(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machinable_area_mm2": r(total, 3), "machining_time_s": r(proof.machining_time, 1),

@@ -7,7 +7,6 @@ the samples it takes, and the list is a minimum set cover, solved exactly. Theor
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -17,28 +16,23 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_matrix, hstack, identity
 
 from geometry.bvh import TriangleTree
-from geometry.drop import drop_grid, drop_tips
 from geometry.errors import InternalError
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import HolderSegment, ToolBody
-from zones.reach import LEVEL_TOLERANCE, LOOKUP_STEP, Clearances, Lattice, TipField, discs_of, lattice_step, touchable
-from zones.remainder import DIAMETERS
+from zones.catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, Lengths, nearest, sold
+from zones.fixtures import covered, over_the_part
+from zones.reach import Clearances, TipField, lattice_step, touchable
+from zones.zoning import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 2000
 SEED = 11
 SEEN = -0.02  # n_z below: out of sight
-BULL_CORNER = 0.2  # corner radius of the bull noses tried, in diameters
-FLUTES = 3.0  # flute length in diameters, where the neck is as long
-RELIEF = 0.05  # how much thinner than the cutter a neck is, in diameters
-MOST_SLENDER = 20.0  # neck length in diameters; no thinner tool is proposed
-LEAST_MM2 = 1.0  # a tool that gains less is not proposed
+LEAST_MM2 = LEAST_ZONE_MM2  # a tool that gains less is not proposed: zones would not use it either
 LEVELS = 8  # neck lengths tried for one cutter
-LEAST_NECK = 1.0  # mm
-NOSE_STEP = 0.8  # mm, grid of the heights that holders have to clear
-PER_SLENDER, PER_STOUT = 1e-2, 1e-4  # weights of the ties, in tools: total slenderness, then thickness
+# weights of the ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
+PER_SLENDER, PER_NEW, PER_STOUT = 1e-2, 1e-3, 1e-4
 
 Able = Callable[[ToolBody, F64], NDArray[np.bool_]]
 
@@ -77,13 +71,18 @@ class Proposal:
     tools       : stoutest first
     emptied_mm2 : of the remainder
     stays_mm2   : by reason: 'undercut', 'pass' (a tool at hand touches it), 'slender' (only a neck longer than the
-                  limit in diameters does), 'sharp corner' (no round tool), 'too little' (not worth a tool)
+                  limit in diameters does), 'sharp corner' (no round tool), 'too little' (not worth a tool), 'fixture'
+                  (one stands above it, or keeps the tools at hand from it that touch it on the bare part)
+    rows        : per tool, the samples it takes; asked : the samples that were asked; why : (n,) of each of these the
+                  reason, 'taken' where a tool does
     """
 
     tools: tuple[ProposedTool, ...]
     emptied_mm2: float
     stays_mm2: dict[str, float]
     rows: tuple[NDArray[np.int64], ...] = field(default=(), compare=False, repr=False)
+    asked: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), compare=False, repr=False)
+    why: NDArray[np.object_] = field(default_factory=lambda: np.zeros(0, object), compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +101,7 @@ class _Candidate:
 
 
 def propose(samples: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTree, part: Part, lift: float,
-            clear: Clearances, able: Able, *, slenderness: float = MOST_SLENDER,
+            clear: Clearances, able: Able, *, bare: TriangleTree | None = None, slenderness: float = MOST_SLENDER,
             least_mm2: float = LEAST_MM2) -> Proposal:
     """Fewest tools that take what no tool at hand does.
 
@@ -113,6 +112,7 @@ def propose(samples: SurfaceSamples, fields: Mapping[str, TipField], tree: Trian
     lift        : mm, distance along the normal within which a touch counts
     clear       : Clearances
     able        : (tool, (n, 3) normals) -> (n,) bool, whether a strategy exists for them
+    bare        : TriangleTree of the part alone, None where there are no fixtures
     slenderness : longest neck in diameters
     least_mm2   : a tool that gains less is not proposed
 
@@ -132,7 +132,7 @@ def propose(samples: SurfaceSamples, fields: Mapping[str, TipField], tree: Trian
     asked = np.sort(rng.choice(n, ASKED_AT_MOST, replace=False)) if n > ASKED_AT_MOST else np.arange(n)
     few = samples.subset(asked)
     area = few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-300))
-    why = _known(few, fields, tree, lift, able)
+    why = _known(few, fields, tree, tree if bare is None else bare, lift, able)
     left = np.flatnonzero(why == "")
     shop = _Shop(tree, part, fields, lift, clear, able, slenderness)
     candidates, why[left] = shop.candidates(few.points[left], few.normals[left])
@@ -148,29 +148,34 @@ def propose(samples: SurfaceSamples, fields: Mapping[str, TipField], tree: Trian
         tools.append(_named(c, c.need[mine], float(area[taken].sum())))
         rows.append(asked[taken])
     why[why == "tool"] = "too little"
+    if bare is not None:
+        rest = np.flatnonzero(np.isin(why, ("slender", "sharp corner")))
+        without = over_the_part(fields, bare, part.bounds, clear)
+        why[rest[_touched(few.subset(rest), without, lift, able)]] = "fixture"
     stays = {str(r): float(area[why == r].sum()) for r in sorted(set(why.tolist()) - {"taken"})}
-    return Proposal(tuple(tools), float(area[why == "taken"].sum()), stays, tuple(rows))
+    return Proposal(tuple(tools), float(area[why == "taken"].sum()), stays, tuple(rows), asked, why)
 
 
-def _known(few: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTree, lift: float,
+def _known(few: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTree, bare: TriangleTree, lift: float,
            able: Able) -> NDArray[np.object_]:
     """Reason of the samples no new tool is asked for: out of sight or covered, or touched by a tool at hand."""
     why = np.full(len(few), "", dtype=object)
-    up = np.tile(np.array([0.0, 0.0, 1.0]), (len(few), 1))
-    _, above = first_hits(tree, few.points + 0.02 * few.normals, up, 1e-4, 1e6)
-    why[(few.normals[:, 2] <= SEEN) | (np.asarray(above) >= 0)] = "undercut"
-    for key in sorted(fields):
-        open_to = np.flatnonzero(why == "")
-        normals = few.normals[open_to]
-        takes = touchable(fields[key], few.points[open_to], normals, lift)[1]
-        why[open_to[takes & able(fields[key].tool, normals)]] = "pass"
+    if bare is not tree:
+        why[covered(few, tree)] = "fixture"
+    why[(few.normals[:, 2] <= SEEN) | covered(few, bare)] = "undercut"
+    open_to = np.flatnonzero(why == "")
+    why[open_to[_touched(few.subset(open_to), fields, lift, able)]] = "pass"
     return why
 
 
-def catalogue(lengths: F64) -> F64:
-    """Lengths tools are sold in, none less than asked of (k,) float64, mm: steps of 1 up to 20, of 5 above."""
-    step = np.where(lengths <= 20.0, 1.0, 5.0)
-    return np.asarray(step * np.ceil(lengths / step - 1e-9))
+def _touched(samples: SurfaceSamples, fields: Mapping[str, TipField], lift: float, able: Able) -> NDArray[np.bool_]:
+    """(n,) bool: some tool touches it and has a strategy for it."""
+    got = np.zeros(len(samples), np.bool_)
+    for key in sorted(fields):
+        left = np.flatnonzero(~got)
+        normals = samples.normals[left]
+        got[left] = touchable(fields[key], samples.points[left], normals, lift)[1] & able(fields[key].tool, normals)
+    return got
 
 
 class _Shop:
@@ -183,8 +188,7 @@ class _Shop:
         some = fields[min(fields)]
         self.allowance, self.cusp = some.allowance, some.cusp
         widest = max(max(DIAMETERS), *(f.tool.diameter for f in fields.values()))
-        self.lattice = Lattice.over(part.bounds, 0.5 * widest + 2 * NOSE_STEP, NOSE_STEP)
-        self._heights: dict[float, F64] = {}
+        self.lengths = Lengths(tree, part.bounds, clear, self.allowance, self.cusp, widest)
 
     def cutters(self) -> list[tuple[ToolBody, str, str]]:
         """Tools to ask, stout to thin, with the id of the one at hand that has this cutter and of its holder."""
@@ -192,12 +196,12 @@ class _Shop:
         out = [(t, t.id, t.id) for t in tools]
         have = {(t.diameter, t.corner_radius) for t in tools}
         for d in DIAMETERS:
-            like = min(tools, key=lambda t: (abs(math.log(t.diameter / d)), t.id))
+            if 0.5 * d <= self.cusp:  # such a tool cannot keep its cusp below its own radius, and no setup takes it
+                continue
+            like = nearest(tools, d)
             for corner in (d / 2, 0.0, round(BULL_CORNER * d, 6)):
                 if (d, corner) not in have:
-                    out.append((replace(like, diameter=d, corner_radius=corner, flute_length=FLUTES * d,
-                                        neck_diameter=(1.0 - RELIEF) * d, shank_diameter=max(like.shank_diameter, d)),
-                                "", like.id))
+                    out.append((sold(like, d, corner), "", like.id))
         return sorted(out, key=lambda c: (-c[0].diameter, -c[0].corner_radius, c[1]))
 
     def candidates(self, points: F64, normals: F64) -> tuple[list[_Candidate], NDArray[np.object_]]:
@@ -214,38 +218,12 @@ class _Shop:
             if not len(rows):
                 continue
             floor = (body.neck_length, body.stickout) if at_hand else (0.0, 0.0)  # instead of it, nothing is lost
-            need = self.lengths(body, tips[fits], floor)
+            need = self.lengths.at(body, tips[fits], floor)
             short = need[:, 0] <= self.slenderness * body.diameter + 1e-9
             why[rows[~short & (why[rows] != "tool")]] = "slender"
             why[rows[short]] = "tool"
             out.extend(_levels(body, at_hand, like, rows[short], need[short]))
         return out, why
-
-    def lengths(self, body: ToolBody, tips: F64, floor: tuple[float, float]) -> F64:
-        """Neck length and stickout (k, 2) a tool needs at tips (k, 3), in catalogue steps but no less than floor, mm.
-
-        A shank shows at least as long as it is thick. Surroundings are looked at one cell of the shank and holder
-        grid wider than asked for, so that the tool also passes that grid wherever its nodes lie.
-        """
-        spare = LOOKUP_STEP * math.sqrt(2.0)
-        lift = self.allowance + self.cusp + 2 * LEVEL_TOLERANCE - tips[:, 2]
-        wide = 0.5 * body.shank_diameter + self.clear.shank + self.allowance + spare
-        neck = drop_tips(self.tree, tips[:, :2], wide, 0.0) + lift
-        nose = np.full(len(tips), -np.inf)
-        cells = self.lattice.cells(tips[:, :2])
-        for d in discs_of(body, self.clear):
-            if d.name == "holder":
-                height = self._height(d.radius + self.allowance + spare + NOSE_STEP / math.sqrt(2.0))
-                nose = np.maximum(nose, height[cells] + lift - (d.height - body.stickout))
-        neck = np.maximum(catalogue(np.maximum(neck, LEAST_NECK)), floor[0])
-        return np.column_stack([neck, np.maximum(catalogue(np.maximum(nose, neck + body.shank_diameter)), floor[1])])
-
-    def _height(self, radius: float) -> F64:
-        """What stands highest within a radius of the nodes of the holder grid, mm."""
-        if radius not in self._heights:
-            g = self.lattice
-            self._heights[radius] = drop_grid(self.tree, g.x0, g.y0, g.step, g.nx, g.ny, radius, 0.0)
-        return self._heights[radius]
 
 
 def _levels(body: ToolBody, at_hand: str, like: str, rows: NDArray[np.int64], need: F64) -> list[_Candidate]:
@@ -283,7 +261,8 @@ def _fewest(candidates: list[_Candidate], area: F64, least: float) -> list[_Cand
     kinds = kinds[:, useful]
     diameters = np.array([candidates[j].body.diameter for j in useful])
     slender = np.array([candidates[j].slenderness for j in useful])
-    price = 1.0 + PER_SLENDER * slender / MOST_SLENDER - PER_STOUT * diameters / max(DIAMETERS)
+    new = np.array([not candidates[j].at_hand for j in useful])
+    price = 1.0 + PER_SLENDER * slender / MOST_SLENDER + PER_NEW * new - PER_STOUT * diameters / max(DIAMETERS)
     rows = hstack([csr_matrix(kinds.astype(np.float64)), identity(len(kinds))], format="csr")
     answer = milp(np.concatenate([price, worth]), constraints=LinearConstraint(rows, lb=1.0),
                   integrality=np.concatenate([np.ones(len(useful)), np.zeros(len(kinds))]),

@@ -23,6 +23,7 @@ from geometry.part import Part
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
+from zones.catalogue import DIAMETERS
 from zones.faces import connection_of
 from zones.machinable import SEEN
 from zones.model import Decomposition
@@ -30,8 +31,6 @@ from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, tou
 from zones.regions import Labels
 from zones.view import View
 
-# mm, tried from stout to thin below the thinnest cutter at hand; nobody is asked to buy a thinner one than the last
-DIAMETERS = (40.0, 25.0, 16.0, 10.0, 6.0, 4.0, 2.5, 1.5, 1.0, 0.6, 0.4, 0.25, 0.15, 0.1)
 ASKED_AT_MOST = 6000  # samples that are asked one by one; the rest follow the nearest in kind by random choice
 # how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last
 GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "gap": 3, "corner": 4, "sharp corner": 5}

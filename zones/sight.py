@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,14 +59,20 @@ def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list
 
 
 class Sight:
-    """One view with what its tools reach."""
+    """One view with what its tools reach.
 
-    def __init__(self, view: View, decomposition: Decomposition, scallop: float, lift: float) -> None:
+    known : Reach by tool id where it was found before, of the same samples
+    """
+
+    def __init__(self, view: View, decomposition: Decomposition, scallop: float, lift: float,
+                 known: Mapping[str, Reach] | None = None) -> None:
         self.view, self.samples = view, view.samples
         self.form = forms_of(self.samples.normals)
         self.can = {t: able(f.tool, self.samples.normals, scallop) for t, f in view.fields.items()}
-        self.reach = {t: Reach(*touchable(f, self.samples.points, self.samples.normals, lift))
-                      for t, f in view.fields.items()}
+        self.reach = dict(known or {})
+        for t, f in view.fields.items():
+            if t not in self.reach:
+                self.reach[t] = Reach(*touchable(f, self.samples.points, self.samples.normals, lift))
         self.bands = connection_bands(view, decomposition)
 
     def gets(self, tool: str) -> NDArray[np.bool_]:

@@ -29,7 +29,7 @@ from zones.openness import OPEN_SHARE, open_share
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach import TipField
 from zones.regions import base_of
-from zones.sight import Sight
+from zones.sight import Reach, Sight
 from zones.view import View
 
 # What a tool has to gain to be used in a region, whatever the size of that: 1 mm² is 25 planning samples, on which an
@@ -99,16 +99,20 @@ class Mcz:
 
 @dataclass(frozen=True, eq=False)
 class Zoning:
-    """Zones in machining order, main computable zones, cutting planes, and (n,) bool which samples some zone holds."""
+    """Zones in machining order, main computable zones, cutting planes, and (n,) bool which samples some zone holds.
+
+    reach : of every view, what each tool reaches
+    """
 
     zones: tuple[ZoneArea, ...]
     mcz: tuple[Mcz, ...]
     planes: tuple[CuttingPlane, ...]
     taken: NDArray[np.bool_]
+    reach: tuple[Mapping[str, Reach], ...] = field(default=(), repr=False)
 
 
 def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: float, lift: float,
-                categories: Categories | None = None) -> Zoning:
+                categories: Categories | None = None, known: Sequence[Mapping[str, Reach]] = ()) -> Zoning:
     """Give every sample of the machinable area to the stoutest tool that can touch it.
 
     views         : in the order they are machined; the same samples and tools in each
@@ -116,6 +120,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
     scallop       : mm, allowed cusp
     lift          : mm, distance along the normal within which a touch counts
     categories    : profiles of the regions; none are given where None
+    known         : per view, what some tools reach, where that was found before
 
     Returns
     -------
@@ -123,7 +128,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
         Zones in machining order: views in turn, tools by size, simple profiles first, then from the top; samples in
         none of them are out of reach.
     """
-    sights = [Sight(v, decomposition, scallop, lift) for v in views]
+    sights = [Sight(v, decomposition, scallop, lift, known[k] if known else None) for k, v in enumerate(views)]
     area = views[0].samples.area
     mcz = tuple(Mcz(s.view.id, t, float(area[r.by_cutter].sum()), float(area[r.by_tool].sum()))
                 for s in sights for t, r in s.reach.items())
@@ -144,7 +149,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
     found.sort(key=lambda z: (place[z.access], -z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), z.category.rank,
                               -z.top, z.region, z.form))
     zones = tuple(replace(z, id=f"Z{k}") for k, z in enumerate(found, start=1))
-    return Zoning(zones, mcz, (*between, *_neck_planes(zones, sights)), taken)
+    return Zoning(zones, mcz, (*between, *_neck_planes(zones, sights)), taken, tuple(s.reach for s in sights))
 
 
 def _neck_planes(zones: Sequence[ZoneArea], sights: Sequence[Sight]) -> list[CuttingPlane]:
@@ -256,11 +261,13 @@ def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form, has_pl
     labels = sight.view.labels
     cells = np.unique(labels.code[take.rows]).tolist()
     plain = [c for c in cells if labels.regions[c].name == base]
-    parts = [(base, cells)] if plain or has_plain else [(labels.regions[c].name, [c]) for c in cells]
+    parts = [(base, cells)] if plain else [(labels.regions[c].name, [c]) for c in cells]
     out = []
+    if has_plain:
+        plain, parts = cells, [(base, cells)]
     for name, codes in parts:
         rows = take.rows[np.isin(labels.code[take.rows], codes)]
-        kind = "SCZI" if base.startswith("C") or not (plain or has_plain) else "SCZ"
+        kind = "SCZI" if base.startswith("C") or not plain else "SCZ"
         planes = {labels.regions[c].name: take.planes[c] for c in codes if c in take.planes}
         merged = tuple(sorted(labels.regions[c].name for c in codes if labels.regions[c].name != name))
         out.append(_zone(sight, tid, rows, kind, name, form, planes, merged, take.tried))

@@ -12,7 +12,8 @@ from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, joined, samples_of, terraces, tool
 from zones import proposal
-from zones.proposal import LEAST_MM2, catalogue, propose
+from zones.catalogue import DIAMETERS, MOST_SLENDER, catalogue
+from zones.proposal import LEAST_MM2, propose
 from zones.reach import Clearances, TipField, lattice_step, touchable
 
 LIFT = 0.002
@@ -74,7 +75,7 @@ def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
         assert len(rows) and t.area_mm2 >= LEAST_MM2
         for margin in (4.0, 4.13, 4.27):
             assert takes(mesh, body, left.subset(rows), margin).all()
-        assert t.neck_length_mm <= proposal.MOST_SLENDER * t.diameter_mm + 1e-9
+        assert t.neck_length_mm <= MOST_SLENDER * t.diameter_mm + 1e-9
         assert t.stickout_mm >= t.neck_length_mm + t.shank_diameter_mm - 1e-9
         assert t.flute_length_mm <= t.neck_length_mm
     assert found.emptied_mm2 == pytest.approx(sum(t.area_mm2 for t in found.tools))
@@ -91,9 +92,9 @@ def test_no_shorter_neck_would_do():
 
 
 def test_a_longer_neck_of_a_cutter_at_hand_is_named_as_such():
-    """In a channel 3.5 wide the ball of 3 at hand is the stoutest that fits, only too short."""
+    """In a channel 3.5 wide the ball of 3 at hand is the stoutest of the series that fits, only too short."""
     mesh = terraces([0, 10, 13.5, 24], [0, 40], [[16, 2, 16]])
-    short = ball(3.0, "T1", neck=6.0, shank=8.0, stickout=40.0, holder=HOLDER)
+    short = ball(3.0, "T1", neck=6.0, shank=6.0, stickout=40.0, holder=HOLDER)
     s = samples_of(mesh, 4.0)
     left = s.subset((np.abs(s.points[:, 0] - 11.75) < 1.76) & (s.points[:, 2] > 4.0) & (s.points[:, 2] < 15.9)
                     & (np.abs(s.normals[:, 0]) > 0.9) & (s.area > 0))
@@ -163,8 +164,8 @@ def test_the_cover_is_the_best_of_all_subsets(seed):
         got = np.zeros(30, bool)
         for c in chosen:
             got[c.rows] = True
-        ties = sum(proposal.PER_SLENDER * c.slenderness / proposal.MOST_SLENDER
-                   - proposal.PER_STOUT * c.body.diameter / max(proposal.DIAMETERS) for c in chosen)
+        ties = sum(proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + proposal.PER_NEW * (not c.at_hand)
+                   - proposal.PER_STOUT * c.body.diameter / max(DIAMETERS) for c in chosen)
         return len(chosen) + ties + float(area[~got & reachable].sum()) / least
 
     reachable = np.zeros(30, bool)

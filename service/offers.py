@@ -1,0 +1,163 @@
+"""The tools to add: what the proposal finds, zoned again with them, so that the list keeps what it promises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.sampling import SurfaceSamples
+from geometry.toolbody import ToolBody
+from schemas.setup import Setup
+from schemas.tools import Tool
+from service.convert import tool_bodies
+from service.prepare import Prepared, clearances, tip_field
+from zones.fixtures import covered
+from zones.machinable import SEEN
+from zones.proposal import Proposal, ProposedTool, propose
+from zones.sight import Reach, able
+from zones.view import View
+from zones.zoning import LEAST_ZONE_MM2, Zoning, build_zones
+
+LENGTHS = ("diameter_mm", "corner_radius_mm", "flute_length_mm", "neck_diameter_mm", "neck_length_mm",
+           "shank_diameter_mm", "stickout_mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """A tool to add to a setup.
+
+    access   : id of the access it was looked for along
+    proposed : its shape
+    body     : the same with an id and a number that are free in the setup
+    area_mm2 : of the remainder, what the zones with it hold
+    """
+
+    access: str
+    proposed: ProposedTool
+    body: ToolBody
+    area_mm2: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Offers:
+    """All tools to add, and what zones built with them leave; areas in mm², ``stays_mm2`` by reason."""
+
+    tools: tuple[Offer, ...]
+    emptied_mm2: float
+    stays_mm2: dict[str, float]
+
+
+def offers(ready: Prepared) -> Offers:
+    """The smallest change of the tool set, each access asked for what is in sight of it and of none before it.
+
+    Zones are built again with the tools added. One that is left with less than a tool has to gain is dropped, the
+    poorest first, and they are built once more: what is promised is what such zones hold.
+    """
+    rest = ~ready.zoning.taken & (ready.samples.area > 0)
+    asked = _asked(ready, np.flatnonzero(rest))
+    found = _numbered(ready.setup, [(v.id, t) for v, _, p in asked for t in p.tools])
+    area, known, zoning = ready.samples.area, ready.zoning.reach, ready.zoning
+    while found:
+        zoning = _again(ready, found, known)
+        known = zoning.reach
+        found = [replace(o, area_mm2=sum(float(area[z.samples[rest[z.samples]]].sum()) for z in zoning.zones
+                                         if z.tool.id == o.body.id)) for o in found]
+        poorest = min(found, key=lambda o: o.area_mm2)
+        if poorest.area_mm2 >= LEAST_ZONE_MM2:
+            break
+        found.remove(poorest)
+    if not found:
+        zoning = ready.zoning
+    stays = float(area[~zoning.taken].sum())
+    emptied = float(area[~ready.zoning.taken].sum()) - stays
+    return Offers(tuple(found), emptied, _stays(asked, area, zoning.taken, stays))
+
+
+def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], Proposal]]:
+    """Each view with the samples it is asked for and its proposal; the last one has all that is left."""
+    scallop = ready.setup.quality.scallop_height_mm
+    out = []
+    for k, view in enumerate(ready.views):
+        last = k == len(ready.views) - 1
+        here = _open(view, view.samples.subset(rest)) | last
+        mine, rest = rest[here], rest[~here]
+        bare = view.tree if view.obstacles is not view.tree else None
+        out.append((view, mine, propose(view.samples.subset(mine), view.fields, view.obstacles, view.part, ready.lift,
+                                        clearances(ready.setup),
+                                        lambda tool, normals: able(tool, normals, scallop), bare=bare)))
+    return out
+
+
+def _open(view: View, samples: SurfaceSamples) -> NDArray[np.bool_]:
+    """(n,) bool: faces the access and nothing of part and fixtures stands above."""
+    if not len(samples):
+        return np.zeros(0, np.bool_)
+    return np.asarray((samples.normals[:, 2] > SEEN) & ~covered(samples, view.obstacles))
+
+
+def _numbered(setup: Setup, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:
+    """The tools with numbers above all of the setup; ids 'P' and that number, which leave the default numbers alone."""
+    bodies = {b.id: b for b in tool_bodies(setup)}
+    number = max(b.number for b in bodies.values())
+    out = []
+    for access, t in tools:
+        number += 1
+        while f"P{number}" in bodies:
+            number += 1
+        out.append(Offer(access, t, t.body(f"P{number}", number, bodies[t.holder_of].holder)))
+    return out
+
+
+def _again(ready: Prepared, found: Sequence[Offer], known: Sequence[Mapping[str, Reach]]) -> Zoning:
+    """Zones with the tools added to those at hand in every view."""
+    setup = ready.setup
+    views = [replace(v, fields={**v.fields, **{o.body.id: tip_field(setup, ready.part, v.rotation, v.obstacles,
+                                                                    v.part.bounds, o.body) for o in found}})
+             for v in ready.views]
+    return build_zones(views, ready.decomposition, setup.quality.scallop_height_mm, ready.lift, known=known)
+
+
+def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDArray[np.float64],
+           taken: NDArray[np.bool_], total: float) -> dict[str, float]:
+    """Area that stays by reason, mm², scaled from the samples that were asked to ``total``."""
+    stays: dict[str, float] = {}
+    for _, mine, proposal in asked:
+        rows = mine[proposal.asked]
+        why = np.where(np.isin(proposal.why, ("taken", "tool")), "too little", proposal.why)
+        weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
+        for reason in set(why[~taken[rows]].tolist()):
+            stays[reason] = stays.get(reason, 0.0) + weight * float(area[rows[~taken[rows] & (why == reason)]].sum())
+    whole = sum(stays.values())
+    return {k: v * total / whole for k, v in sorted(stays.items())} if whole > 0.0 else {}
+
+
+def as_dict(setup: Setup, found: Offers) -> dict[str, Any]:
+    """The proposal of a report: one list of tools, what they empty, what stays by reason; mm and mm²."""
+    tools = []
+    for o in found.tools:
+        t = o.proposed
+        lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
+        tools.append({"kind": t.kind, **lengths, "slenderness": round(t.neck_length_mm / t.diameter_mm, 2),
+                      "instead_of": t.instead_of or None, "like": t.holder_of, "access": o.access,
+                      "area_mm2": round(o.area_mm2, 3), "tool": _entry(setup, o)})
+    return {"tools": tools, "emptied_mm2": round(found.emptied_mm2, 3),
+            "stays_mm2": {k: round(v, 3) for k, v in found.stays_mm2.items()}}
+
+
+def _entry(setup: Setup, offer: Offer) -> dict[str, Any]:
+    """The tool as an entry of ``tools`` of a setup, in the holder of the tool at hand it resembles."""
+    t = offer.proposed
+    like = next(x for x in setup.tools if x.id == t.holder_of)
+    lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
+    gauge = (like.gauge_length_mm or 0.0) - (like.stickout_mm or 0.0) + t.stickout_mm
+    entry = Tool(id=offer.body.id, number=offer.body.number, kind=t.kind, flutes=like.flutes,
+                 center_cutting=like.center_cutting, gauge_length_mm=round(gauge, 4), max_rpm=like.max_rpm,
+                 holder=like.holder, **lengths)
+    return entry.model_dump(mode="json")
+
+
+__all__ = ["Offer", "Offers", "as_dict", "offers"]

@@ -1,0 +1,100 @@
+"""Tools as they are sold, and how long one has to be at a place.
+
+Diameters and shanks are series of solid carbide mills in millimetres; lengths come in steps. What is named to a buyer,
+by the remainder or by the proposal, comes from here. Theory: docs/theory/tools.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.bvh import TriangleTree
+from geometry.drop import drop_grid, drop_tips
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from zones.reach import LEVEL_TOLERANCE, LOOKUP_STEP, Clearances, Lattice, discs_of
+
+# mm, stout to thin; nobody is asked to buy a thinner one than the last
+DIAMETERS = (40.0, 32.0, 25.0, 20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.2, 1.0, 0.8, 0.6, 0.5,
+             0.4, 0.3, 0.2, 0.1)
+# mm, for cutters of up to the same thickness
+SHANKS = (6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0, 40.0)
+MOST_SLENDER = 20.0  # neck length in diameters; no thinner tool is named
+BULL_CORNER = 0.2  # corner radius of the bull noses tried, in diameters
+FLUTES = 3.0  # flute length in diameters, where the neck is as long
+RELIEF = 0.05  # how much thinner than the cutter a neck is, in diameters
+LEAST_NECK = 1.0  # mm
+NOSE_STEP = 0.8  # mm, grid of the heights that holders have to clear
+
+
+def catalogue(lengths: F64) -> F64:
+    """Lengths tools are sold in, none less than asked of (k,) float64, mm: steps of 1 up to 20, of 5 above."""
+    step = np.where(lengths <= 20.0, 1.0, 5.0)
+    return np.asarray(step * np.ceil(lengths / step - 1e-9))
+
+
+def shank_of(diameter: float, at_hand: float) -> float:
+    """Shank of a cutter to buy, mm: that of a tool at hand, unless such a cutter is not sold on one so thick.
+
+    >>> shank_of(2.5, 30.0), shank_of(2.5, 4.0), shank_of(16.0, 6.0)
+    (6.0, 4.0, 16.0)
+    """
+    usual = next((s for s in SHANKS if s >= diameter), diameter)
+    return max(diameter, min(at_hand, usual))
+
+
+def sold(like: ToolBody, diameter: float, corner_radius: float) -> ToolBody:
+    """A cutter of the series, mm, in the holder of a tool at hand; its lengths are still to be found."""
+    return replace(like, diameter=diameter, corner_radius=corner_radius, flute_length=FLUTES * diameter,
+                   neck_diameter=(1.0 - RELIEF) * diameter, shank_diameter=shank_of(diameter, like.shank_diameter))
+
+
+def nearest(tools: list[ToolBody], diameter: float) -> ToolBody:
+    """The tool at hand that is nearest in diameter (mm), by ratio."""
+    return min(tools, key=lambda t: (abs(math.log(t.diameter / diameter)), t.id))
+
+
+class Lengths:
+    """How long necks and stickouts have to be over obstacles.
+
+    tree      : TriangleTree of part and fixtures, access frame
+    bounds    : (2, 3) float64 of the part, mm
+    clear     : Clearances
+    allowance : mm, material left on the part; cusp : mm, what passes may leave standing above that
+    widest    : mm, the stoutest cutter there may be
+    """
+
+    def __init__(self, tree: TriangleTree, bounds: F64, clear: Clearances, allowance: float, cusp: float,
+                 widest: float) -> None:
+        self.tree, self.clear, self.allowance, self.cusp = tree, clear, allowance, cusp
+        self.lattice = Lattice.over(bounds, 0.5 * widest + 2 * NOSE_STEP, NOSE_STEP)
+        self._heights: dict[float, F64] = {}
+
+    def at(self, body: ToolBody, tips: F64, floor: tuple[float, float] = (0.0, 0.0)) -> F64:
+        """Neck length and stickout (k, 2) a tool needs at tips (k, 3), in catalogue steps but no less than floor, mm.
+
+        A shank shows at least as long as it is thick. Surroundings are looked at one cell of the shank and holder
+        grid wider than asked for, so that the tool also passes that grid wherever its nodes lie.
+        """
+        spare = LOOKUP_STEP * math.sqrt(2.0)
+        lift = self.allowance + self.cusp + 2 * LEVEL_TOLERANCE - tips[:, 2]
+        wide = 0.5 * body.shank_diameter + self.clear.shank + self.allowance + spare
+        neck = drop_tips(self.tree, tips[:, :2], wide, 0.0) + lift
+        nose = np.full(len(tips), -np.inf)
+        cells = self.lattice.cells(tips[:, :2])
+        for d in discs_of(body, self.clear):
+            if d.name == "holder":
+                height = self._height(d.radius + self.allowance + spare + NOSE_STEP / math.sqrt(2.0))
+                nose = np.maximum(nose, height[cells] + lift - (d.height - body.stickout))
+        neck = np.maximum(catalogue(np.maximum(neck, LEAST_NECK)), floor[0])
+        return np.column_stack([neck, np.maximum(catalogue(np.maximum(nose, neck + body.shank_diameter)), floor[1])])
+
+    def _height(self, radius: float) -> F64:
+        """What stands highest within a radius of the nodes of the holder grid, mm."""
+        if radius not in self._heights:
+            g = self.lattice
+            self._heights[radius] = drop_grid(self.tree, g.x0, g.y0, g.step, g.nx, g.ny, radius, 0.0)
+        return self._heights[radius]

@@ -1,0 +1,34 @@
+"""What fixtures keep tools from: the same questions, asked of the part alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64
+from geometry.rays import first_hits
+from geometry.sampling import SurfaceSamples
+from zones.reach import Clearances, TipField, lattice_step
+
+SKIN = 0.02  # mm off the surface where a ray upward starts
+AIR = 4.0  # mm beside the part, beyond the cutter's radius
+
+
+def covered(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.bool_]:
+    """(n,) bool: something of the tree stands above, mm, access frame."""
+    up = np.tile(np.array([0.0, 0.0, 1.0]), (len(samples), 1))
+    _, above = first_hits(tree, samples.points + SKIN * samples.normals, up, 1e-4, 1e6)
+    return np.asarray(np.asarray(above) >= 0)
+
+
+def over_the_part(fields: Mapping[str, TipField], bare: TriangleTree, bounds: F64,
+                  clear: Clearances) -> dict[str, TipField]:
+    """Tip limits of the same tools with the fixtures gone.
+
+    bare : TriangleTree of the part alone, access frame; bounds : (2, 3) float64 of the part, mm
+    """
+    return {t: TipField(bare, f.tool, clear, bounds, f.tool.radius + AIR, lattice_step(f.tool), f.allowance, f.cusp)
+            for t, f in fields.items()}
