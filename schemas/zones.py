@@ -129,13 +129,31 @@ class CuttingPlane(ReportModel):
     reason: str
 
 
+class Place(ReportModel):
+    """What an entry holds of a face, and where."""
+
+    face: Annotated[str, Field(examples=["F12"])]
+    area_mm2: float
+    box_mm: Annotated[list[list[float]], Field(min_length=2, max_length=2,
+                                               description="Lower and upper corner in the setup frame, mm.")]
+
+
 class Remainder(ReportModel):
     """Area that the setup cannot reach, why, and what would."""
 
     faces: list[Any]
     area_mm2: float
-    reason: str
-    would_need: dict[str, Any] = {}
+    reason: Annotated[str, Field(description="undercut, undercut behind connection C2, fixture, pass, shank, holder, "
+                                             "gap, corner or sharp corner; see the glossary.")]
+    would_need: Annotated[dict[str, Any], Field(
+        description="The tool that would do: kind, diameter_mm, corner_radius_mm, neck_length_mm, shank_diameter_mm, "
+                    "stickout_mm in sizes that are sold, like (the tool at hand whose holder it was measured with), "
+                    "share (of the area it does). Or kind 'other access', 'other clamping' or 'other process'. Empty "
+                    "where no tool is needed or none would do.")] = {}
+    tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches it; reason "
+                                                          "fixture: the one that would without fixtures.")] = None
+    why_left: Annotated[str | None, Field(description="Reason pass: why that tool was not used.")] = None
+    patches: Annotated[list[Place], Field(description="Area by face, and where.")] = []
 
 
 class ProposedTool(ReportModel):
@@ -175,6 +193,11 @@ class Zones(ReportModel):
     channels: list[ChannelFacts]
     mcz: list[ComputableZone] = []
     cutting_planes: list[CuttingPlane] = []
+    machinable_area_mm2: Annotated[float | None, Field(
+        description="Of all faces asked for. In a dry check zones and remainder sum to it; in a report what is proved, "
+                    "the findings and the remainder do.")] = None
+    machinable_by_role_mm2: Annotated[dict[str, float], Field(
+        description="The same by the role of the faces: wall, connection, floor, base, fillet, free.")] = {}
     zones: list[ZoneFacts]
     remainder: list[Remainder]
     proposal: Proposal | None = None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from schemas.setup import Setup, setup_sha256
 from service import advice, offers
-from service.prepare import Prepared
+from service.prepare import Prepared, clearances
 from service.version import VERSION
 from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan, ZonePlan
@@ -23,7 +23,8 @@ from zones.zoning import ZoneArea, is_open
 
 RAPID_MM_MIN = 10000.0
 REMAINDER_FLOOR_MM2 = 0.005
-ZONES_KEYS = ("part", "walls", "connections", "channels", "mcz", "cutting_planes", "zones", "remainder", "proposal")
+ZONES_KEYS = ("part", "walls", "connections", "channels", "mcz", "cutting_planes", "machinable_area_mm2",
+              "machinable_by_role_mm2", "zones", "remainder", "proposal")
 
 
 def r(value: float, digits: int = 4) -> float | None:
@@ -107,16 +108,40 @@ def _place(ready: Prepared, at: tuple[float, float, float]) -> list[float | None
 
 def _remainder(ready: Prepared, items: list[Remainder]) -> list[dict[str, Any]]:
     return [{"faces": faces(x.faces), "area_mm2": r(x.area, 3), "reason": x.reason, "would_need": x.would_need,
-             "at_mm": _place(ready, x.at)} for x in items if x.area >= REMAINDER_FLOOR_MM2]
+             "tool_at_hand": x.tool_at_hand or None, "why_left": x.why_left or None, "at_mm": _place(ready, x.at),
+             "patches": _places(ready, x)} for x in items if x.area >= REMAINDER_FLOOR_MM2]
+
+
+def _places(ready: Prepared, item: Remainder) -> list[dict[str, Any]]:
+    """What an entry holds of each face, and the box in the setup frame where."""
+    s = item.samples
+    if s is None:
+        return []
+    points = ready.views[0].back(s.points)
+    out = []
+    for face in np.unique(s.face):
+        mine = s.face == face
+        box = [[r(v) for v in row] for row in (points[mine].min(axis=0).tolist(), points[mine].max(axis=0).tolist())]
+        out.append({"face": f"F{face}", "area_mm2": r(float(s.area[mine].sum()), 3), "box_mm": box})
+    return out
+
+
+def _areas(ready: Prepared) -> dict[str, Any]:
+    """Machinable area, whole and by the role of the faces, of the triangles the samples stand for."""
+    face, area = ready.samples.face, ready.samples.area
+    roles = np.array([ready.decomposition.face_role.get(int(f), "free") for f in range(int(face.max(initial=0)) + 1)])
+    by_role = {str(k): r(float(area[roles[face] == k].sum()), 3) for k in sorted(set(roles[np.unique(face)].tolist()))}
+    return {"machinable_area_mm2": r(float(area.sum()), 3), "machinable_by_role_mm2": by_role}
 
 
 def dry_report(ready: Prepared) -> dict[str, Any]:
     """zones.json without a plan: what the tools at hand reach and what they do not."""
     rest = ~ready.zoning.taken
     first = ready.views[0]
-    items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift)
-    return {**_shape(ready), "zones": [_zone(ready, z) for z in ready.zones], "remainder": _remainder(ready, items),
-            "proposal": offers.as_dict(ready.setup, offers.offers(ready))}
+    items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift,
+                    clear=clearances(ready.setup))
+    return {**_shape(ready), **_areas(ready), "zones": [_zone(ready, z) for z in ready.zones],
+            "remainder": _remainder(ready, items), "proposal": offers.as_dict(ready.setup, offers.offers(ready))}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
@@ -136,7 +161,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
     items = explain(dense.subset(rest), labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    given_up[rest])
+                    given_up[rest], clear=clearances(ready.setup))
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
     # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
@@ -148,7 +173,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     plans = {p.zone.id: p for p in made.zones}
     steps = {s.id: s for s in made.steps}
     report = {
-        **_shape(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
+        **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
         "labels": dict(ready.setup.labels),
         "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ def check(recipe: str, seed: int, folder: Path) -> None:
     report = dry_report(ready)
     total = sum(z["area_mm2"] for z in report["zones"]) + sum(x["area_mm2"] for x in report["remainder"])
     assert total == pytest.approx(float(area.sum()), rel=1e-3)
+    check_sums(report, total)
 
     patches = [(name, p) for name, found in ready.patches.items() for p in found]
     whole = {int(f): float(ready.part.mesh.areas[ready.part.mesh.face_ids == f].sum())
@@ -48,6 +50,19 @@ def check(recipe: str, seed: int, folder: Path) -> None:
     by_zone = {name: sum(p.area for n, p in patches if n == name) for name in ready.patches}
     off = sum(abs(by_zone.get(z.id, 0.0) - float(area[z.samples].sum())) for z in ready.zones)
     assert off <= 0.01 * float(area.sum())  # the spacing of the samples along every border between two zones
+
+
+def check_sums(report: dict[str, Any], total: float) -> None:
+    """What a reader of zones.json can add up: area by role, and what stays by face and place."""
+    assert report["machinable_area_mm2"] == pytest.approx(total, rel=1e-3)
+    assert sum(report["machinable_by_role_mm2"].values()) == pytest.approx(report["machinable_area_mm2"], rel=1e-6)
+    lower, upper = np.array(report["part"]["bbox_mm"])
+    for item in report["remainder"]:
+        assert sum(p["area_mm2"] for p in item["patches"]) == pytest.approx(item["area_mm2"], abs=0.01)
+        assert [p["face"] for p in item["patches"]] == item["faces"]
+        for p in item["patches"]:
+            box = np.array(p["box_mm"])
+            assert (lower - 0.01 <= box[0]).all() and (box[0] <= box[1]).all() and (box[1] <= upper + 0.01).all()
 
 
 @pytest.mark.parametrize(("recipe", "seed"), EVERYDAY)

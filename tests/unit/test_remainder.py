@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
+from zones.catalogue import DIAMETERS, catalogue
 from zones.model import Connection, Decomposition
 from zones.reach import touchable
 from zones.remainder import explain
@@ -156,3 +158,84 @@ def test_many_samples_are_asked_by_a_share_and_areas_still_sum():
     found = stays(mesh, [ball(3.0, neck=1.0, shank=9.0)], s)
     assert sum(r.area for r in found) == pytest.approx(s.area.sum())
     assert found == sorted(found, key=lambda r: -r.area)
+
+
+def clamped_channel():
+    """A channel 6 wide and 8 deep, and a clamp over one end of it 2 above the floor."""
+    mesh = terraces([0, 6, 12, 18], [0, 24], [[10, 2, 10]])
+    clamp = box_mesh([7, -1, 4], [11, 8, 14])
+    s = samples_of(mesh, 6.0)
+    floor = s.subset((s.normals[:, 2] > 0.9) & (np.abs(s.points[:, 2] - 2) < 1e-9) & (s.points[:, 0] > 6.1)
+                     & (s.points[:, 0] < 11.9) & (s.points[:, 1] < 14.0) & (s.area > 0))
+    return mesh, joined(mesh, clamp), floor
+
+
+def held_by(mesh, held, tools, samples):
+    tree = TriangleTree(held)
+    fields = {t.id: field_of(tree, t) for t in tools}
+    view = view_of(as_part(mesh), samples, fields, obstacles=tree)
+    return explain(samples, view.labels, [view], NOTHING, LIFT), fields
+
+
+def test_what_a_fixture_alone_keeps_a_tool_from_is_said_of_the_fixture():
+    mesh, held, floor = clamped_channel()
+    body = tool(4.0, 0.0)
+    found, fields = held_by(mesh, held, [body], floor)
+    assert {r.reason for r in found} == {"fixture", "pass"}
+    bare = {r.reason: r for r in stays(mesh, [body], floor)}
+    assert set(bare) == {"pass"}
+    got = touchable(fields["T1"], floor.points, floor.normals, LIFT)[1]
+    by_fixture = [r for r in found if r.reason == "fixture"]
+    assert sum(r.area for r in by_fixture) == pytest.approx(float(floor.area[~got].sum()))
+    assert all(r.would_need == {"kind": "other clamping"} for r in by_fixture)
+    assert {r.tool_at_hand for r in by_fixture} == {"", "T1"}  # under the clamp, and beside it
+
+
+def test_a_tool_that_is_asked_for_clears_part_and_fixtures():
+    mesh, held, floor = clamped_channel()
+    short = tool(4.0, 0.0, neck=3.0, shank=5.5)  # too short for the channel with or without the clamp
+    found, _ = held_by(mesh, held, [short], floor)
+    asked = [r for r in found if "diameter_mm" in r.would_need]
+    assert asked and {r.reason for r in asked} <= {"shank", "gap", "corner"}
+    for r in asked:
+        n = r.would_need
+        body = replace(short, diameter=n["diameter_mm"], corner_radius=n["corner_radius_mm"],
+                       neck_diameter=0.95 * n["diameter_mm"], neck_length=n["neck_length_mm"],
+                       shank_diameter=n["shank_diameter_mm"], stickout=n["stickout_mm"])
+        got = touchable(field_of(TriangleTree(held), body), r.samples.points, r.samples.normals, LIFT)[1]
+        assert r.samples.area[got].sum() >= (n["share"] - 0.02) * r.area
+
+
+def test_tools_asked_for_are_sold_and_do_what_they_are_named_for():
+    # a square pocket and a deep slot: corners of every thickness, necks beyond what is sold
+    mesh = terraces([0, 4, 16, 20, 20.5, 26], [0, 4, 16, 20], [[14] * 5, [14, 8, 14, 2, 14], [14] * 5])
+    s = samples_of(mesh, 30.0)
+    inside = s.subset((s.points[:, 0] > 3.9) & (s.points[:, 0] < 20.6) & (s.points[:, 1] > 3.9)
+                      & (s.points[:, 1] < 16.1) & (s.points[:, 2] < 13.9)
+                      & (np.abs(s.normals).max(axis=1) > 0.99) & (s.area > 0))
+    body = ball(3.175, neck=20.0, shank=6.0)
+    left = out_of_reach(mesh, [body], inside)
+    found = stays(mesh, [body], left)
+    named = [r for r in found if "diameter_mm" in r.would_need]
+    assert len(named) > 2 and sum(r.area for r in found) == pytest.approx(float(left.area.sum()))
+    for r in named:
+        n = r.would_need
+        assert n["diameter_mm"] in (*DIAMETERS, 3.175) and n["share"] >= 0.5
+        assert n["neck_length_mm"] <= 20 * n["diameter_mm"] and n["stickout_mm"] >= n["neck_length_mm"] + 5.9
+        assert n["neck_length_mm"] == float(catalogue(np.array([n["neck_length_mm"]]))[0])
+        bought_tool = replace(body, diameter=n["diameter_mm"], corner_radius=n["corner_radius_mm"],
+                              neck_diameter=0.95 * n["diameter_mm"], neck_length=n["neck_length_mm"],
+                              shank_diameter=n["shank_diameter_mm"], stickout=n["stickout_mm"])
+        got = touchable(field_of(mesh, bought_tool), r.samples.points, r.samples.normals, LIFT)[1]
+        assert r.samples.area[got].sum() >= 0.5 * r.area
+    assert any(r.would_need.get("kind") == "other process" and r.would_need["slenderness"] > 20 for r in found)
+
+
+def test_what_is_left_to_a_tool_at_hand_names_it_and_says_why():
+    mesh = block()
+    s = wall_of_block(mesh)
+    high = s.subset(s.points[:, 2] > 6)
+    tools = [ball(3.0, "T2"), ball(2.0, "T1")]
+    assert [(r.tool_at_hand, r.why_left) for r in stays(mesh, tools, high)] == [("T2", "less than a zone is made of")]
+    (given,) = stays(mesh, tools, high, given_up=np.ones(len(high), bool))
+    assert (given.reason, given.tool_at_hand, given.why_left) == ("pass", "T2", "no pass gets there")
