@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from service.prepare import Prepared, clearances, tip_field
 from zones.fixtures import covered
 from zones.machinable import SEEN
 from zones.proposal import Proposal, ProposedTool, propose
+from zones.reach import TipField, touchable
 from zones.sight import Reach, able
 from zones.view import View
 from zones.zoning import LEAST_ZONE_MM2, Zoning, build_zones
@@ -43,6 +44,14 @@ class Offer:
 
 
 @dataclass(frozen=True, eq=False)
+class _Added:
+    """What zones are built from for a tool that is not there yet, in one view."""
+
+    limit: TipField
+    reach: Reach
+
+
+@dataclass(frozen=True, eq=False)
 class Offers:
     """All tools to add, and what zones built with them leave; areas in mm², ``stays_mm2`` by reason."""
 
@@ -54,22 +63,23 @@ class Offers:
 def offers(ready: Prepared) -> Offers:
     """The smallest change of the tool set, each access asked for what is in sight of it and of none before it.
 
-    Zones are built again with the tools added. One that is left with less than a tool has to gain is dropped, the
-    poorest first, and they are built once more: what is promised is what such zones hold.
+    Zones are built again with the tools added, each asked for the remainder only. Those that are left with less than a
+    tool has to gain are dropped, the poorest first and as many at once as hold less than that together, and zones are
+    built once more: what is promised is what such zones hold.
     """
     rest = ~ready.zoning.taken & (ready.samples.area > 0)
     asked = _asked(ready, np.flatnonzero(rest))
     found = _numbered(ready.setup, [(v.id, t) for v, _, p in asked for t in p.tools])
-    area, known, zoning = ready.samples.area, ready.zoning.reach, ready.zoning
+    area, zoning = ready.samples.area, ready.zoning
+    added = [_added(ready, view, found, rest) for view in ready.views]
     while found:
-        zoning = _again(ready, found, known)
-        known = zoning.reach
+        zoning = _again(ready, {o.body.id for o in found}, added)
         found = [replace(o, area_mm2=sum(float(area[z.samples[rest[z.samples]]].sum()) for z in zoning.zones
                                          if z.tool.id == o.body.id)) for o in found]
-        poorest = min(found, key=lambda o: o.area_mm2)
-        if poorest.area_mm2 >= LEAST_ZONE_MM2:
+        kept = _worth_it(found)
+        if len(kept) == len(found):
             break
-        found.remove(poorest)
+        found = kept
     if not found:
         zoning = ready.zoning
     stays = float(area[~zoning.taken].sum())
@@ -112,13 +122,36 @@ def _numbered(setup: Setup, tools: Sequence[tuple[str, ProposedTool]]) -> list[O
     return out
 
 
-def _again(ready: Prepared, found: Sequence[Offer], known: Sequence[Mapping[str, Reach]]) -> Zoning:
-    """Zones with the tools added to those at hand in every view."""
-    setup = ready.setup
-    views = [replace(v, fields={**v.fields, **{o.body.id: tip_field(setup, ready.part, v.rotation, v.obstacles,
-                                                                    v.part.bounds, o.body) for o in found}})
-             for v in ready.views]
-    return build_zones(views, ready.decomposition, setup.quality.scallop_height_mm, ready.lift, known=known)
+def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np.bool_]) -> dict[str, _Added]:
+    """The tools by id in one view: their tip limit, and what they reach of the samples in ``rest`` (n,) bool."""
+    rows, s = np.flatnonzero(rest), view.samples
+    out = {}
+    for o in found:
+        limit = tip_field(ready.setup, ready.part, view.rotation, view.obstacles, view.part.bounds, o.body)
+        few = touchable(limit, s.points[rows], s.normals[rows], ready.lift)
+        reach = Reach(np.zeros(len(s), np.bool_), np.zeros(len(s), np.bool_), np.zeros((len(s), 3)))
+        reach.by_cutter[rows], reach.by_tool[rows], reach.tips[rows] = few
+        out[o.body.id] = _Added(limit, reach)
+    return out
+
+
+def _again(ready: Prepared, ids: Container[str], added: Sequence[Mapping[str, _Added]]) -> Zoning:
+    """Zones with some of the tools ``added`` to those at hand in every view."""
+    new = [{t: a for t, a in here.items() if t in ids} for here in added]
+    views = [replace(v, fields={**v.fields, **{t: a.limit for t, a in n.items()}})
+             for v, n in zip(ready.views, new, strict=True)]
+    known = [{**r, **{t: a.reach for t, a in n.items()}} for r, n in zip(ready.zoning.reach, new, strict=True)]
+    return build_zones(views, ready.decomposition, ready.setup.quality.scallop_height_mm, ready.lift, known=known)
+
+
+def _worth_it(found: Sequence[Offer]) -> list[Offer]:
+    """The tools without those to drop now: none, one, or more that hold less than one has to gain all together."""
+    by_area = sorted(found, key=lambda o: o.area_mm2)
+    if by_area[0].area_mm2 >= LEAST_ZONE_MM2:
+        return list(found)
+    held = np.cumsum([o.area_mm2 for o in by_area])
+    drop = {o.body.id for o in by_area[:max(1, int(np.searchsorted(held, LEAST_ZONE_MM2)))]}
+    return [o for o in found if o.body.id not in drop]
 
 
 def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDArray[np.float64],

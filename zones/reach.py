@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt, maximum_filter
+from scipy.ndimage import distance_transform_edt, maximum_filter
 from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
@@ -84,6 +84,10 @@ class Lattice:
         j = np.clip(np.rint((xy[:, 0] - self.x0) / self.step).astype(np.int64), 0, self.nx - 1)
         i = np.clip(np.rint((xy[:, 1] - self.y0) / self.step).astype(np.int64), 0, self.ny - 1)
         return i, j
+
+    def nodes(self, i: NDArray[np.int64], j: NDArray[np.int64], z: float) -> F64:
+        """(n, 3) mm: nodes in rows i and columns j (n,), at height z, mm."""
+        return np.column_stack([self.x0 + self.step * j, self.y0 + self.step * i, np.full(len(i), z)])
 
     def mask(self, xy: F64) -> NDArray[np.bool_]:
         """(ny, nx) bool: nodes that are nearest to one of xy (n, 2) mm."""
@@ -204,21 +208,31 @@ class TipField:
             self._height = np.maximum(self.cut_height, self.noncut[np.ix_(i, j)])
         return self._height
 
-    def around(self, xy: F64, z: float, reach: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Nodes within ``reach`` mm of any of xy (n, 2) mm, along x and y: free and blocked for the cutting part at z.
+    def rim(self, xy: F64, z: float, reach: float) -> F64:
+        """(k, 2) mm: nodes where the cutting part is free at tip height z, beside one where it is not, near some of xy.
 
-        Returns two (ny, nx) bool.
+        xy is (n, 2) mm; near is within ``reach`` mm along x and along y. Only the lattice round xy is looked at.
         """
-        lat, size = self.lattice, 2 * int(math.ceil(reach / self.lattice.step)) + 1
-        near = maximum_filter(lat.mask(xy).view(np.uint8), size).view(np.bool_)
+        lat, half = self.lattice, int(math.ceil(reach / self.lattice.step))
+        i, j = lat.cells(xy)
+        i0, i1 = max(int(i.min()) - half, 0), min(int(i.max()) + half + 1, lat.ny)
+        j0, j1 = max(int(j.min()) - half, 0), min(int(j.max()) + half + 1, lat.nx)
+        near = np.zeros((i1 - i0, j1 - j0), np.bool_)
+        near[i - i0, j - j0] = True
+        near = maximum_filter(near.view(np.uint8), 2 * half + 1).view(np.bool_)
         if self._cut is not None:
-            free = self._cut <= z
+            free = self._cut[i0:i1, j0:j1] <= z
         else:
-            i, j = np.nonzero(near)
+            rows, cols = np.nonzero(near)
             free = np.zeros_like(near)
-            free[near] = ~self.blocked_by_cutter(np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i,
-                                                                 np.full(len(i), z)]))
-        return near & free, near & ~free
+            free[near] = ~self.blocked_by_cutter(lat.nodes(rows + i0, cols + j0, z))
+        blocked = near & ~free
+        beside = np.zeros_like(near)
+        for a, b in ((beside[1:], blocked[:-1]), (beside[:-1], blocked[1:]),
+                     (beside[:, 1:], blocked[:, :-1]), (beside[:, :-1], blocked[:, 1:])):
+            a |= b
+        rows, cols = np.nonzero(near & free & beside)
+        return lat.nodes(rows + i0, cols + j0, z)[:, :2]
 
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
@@ -293,16 +307,13 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
     So about one step of the lattice is what can be missed, at the end of a corner of the free region. The last of the k
     goes towards the middle of those nodes, which is straight away from a straight wall: there nothing is missed.
     """
-    lat = field.lattice
     out = np.repeat(np.column_stack([points[:, :2], tip_z])[:, None], AIMED + 1, axis=1)
     level = np.round(tip_z, 6)  # a plane that was turned is level but for rounding
     for z in np.unique(level):
         mine = np.flatnonzero(level == z)
-        free, blocked = field.around(points[mine, :2], float(z), flat + BEYOND * lat.step)
-        i, j = np.nonzero(free & binary_dilation(blocked))
-        if not len(i):
+        rim = field.rim(points[mine, :2], float(z), flat + BEYOND * field.lattice.step)
+        if not len(rim):
             continue
-        rim = np.column_stack([lat.x0 + lat.step * j, lat.y0 + lat.step * i])
         near = cKDTree(rim).query(points[mine, :2], k=min(AIMED, len(rim)))[1].reshape(len(mine), -1)
         way = rim[near] - points[mine, None, :2]
         way = np.concatenate([way, 1e3 * way.mean(axis=1, keepdims=True)], axis=1)

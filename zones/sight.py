@@ -86,11 +86,14 @@ class Sight:
     def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, Form, NDArray[np.int64]]]:
         """Base region with its place, form and samples of what is to be shared out, in a fixed order."""
         labels = self.view.labels
-        base = np.array([r.ground for r in labels.regions], dtype=object)[labels.code]
+        names, ground = np.unique([r.ground for r in labels.regions], return_inverse=True)
+        asked = np.flatnonzero(rows)
+        base = ground[labels.code[asked]]
         out = []
-        for name in sorted(set(base[rows].tolist())):
+        for k in np.unique(base):
+            mine = asked[base == k]
             for form in Form:
-                members = np.flatnonzero(rows & (base == name) & (self.form == form))
+                members = mine[self.form[mine] == form]
                 if len(members):
-                    out.append((str(name), form, members))
+                    out.append((str(names[k]), form, members))
         return out

@@ -226,7 +226,7 @@ def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Form
 
 def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> list[ZoneArea]:
     left = members
-    area = sight.samples.area
+    area, regions, code = sight.samples.area, sight.view.labels.regions, sight.view.labels.code
     least = least_area(area[members], LEAST_ZONE_MM2, CERTAIN)
     tried: list[dict[str, object]] = []
     out: dict[str, _Take] = {}
@@ -239,7 +239,7 @@ def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> l
         if float(area[left].sum()) < least:
             break
         planes = neck_planes(sight, left, tid, base) if ruled else {}
-        limit = np.array([planes.get(int(c), -np.inf) for c in sight.view.labels.code[left]])
+        limit = np.array([planes.get(c, -np.inf) for c in range(len(regions))])[code[left]]
         take = left[sight.gets(tid)[left] & (sight.samples.points[left, 2] >= limit)]
         got = float(area[take].sum())
         if got < least:
