@@ -133,6 +133,9 @@ FORK = [(10, -9), (13, -9), (13, -6), (18, 0.5), (15, 0.5), (11.5, -4), (8, 0.5)
 
 SLENDER_FORK = [(10, -9), (11, -9), (11, -5), (16, 0.5), (14.8, 0.5), (10.5, -4.4), (6.2, 0.5), (5, 0.5), (10, -5)]
 
+SHORT_STEM = [(9, -9.3), (11, -9.3), (10.6, -6), (14.06, 0.5), (12.7, 0.5), (10, -4.57), (7.3, 0.5), (5.94, 0.5),
+              (9.4, -6)]
+
 
 def aslant() -> Shape:
     """Two walls 3 apart and a steep bar that meets both slantwise: rays across the bar leave by the back of a wall."""
@@ -189,6 +192,7 @@ SHAPES: dict[str, tuple[Callable[[], Shape], Counts]] = {
     "slender fork": (lambda: pair().union(outline("XY", SLENDER_FORK, 2.2, (0, 0, 9))), (2, 1, 1)),
     "slender fork with an arm at a hub in a wall": (lambda: pair().union(outline(
         "XY", SLENDER_FORK, 2.2, (0, 0, 9))).union(rod((15.5, 1.5, 0), (15.5, 1.5, 22), 4)), (3, 1, 2)),
+    "fork with a short stem": (lambda: pair().union(outline("XY", SHORT_STEM, 2.2, (0, 0, 9))), (2, 1, 1)),
     "short bar aslant between walls": (aslant, (2, 1, 1)),
     "short steep bar between walls": (steep, (2, 1, 1)),
     "walls above and below a plate": (both_sides, (4, 2, 2)),

@@ -260,13 +260,17 @@ class FaceGraph:
         return bool(np.isclose(fa.radius, fb.radius, rtol=1e-3) and same_side)
 
     def _fillets(self) -> np.ndarray:
-        parallel = self.sample_share((self.back_dot < PARALLEL_DOT) & (self.inward < 0.5 * self.height))
+        parallel = self._parallel(np.full(self.n, 0.5 * self.height))
         out = np.zeros(self.n, bool)
         for face in range(self.n):
             if self.part.faces[face].curvature_min < -1e-6 and not self.sliver[face]:
                 out[face] = parallel[face] < PARALLEL_SHARE and self._stands_for_concave(face)
         out |= self._corner_patches(out)
         return out | self._chamfers(out)
+
+    def _parallel(self, thickness: F64) -> np.ndarray:
+        """(n,) float64: share of each face with a parallel one behind less than ``thickness`` (n,) of material, mm."""
+        return self.sample_share((self.back_dot < PARALLEL_DOT) & (self.inward < thickness[self.face]))
 
     def _stands_for_concave(self, face: int) -> bool:
         """Whether a face turns concavely, with a small radius, between its two longest tangent neighbours."""
@@ -312,8 +316,12 @@ class FaceGraph:
         return out
 
     def _chamfers(self, fillet: np.ndarray) -> np.ndarray:
-        """Narrow faces between two concave edges, leaning half way between their neighbours (a weld, a chamfer)."""
+        """Narrow faces between two concave edges, leaning half way between their neighbours (a weld, a chamfer).
+
+        Not so the flank of a short bar or of a leg of a fork: that is wider than the material behind it is thick.
+        """
         out = np.zeros(self.n, bool)
+        width = np.zeros(self.n)
         for face in np.flatnonzero(~fillet & ~self.sliver).tolist():
             links = sorted((k for k in self.at[face] if k.kind == EdgeKind.CONCAVE), key=lambda k: -k.length)[:2]
             if len(links) < 2 or self.area[face] > 0.15 * self.height * links[1].length:
@@ -321,7 +329,8 @@ class FaceGraph:
             a, b = (self.normals_at(k.other(face), k.nodes).mean(axis=0) for k in links)
             mid = (a + b) / max(float(np.linalg.norm(a + b)), 1e-9)
             out[face] = -0.5 < a @ b < 0.9 and float(mid @ self.normal[face]) > 0.9
-        return out
+            width[face] = self.area[face] / links[1].length
+        return out & (self._parallel(width) < PARALLEL_SHARE)
 
 
 def cast(tree: TriangleTree, origins: F64, directions: F64, skin: float) -> tuple[F64, np.ndarray]:

@@ -97,3 +97,8 @@ def test_seat_is_the_lowest_plane_and_floor_looks_up() -> None:
 
 def test_part_without_walls_says_so() -> None:
     assert any("no wall" in w for w in found("block").warnings)
+
+
+def test_flanks_of_a_short_stem_belong_to_the_fork_and_are_no_chamfers() -> None:
+    d = found("fork with a short stem")
+    assert len(d.connections[0].faces) == 8 and "fillet" not in d.face_role.values()
