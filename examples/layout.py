@@ -82,16 +82,19 @@ class HubDisc:
         """(n,) bool: whether the hub touches the segment between two points, (n, 3) float64 in mm."""
         f = np.linspace(0.0, 1.0, 65)[:, None]
         p = start[:, None] + (end - start)[:, None] * f
-        share = np.clip((p[..., 2] - self.thickness) / self.hub_height, 0.0, 1.0)
-        limit = self.hub_radius[0] + (self.hub_radius[1] - self.hub_radius[0]) * share
         above = p[..., 2] > self.thickness + self.hub_height
-        return np.asarray(((np.hypot(p[..., 0], p[..., 1]) <= limit) & ~above).any(axis=1))
+        return np.asarray(((np.hypot(p[..., 0], p[..., 1]) <= self._radius_at(p[..., 2])) & ~above).any(axis=1))
 
     def above_floor(self, z: float) -> Polygon:
         """Plan outline of the hub at height z, mm; empty over its top."""
-        share = max((z - self.thickness) / self.hub_height, 0.0)
-        radius = self.hub_radius[0] + (self.hub_radius[1] - self.hub_radius[0]) * share
-        return Point(0, 0).buffer(radius, quad_segs=64) if share <= 1.0 else Polygon()
+        if z > self.thickness + self.hub_height:
+            return Polygon()
+        return Point(0, 0).buffer(float(self._radius_at(z)), quad_segs=64)
+
+    def _radius_at(self, z: float | F64) -> F64:
+        """Radius of the hub at heights z, mm; that of its foot and top below and above."""
+        r0, r1 = self.hub_radius
+        return np.asarray(r0 + (r1 - r0) * np.clip((z - self.thickness) / self.hub_height, 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

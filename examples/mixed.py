@@ -22,7 +22,6 @@ CHORD: dict[str | None, tuple[float, float]] = {
     "C8": (50, 68), "C10": (60, 78),
 }
 """Length, mm, that a profile is drawn at, so that its bends stay well wider than the wall is thick."""
-TRIES = 40
 
 
 @dataclass(frozen=True, eq=False)

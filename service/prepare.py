@@ -23,6 +23,7 @@ from service.blank import check_against_part
 from service.convert import face_numbers, tool_bodies
 from zones.categories import Categories
 from zones.decompose import decompose
+from zones.fixtures import AIR
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
 from zones.patches import zone_patches
@@ -38,8 +39,7 @@ LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
 MOST_DENSITY = 150.0
 BORDER_SPACING = 0.2  # mm
 BORDER_INSET = 0.0  # mm: on the border itself
-MOST_ROOM = 60.0  # mm, the same beside a large block
-AIR = 4.0  # mm beyond the cutter's radius that the planning lattice covers round the part
+MOST_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
 
 Progress = Callable[[str, float], None]
 

@@ -181,7 +181,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "proposal": offers.as_dict(ready.setup, offers.offers(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
-        "machinable_area_mm2": r(total, 3), "machining_time_s": r(proof.machining_time, 1),
+        "machining_time_s": r(proof.machining_time, 1),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},

@@ -19,10 +19,9 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64
 from geometry.tilted import axis_frames, blocked_along
 from geometry.toolbody import ToolBody
+from zones.machinable import LEVEL, SEEN
 from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, Clearances, contact_tips, discs_of
 
-SEEN = -0.02  # of the normal along the axis: below, the tool would come from inside the material
-LEVEL = 1.0 - 1e-6  # of the normal along the axis: above, the whole flat bottom may lie on it
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 AT_ONCE = 400_000  # pairs of sample and direction asked in one go
 CANDIDATES = 4000  # axes tried for a cone before the best is refined

@@ -67,12 +67,14 @@ class Bridges:
     connections : per connection the labels of its bodies
     ends        : per connection its ends at walls
     base        : labels of bodies that walls stand on
+    borders     : between the bodies
     """
 
     body: np.ndarray
     connections: list[list[int]]
     ends: list[list[End]]
     base: set[int]
+    borders: list[Border]
 
 
 def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
@@ -106,7 +108,7 @@ def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
         if len(ends) >= 2 and (proved or _open_below(graph, set(group), ends, borders, below, floating - thin)):
             out.append(group)
             out_ends.append(ends)
-    return Bridges(body, out, out_ends, base)
+    return Bridges(body, out, out_ends, base, borders)
 
 
 def all_bodies(graph: FaceGraph, label: np.ndarray) -> np.ndarray:
@@ -194,7 +196,13 @@ def _carries(borders: list[Border], x: int, thin: set[int]) -> bool:
     """Whether a thin body stands on a body: their border shows the upper side of that body."""
     sides = [own for b in borders for own, mine, other in ((b.na, b.a, b.b), (b.nb, b.b, b.a))
              if mine == x and other in thin]
-    return any(float(np.nan_to_num(own[:, 2]).mean()) > STEEP_NZ for own in sides)
+    return any(_rises(own) for own in sides)
+
+
+def _rises(normals: F64) -> bool:
+    """Whether a border shows an upper side: the mean of its (k, 3) normals, of which some may be NaN, looks up."""
+    up = normals[np.isfinite(normals[:, 2]), 2]
+    return bool(len(up)) and float(up.mean()) > STEEP_NZ
 
 
 def _void_rows(graph: FaceGraph, body: np.ndarray, x: int) -> np.ndarray:
@@ -240,8 +248,7 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
         if (border.a in group) != (border.b in group):
             other, own = (border.b, border.na) if border.a in group else (border.a, border.nb)
             if other not in unsupported and all(other != e.at for e in ends):
-                rises = float(np.nan_to_num(own[:, 2]).mean()) > STEEP_NZ
-                (tops if rises else unders).append(v[border.nodes][:, :2] @ frame)
+                (tops if _rises(own) else unders).append(v[border.nodes][:, :2] @ frame)
     where = void[:, :2] @ frame
     covered = [(float(q[:, 0].min()), float(q[:, 0].max())) for q in unders if not _beside(q, tops, where)]
     u = where[:, 0]
@@ -283,7 +290,7 @@ def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[B
                 if k.kind != EdgeKind.CONCAVE and int(body[g]) in base}
     for border in borders:
         for x, y, normals in ((border.a, border.b, border.nb), (border.b, border.a, border.na)):
-            if y in base and float(np.nan_to_num(normals[:, 2]).mean()) > STEEP_NZ:
+            if y in base and _rises(normals):
                 standing.add(x)
     free = among - standing
     under = np.zeros(graph.n, bool)

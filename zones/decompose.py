@@ -12,16 +12,15 @@ import numpy as np
 
 from geometry.part import EdgeKind, Part
 from zones.channels import find_facings
-from zones.connections import Bridges, find_borders, find_bridges
+from zones.connections import Bridges, find_bridges
 from zones.facegraph import STEEP_NZ, FaceGraph
+from zones.machinable import STEEP
 from zones.model import Channel, Connection, Decomposition, Wall
 from zones.walls import SEAT, Sheets, find_sheets
 
 # Part of its side area that must be steep for a thin body to be a wall: the blades of an inducer twist from upright
 # at the hub to lying at the tip, so most of their area may be less steep.
 STEEP_SHARE = 0.25
-LEAN_NZ = 0.70710678
-"""Sides lean up to 45 degrees, the same limit that parts waterlines from projected passes."""
 
 
 def decompose(part: Part) -> Decomposition:
@@ -46,14 +45,14 @@ def decompose(part: Part) -> Decomposition:
     walls = tuple(_wall(graph, sheets, bridges.body, x, f"W{i}") for i, x in enumerate(wall_labels, 1))
     name = {x: w.id for x, w in zip(wall_labels, walls, strict=True)}
     connections = _connections(graph, bridges, name)
-    connection_faces = [int(f) - 1 for c in connections for f in c.faces]
+    spanned = [int(f) - 1 for c in connections for f in c.faces]
     left_out = graph.fillet | graph.sliver
-    left_out[connection_faces] = True
+    left_out[spanned] = True
     sides = [_channel_sides(graph, sheets, x) for x in wall_labels]
     channels = tuple(
         Channel(f"H{i}", (walls[f.walls[0]].id, walls[f.walls[1]].id), f.gap_min, f.at)
         for i, f in enumerate(find_facings(graph, sides, left_out), 1))
-    roles = _roles(graph, bridges, set(wall_labels), set(connection_faces))
+    roles = _roles(graph, bridges, set(wall_labels), set(spanned))
     seat = tuple(int(f) + 1 for f in np.flatnonzero(graph.seat))
     lying = np.flatnonzero(np.isin(bridges.body, [x for x in standing if x not in wall_labels]))
     return Decomposition(walls, connections, channels, roles, seat, _warnings(graph, walls, lying))
@@ -62,7 +61,8 @@ def decompose(part: Part) -> Decomposition:
 def _is_upright(graph: FaceGraph, sheets: Sheets, label: int) -> bool:
     """Whether a thin body holds enough steep area to be a wall."""
     sides = sheets.sides(label)
-    steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= LEAN_NZ)[sides]
+    # sides lean up to 45 degrees, the limit that parts waterlines from projected passes
+    steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= STEEP)[sides]
     return bool((graph.area[sides] * steep).sum() >= STEEP_SHARE * graph.area[sides].sum())
 
 
@@ -72,7 +72,7 @@ def _stands(graph: FaceGraph, bridges: Bridges, label: int) -> bool:
         for f, g in ((link.a, link.b), (link.b, link.a)):
             if bridges.body[f] == label and (graph.seat[g] or int(bridges.body[g]) in bridges.base):
                 return True
-    return any(label in (b.a, b.b) and {b.a, b.b} & bridges.base for b in find_borders(graph, bridges.body))
+    return any(label in (b.a, b.b) and {b.a, b.b} & bridges.base for b in bridges.borders)
 
 
 def _place(graph: FaceGraph, faces: np.ndarray) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeInfo, EdgeKind, Part
 from geometry.rays import first_hits
-from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.sampling import SurfaceSamples, joined, sample_surface
 
 STEEP_NZ = 0.5
 """A normal more than 60 degrees from +Z has n_z below this; below minus this it faces down."""
@@ -194,6 +194,11 @@ class FaceGraph:
         return self.share(np.abs(self.mesh.normals[:, 2]) <= STEEP_NZ) >= 0.5
 
     @cached_property
+    def side_like(self) -> np.ndarray:
+        """(n,) bool: at least 30 degrees off horizontal over half of the face."""
+        return np.asarray(self.steep | (self.share(np.abs(self.mesh.normals[:, 2]) < 0.87) >= 0.5))
+
+    @cached_property
     def seat(self) -> np.ndarray:
         """(n,) bool: faces of the lowest plane facing away from the spindle."""
         low = self.part.bounds[0, 2] + 1e-4 * self.height
@@ -358,8 +363,7 @@ def _samples(graph: FaceGraph) -> SurfaceSamples:
         wanted = SAMPLES_PER_FACE + SAMPLES_IN_ALL * graph.area[face] / total
         triangles = order[cuts[face]:cuts[face + 1]]
         parts.append(sample_surface(graph.mesh, wanted / graph.area[face], seed=17, triangles=triangles))
-    names = ("points", "normals", "area", "face", "triangle")
-    return SurfaceSamples(*(np.concatenate([getattr(s, k) for s in parts]) for k in names))
+    return joined(parts)
 
 
 def _dot(a: F64, b: F64) -> F64:

@@ -30,6 +30,7 @@ from geometry.kernels.drop import blocked_range, drop_range
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
+from zones.machinable import LEVEL, SEEN
 
 LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
@@ -143,7 +144,7 @@ class TipField:
         self.lattice = Lattice.over(bounds, margin, step)
         self.coarse = Lattice.over(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
         self.discs = discs_of(tool, clear)
-        self.noncut, self.owner = self._noncut(self.discs)
+        self.noncut = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
         self._off: tuple[float, F64 | None] = (math.nan, None)
@@ -151,17 +152,15 @@ class TipField:
     def _grid(self, lattice: Lattice, radius: float, corner: float) -> F64:
         return drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, corner)
 
-    def _noncut(self, discs: tuple[Disc, ...]) -> tuple[F64, NDArray[np.int8]]:
+    def _noncut(self, discs: tuple[Disc, ...]) -> F64:
         grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
-        owner = np.zeros(grid.shape, np.int8)
         for d in discs:
             limit = self.disc_limit(d, self._grid(self.coarse, self.disc_radius(d, 0.5), 0.0))
-            owner[limit > grid] = 1 if d.name == "shank" else 2
             grid = np.maximum(grid, limit)
         if discs:  # what stands beyond the grid is not known here, so the tool does not go there
             for edge in (grid[:1], grid[-1:], grid[:, :1], grid[:, -1:]):
                 edge[:] = np.inf
-        return grid, owner
+        return grid
 
     def disc_radius(self, disc: Disc, diagonals: float) -> float:
         """Radius of a disc with the allowance and this many cell diagonals of the shank and holder grid, mm."""
@@ -274,10 +273,6 @@ class TipField:
         """(n,) bool: shank or holder would come nearer than their clearance at tips (n, 3) mm."""
         return np.asarray(noncut_blocked(self.noncut, self.coarse_row, np.ascontiguousarray(tips)))
 
-    def blocker(self, tips: F64) -> NDArray[np.int8]:
-        """(n,) int8: 1 shank, 2 holder is what limits most at tips (n, 3) mm."""
-        return self.owner[self.coarse.cells(tips[:, :2])]
-
 
 FLAT_RING = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
@@ -363,7 +358,7 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
     whole = cutter & ~field.blocked_by_body(tips)
     flat = tool.radius - tool.corner_radius
     if flat > 0:
-        level = normals[:, 2] > 1.0 - 1e-6
+        level = normals[:, 2] > LEVEL
         for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)):
             for side in FLAT_RING:
                 todo = np.flatnonzero(level & ~whole)
@@ -376,5 +371,5 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
                 left = np.flatnonzero(~whole[open_to])
                 _take(field, np.ascontiguousarray(trials[left]), open_to[left], cutter, whole, tips)
     tips[:, 2] -= LEVEL_TOLERANCE
-    seen = normals[:, 2] > -0.02
+    seen = normals[:, 2] > SEEN
     return cutter & seen, whole & seen, tips

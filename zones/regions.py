@@ -8,7 +8,6 @@ for each (``zones.parting``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,13 +95,6 @@ class Labels:
         """(n,) names of the regions."""
         return np.array([r.name for r in self.regions], dtype=object)[self.code] if len(self.code) else \
             np.zeros(0, dtype=object)
-
-    @staticmethod
-    def by_face(base: Mapping[int, str], face: NDArray[np.int32]) -> Labels:
-        """Labels where every face (n,) is one region, without looking at the plan."""
-        regions = tuple(Region(b) for b in sorted(set(base.values())))
-        place = {r.base: k for k, r in enumerate(regions)}
-        return Labels(regions, np.array([place[base[int(f)]] for f in face], dtype=np.int64))
 
 
 class Regioner:

@@ -75,7 +75,7 @@ def find_sheets(graph: FaceGraph) -> Sheets:
 
 def thin_faces(graph: FaceGraph) -> np.ndarray:
     """(n,) bool: faces that are, over most of their area, a side of material thinner than half its height."""
-    candidate = _side_like(graph) & ~graph.fillet & ~graph.sliver & ~graph.seat
+    candidate = graph.side_like & ~graph.fillet & ~graph.sliver & ~graph.seat
     height = _side_heights(graph)
     bore = _bores(graph)
     backed = (graph.back >= 0) & (graph.back_dot < OPPOSED_DOT) & ~bore[graph.back]
@@ -83,16 +83,11 @@ def thin_faces(graph: FaceGraph) -> np.ndarray:
     return np.asarray(candidate & ~bore & (graph.strip_share(backed) >= THIN_SHARE))
 
 
-def _side_like(graph: FaceGraph) -> np.ndarray:
-    """(n,) bool: at least 30 degrees off horizontal over half of the face."""
-    return np.asarray(graph.steep | (graph.share(np.abs(graph.mesh.normals[:, 2]) < 0.87) >= 0.5))
-
-
 def _has_two_sides(graph: FaceGraph, faces: np.ndarray) -> bool:
     """Whether inward rays from faces ((n,) bool) end on another side rather than on a floor (as from a bore)."""
     rows = graph.face_rows(faces)
     back = graph.back[rows]
-    two = (back >= 0) & _side_like(graph)[back] & ~graph.seat[back]
+    two = (back >= 0) & graph.side_like[back] & ~graph.seat[back]
     return float(graph.samples.area[rows][two].sum()) >= 0.5 * float(graph.samples.area[rows].sum())
 
 
@@ -161,7 +156,7 @@ def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray)
     """Join bodies whose inward rays end on each other; nothing joins a span but what is of it."""
     rows = np.flatnonzero(thin[graph.face])
     rows = rows[(graph.back[rows] >= 0) & (graph.back_dot[rows] < OPPOSED_DOT)]
-    rows = rows[_side_like(graph)[graph.back[rows]]]
+    rows = rows[graph.side_like[graph.back[rows]]]
     span = _spans(graph, thin)
     sets = UnionFind(graph.n)
     for label in np.unique(body[graph.face[rows]]):

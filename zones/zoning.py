@@ -214,7 +214,11 @@ def _gleaned(sights: Sequence[Sight], found: Sequence[ZoneArea], taken: NDArray[
 
 def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Form]]
            ) -> list[tuple[str, Form, NDArray[np.int64]]]:
-    """Groups of (n,) bool samples that are worth a zone to a tool in use; whatever adds to one of its ``own`` is."""
+    """Groups of (n,) bool samples that are worth a zone to a tool in use.
+
+    Whatever adds to one of its ``own`` zones of a whole region is; what lies under or over a connection, where it has
+    no other zone in that region, has to be worth one of its own.
+    """
     out = []
     for base, form, members in sight.groups(rows):
         area = sight.samples.area[members]
@@ -260,11 +264,9 @@ def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form, has_pl
     """One zone where the tool cuts the plain cells of the region too (or has them already), else one for each cell."""
     labels = sight.view.labels
     cells = np.unique(labels.code[take.rows]).tolist()
-    plain = [c for c in cells if labels.regions[c].name == base]
+    plain = has_plain or any(labels.regions[c].name == base for c in cells)
     parts = [(base, cells)] if plain else [(labels.regions[c].name, [c]) for c in cells]
     out = []
-    if has_plain:
-        plain, parts = cells, [(base, cells)]
     for name, codes in parts:
         rows = take.rows[np.isin(labels.code[take.rows], codes)]
         kind = "SCZI" if base.startswith("C") or not plain else "SCZ"
@@ -322,14 +324,13 @@ def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: Form, got: f
             "limit": round(least, 3)}
 
 
-def is_open(zone: ZoneArea, field: TipField, area: F64 | None = None) -> bool:
+def is_open(zone: ZoneArea, field: TipField, area: F64) -> bool:
     """Whether passes can leave the zone: over nearly all its area the tool can go out of the part at its level.
 
-    area : (n,) float64, mm², of all samples of the machinable area; those of the zone count alike where None
+    area : (n,) float64, mm², of all samples of the machinable area
 
     Passes along steep area stay at one height, so there the level is that of each tip; others follow the surface, so
     it is that of the highest. A zone with walls or connections all round some of it is closed.
     """
     level = zone.tips[:, 2] if zone.form is Form.STEEP else zone.tips[:, 2].max()
-    weight = np.ones(len(zone.samples)) if area is None else area[zone.samples]
-    return open_share(field, zone.tips, level, weight) > OPEN_SHARE
+    return open_share(field, zone.tips, level, area[zone.samples]) > OPEN_SHARE

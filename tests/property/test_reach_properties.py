@@ -177,6 +177,8 @@ def share_reached(mesh, body, exact=True):
 def test_a_cutter_thinner_than_a_round_reaches_it_whole(seed, kind, upright):
     if kind == "flat" and not upright:
         pytest.skip("a sharp end reaches slopes at steps only")
+    if kind == "bull" and not upright:
+        pytest.skip("of a trough a bull's flat bottom reaches what its corner fits into")
     rng = np.random.default_rng(seed)
     radius = rng.uniform(0.8, 9.0)
     mesh = bent_strip(radius, CHORD, upright=upright, seed=seed)
@@ -186,9 +188,6 @@ def test_a_cutter_thinner_than_a_round_reaches_it_whole(seed, kind, upright):
             continue
         r = thick * radius
         body = tool(2 * r, {"ball": r, "flat": 0.0, "bull": 0.4 * r}[kind], shank=2 * r)
-        # of a trough a bull's flat bottom reaches what its corner fits into
-        if kind == "bull" and not upright:
-            continue
         assert share_reached(mesh, body) == 1.0, (radius, thick)
 
 

@@ -17,11 +17,18 @@ from zones.zoning import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
 NOTHING = Decomposition((), (), ())
 
 
+def labels_by_face(base, face):
+    """Labels where every face is one region, without looking at the plan."""
+    regions = tuple(Region(b) for b in sorted(set(base.values())))
+    place = {r.base: k for k, r in enumerate(regions)}
+    return Labels(regions, np.array([place[base[int(f)]] for f in face], dtype=np.int64))
+
+
 def zones_of(mesh, tools, *, faces=None, scallop=0.02, lift=0.002, density=20.0, regions=None):
     samples = samples_of(mesh, density, faces)
     samples = samples.subset(samples.normals[:, 2] > -0.02)
     fields = {t.id: field_of(mesh, t) for t in tools}
-    labels = None if regions is None else Labels.by_face(regions, samples.face)
+    labels = None if regions is None else labels_by_face(regions, samples.face)
     view = view_of(as_part(mesh), samples, fields, labels=labels)
     return samples, fields, list(build_zones([view], NOTHING, scallop, lift).zones)
 
@@ -149,11 +156,11 @@ def test_tools_that_reach_nothing_make_no_zone():
 
 def test_open_and_closed_zones():
     mesh = dome()
-    _, fields, zones = zones_of(mesh, [ball(4)], faces={2})
-    assert is_open(zones[0], fields["T1"])
+    samples, fields, zones = zones_of(mesh, [ball(4)], faces={2})
+    assert is_open(zones[0], fields["T1"], samples.area)
     pocket = terraces([0, 4, 16, 20], [0, 4, 16, 20], [[8, 8, 8], [8, 2, 8], [8, 8, 8]])
-    _, fields, zones = zones_of(pocket, [ball(4)], faces={face_at(pocket, (10, 10, 2), (0, 0, 1))})
-    assert not is_open(zones[0], fields["T1"])
+    samples, fields, zones = zones_of(pocket, [ball(4)], faces={face_at(pocket, (10, 10, 2), (0, 0, 1))})
+    assert not is_open(zones[0], fields["T1"], samples.area)
 
 
 def pocket(size: float):
