@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
 from schemas.setup import Setup
 from schemas.tools import Tool
 from service.convert import tool_bodies
 from service.prepare import Prepared, clearances, tip_field
-from zones.fixtures import covered
-from zones.machinable import SEEN
+from zones.fixtures import in_sight
 from zones.proposal import Proposal, ProposedTool, propose
 from zones.reach import TipField, touchable
 from zones.sight import Reach, able
@@ -93,20 +91,13 @@ def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray
     out = []
     for k, view in enumerate(ready.views):
         last = k == len(ready.views) - 1
-        here = _open(view, view.samples.subset(rest)) | last
+        here = in_sight(view.samples.subset(rest), view.obstacles) | last
         mine, rest = rest[here], rest[~here]
         bare = view.tree if view.obstacles is not view.tree else None
         out.append((view, mine, propose(view.samples.subset(mine), view.fields, view.obstacles, view.part, ready.lift,
                                         clearances(ready.setup),
                                         lambda tool, normals: able(tool, normals, scallop), bare=bare)))
     return out
-
-
-def _open(view: View, samples: SurfaceSamples) -> NDArray[np.bool_]:
-    """(n,) bool: faces the access and nothing of part and fixtures stands above."""
-    if not len(samples):
-        return np.zeros(0, np.bool_)
-    return np.asarray((samples.normals[:, 2] > SEEN) & ~covered(samples, view.obstacles))
 
 
 def _numbered(setup: Setup, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:

@@ -1,4 +1,4 @@
-"""What fixtures keep tools from: the same questions, asked of the part alone."""
+"""What stands above samples, and what fixtures keep tools from: the same questions, asked of the part alone."""
 
 from __future__ import annotations
 
@@ -11,17 +11,27 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
+from zones.machinable import SEEN
 from zones.reach import Clearances, TipField, lattice_step
 
 SKIN = 0.02  # mm off the surface where a ray upward starts
 AIR = 4.0  # mm beside the part, beyond the cutter's radius
 
 
+def above(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.int64]:
+    """(n,) int64: the triangle of the tree that stands lowest above each sample, -1 where none does; access frame."""
+    hit = first_hits(tree, samples.points + SKIN * samples.normals, (0.0, 0.0, 1.0), 1e-4, 1e6)[1]
+    return hit.astype(np.int64)
+
+
 def covered(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.bool_]:
-    """(n,) bool: something of the tree stands above, mm, access frame."""
-    up = np.tile(np.array([0.0, 0.0, 1.0]), (len(samples), 1))
-    _, above = first_hits(tree, samples.points + SKIN * samples.normals, up, 1e-4, 1e6)
-    return np.asarray(np.asarray(above) >= 0)
+    """(n,) bool: something of the tree stands above; access frame."""
+    return above(samples, tree) >= 0
+
+
+def in_sight(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.bool_]:
+    """(n,) bool: faces the access, and nothing of the tree stands above; access frame."""
+    return np.asarray((samples.normals[:, 2] > SEEN) & ~covered(samples, tree))
 
 
 def over_the_part(fields: Mapping[str, TipField], bare: TriangleTree, bounds: F64,

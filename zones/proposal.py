@@ -22,13 +22,12 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import HolderSegment, ToolBody
 from zones.catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, Lengths, nearest, sold
-from zones.fixtures import covered, over_the_part
+from zones.fixtures import covered, in_sight, over_the_part
 from zones.reach import Clearances, TipField, lattice_step, touchable
 from zones.zoning import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 2000
 SEED = 11
-SEEN = -0.02  # n_z below: out of sight
 LEAST_MM2 = LEAST_ZONE_MM2  # a tool that gains less is not proposed: zones would not use it either
 LEVELS = 8  # neck lengths tried for one cutter
 # weights of the ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
@@ -162,7 +161,7 @@ def _known(few: SurfaceSamples, fields: Mapping[str, TipField], tree: TriangleTr
     why = np.full(len(few), "", dtype=object)
     if bare is not tree:
         why[covered(few, tree)] = "fixture"
-    why[(few.normals[:, 2] <= SEEN) | covered(few, bare)] = "undercut"
+    why[~in_sight(few, bare)] = "undercut"
     open_to = np.flatnonzero(why == "")
     why[open_to[_touched(few.subset(open_to), fields, lift, able)]] = "pass"
     return why

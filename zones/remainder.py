@@ -15,11 +15,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from zones.catalogue import MOST_SLENDER
 from zones.faces import connection_of
-from zones.fixtures import SKIN, covered, over_the_part
+from zones.fixtures import above, covered, over_the_part
 from zones.machinable import SEEN
 from zones.model import Decomposition
 from zones.needs import DOES, Buyer, Cutter
@@ -200,12 +199,9 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
     out = _Why.blank(n, place)
     reason = out.reason
     owner = connection_of(part, decomposition)
-    up = np.tile(np.array([0.0, 0.0, 1.0]), (n, 1))
-    _, above = first_hits(view.tree, few.points + SKIN * few.normals, up, 1e-4, 1e6)
-    above = np.asarray(above)
-    under = (few.normals[:, 2] <= SEEN) | (above >= 0)
-    for k in np.flatnonzero(under):
-        c = owner.get(int(part.mesh.face_ids[above[k]])) if above[k] >= 0 else None
+    roof = above(few, view.tree)
+    for k in np.flatnonzero((few.normals[:, 2] <= SEEN) | (roof >= 0)):
+        c = owner.get(int(part.mesh.face_ids[roof[k]])) if roof[k] >= 0 else None
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
     clamped = view.obstacles is not view.tree
     if clamped:
