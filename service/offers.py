@@ -15,9 +15,10 @@ from schemas.tools import Tool
 from service.convert import tool_bodies
 from service.prepare import Prepared, clearances, tip_field
 from zones.fixtures import in_sight
+from zones.needs import Buyer
 from zones.proposal import Proposal, ProposedTool, propose
 from zones.reach import TipField, touchable
-from zones.sight import Reach, able
+from zones.sight import Reach
 from zones.view import View
 from zones.zoning import LEAST_ZONE_MM2, Zoning, build_zones
 
@@ -87,16 +88,13 @@ def offers(ready: Prepared) -> Offers:
 
 def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], Proposal]]:
     """Each view with the samples it is asked for and its proposal; the last one has all that is left."""
-    scallop = ready.setup.quality.scallop_height_mm
     out = []
     for k, view in enumerate(ready.views):
         last = k == len(ready.views) - 1
         here = in_sight(view.samples.subset(rest), view.obstacles) | last
         mine, rest = rest[here], rest[~here]
-        bare = view.tree if view.obstacles is not view.tree else None
-        out.append((view, mine, propose(view.samples.subset(mine), view.fields, view.obstacles, view.part, ready.lift,
-                                        clearances(ready.setup),
-                                        lambda tool, normals: able(tool, normals, scallop), bare=bare)))
+        buyer = Buyer(view, ready.lift, clearances(ready.setup))
+        out.append((view, mine, propose(view.samples.subset(mine), buyer)))
     return out
 
 
@@ -151,7 +149,7 @@ def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDAr
     stays: dict[str, float] = {}
     for _, mine, proposal in asked:
         rows = mine[proposal.asked]
-        why = np.where(np.isin(proposal.why, ("taken", "tool")), "too little", proposal.why)
+        why = np.where(proposal.why == "taken", "too little", proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
         for reason in set(why[~taken[rows]].tolist()):
             stays[reason] = stays.get(reason, 0.0) + weight * float(area[rows[~taken[rows] & (why == reason)]].sum())

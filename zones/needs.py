@@ -5,8 +5,9 @@ Asked of one access direction, against part and fixtures together. Theory: docs/
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
 from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, nearest, sold
+from zones.fixtures import over_the_part
 from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
 from zones.sight import able
 from zones.view import View
@@ -35,6 +37,10 @@ class Cutter:
     like: str
     at_hand: bool
 
+    def sold_on(self, neck: F64) -> NDArray[np.bool_]:
+        """(k,) bool: such a cutter is sold on necks of these lengths (k,), mm."""
+        return np.asarray(neck <= MOST_SLENDER * self.diameter + 1e-9)
+
 
 @dataclass(frozen=True, eq=False)
 class Wants:
@@ -43,9 +49,6 @@ class Wants:
     reason: NDArray[np.object_]
     cutter: NDArray[np.object_]
     slenderness: F64
-
-
-Words = Callable[[Cutter, F64, NDArray[np.int64]], NDArray[np.object_]]
 
 
 class Buyer:
@@ -59,10 +62,26 @@ class Buyer:
     def __init__(self, view: View, lift: float, clear: Clearances) -> None:
         self.view, self.lift, self.clear = view, lift, clear
         self.tools = {t: f.tool for t, f in sorted(view.fields.items())}
+        self.clamped = view.obstacles is not view.tree
         some = next(iter(view.fields.values()))
         self.allowance, self.cusp = some.allowance, some.cusp
         widest = max(DIAMETERS[0], *(t.diameter for t in self.tools.values()))
         self.lengths = Lengths(view.obstacles, view.part.bounds, clear, self.allowance, self.cusp, widest)
+
+    @cached_property
+    def unclamped(self) -> dict[str, TipField]:
+        """Tip limits of the tools at hand with the fixtures gone."""
+        return over_the_part(self.view.fields, self.view.tree, self.view.part.bounds, self.clear)
+
+    def touched_by(self, samples: SurfaceSamples, fields: Mapping[str, TipField]) -> NDArray[np.object_]:
+        """(n,) id of the stoutest of the tools, whole, that touches each and can finish it; '' where none does."""
+        out = np.full(len(samples), "", dtype=object)
+        for t in sorted(fields, key=lambda t: (-fields[t].tool.diameter, t)):
+            left = np.flatnonzero(out == "")
+            normals = samples.normals[left]
+            got = touchable(fields[t], samples.points[left], normals, self.lift)[1]
+            out[left[got & able(fields[t].tool, normals, self.cusp)]] = t
+        return out
 
     def body(self, cutter: Cutter) -> ToolBody:
         """The tool with the lengths of the one it goes with."""
@@ -70,72 +89,68 @@ class Buyer:
         return like if cutter.at_hand else sold(like, cutter.diameter, cutter.corner)
 
     def need(self, cutter: Cutter, tips: F64) -> F64:
-        """Neck length and stickout (k, 2), mm, the tool has to have at tips (k, 3), mm, where its cutting part fits."""
+        """Neck length and stickout (k, 2), mm, the tool has to have at tips (k, 3), mm, where its cutting part fits.
+
+        One at hand keeps at least its own: instead of it, nothing is lost.
+        """
+        if not len(tips):
+            return np.zeros((0, 2))
         body = self.body(cutter)
         return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (0.0, 0.0))
 
-    def touches(self, cutter: Cutter, samples: SurfaceSamples) -> tuple[NDArray[np.bool_], F64]:
-        """(n,) bool, whether the cutting part alone touches each and can finish it, and tips (n, 3), mm."""
+    def touches(self, cutter: Cutter, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
+        """Rows (k,) of the samples that the cutting part alone touches and can finish, and its tips (k, 3), mm."""
         body = self.body(cutter)
-        bare = replace(body, shank_diameter=body.diameter, neck_diameter=body.diameter, holder=())
+        rows = np.flatnonzero(able(body, samples.normals, self.cusp))
+        bare = replace(body, shank_diameter=body.diameter, holder=())
         field = TipField(self.view.obstacles, bare, self.clear, self.view.part.bounds, body.radius, lattice_step(body),
                          self.allowance, self.cusp)
-        fits, _, tips = touchable(field, samples.points, samples.normals, self.lift)
-        return fits & able(body, samples.normals, max(self.cusp, 1e-6)), tips
+        _, fits, tips = touchable(field, samples.points[rows], samples.normals[rows], self.lift)
+        return rows[fits], tips[fits]
 
     def wants(self, samples: SurfaceSamples) -> Wants:
         """What would do for n samples that no tool at hand touches: one of these with more neck, or a thinner one."""
         n = len(samples)
         out = Wants(np.full(n, "", dtype=object), np.full(n, None, dtype=object), np.full(n, np.inf))
         for tid, field in self.view.fields.items():
-            cutter = Cutter(field.tool.diameter, field.tool.corner_radius, tid, True)
-            self._ask(cutter, samples, np.arange(n), out, self._stopped_by)
+            rows, tips = self._ask(Cutter(field.tool.diameter, field.tool.corner_radius, tid, True), samples,
+                                   np.arange(n), out)
+            out.reason[rows] = _stopped_by(field, tips)
         ahead = np.asarray(first_hits(self.view.obstacles, samples.points, samples.normals, 1e-3, 1e6)[0])
         thinnest = min(self.tools.values(), key=lambda t: t.diameter)
+        reason = np.where(ahead < thinnest.diameter * GAP, "gap", "corner").astype(object)
         for d in (thinnest.diameter, *(d for d in DIAMETERS if d < thinnest.diameter and 0.5 * d > self.cusp)):
             for corner in (d / 2, 0.0):
                 left = np.flatnonzero(out.reason == "")
                 if not len(left):
                     return out
-                tight = ahead[left] < thinnest.diameter * GAP
-                words = np.where(tight, "gap", "corner").astype(object)
-                self._ask(Cutter(d, corner, nearest(list(self.tools.values()), d).id, False), samples, left, out,
-                          _given(words))
+                like = nearest(list(self.tools.values()), d).id
+                rows, _ = self._ask(Cutter(d, corner, like, False), samples, left, out)
+                out.reason[rows] = reason[rows]
         return out
 
-    def _ask(self, cutter: Cutter, samples: SurfaceSamples, rows: NDArray[np.int64], out: Wants, why: Words) -> None:
-        """Note the cutter for those of ``rows`` it would do for with a stouter neck than what is noted."""
-        fits, tips = self.touches(cutter, samples.subset(rows))
-        of = np.flatnonzero(fits)
-        if not len(of):
-            return
-        slender = self.need(cutter, tips[of])[:, 0] / cutter.diameter
-        of, slender = of[slender < out.slenderness[rows[of]]], slender[slender < out.slenderness[rows[of]]]
-        out.reason[rows[of]] = why(cutter, tips[of], of)
-        out.cutter[rows[of]] = cutter
-        out.slenderness[rows[of]] = slender
+    def _ask(self, cutter: Cutter, samples: SurfaceSamples, rows: NDArray[np.int64],
+             out: Wants) -> tuple[NDArray[np.int64], F64]:
+        """Note the cutter for those of ``rows`` it would do for with a stouter neck than what is noted.
 
-    def _stopped_by(self, cutter: Cutter, tips: F64, _of: NDArray[np.int64]) -> NDArray[np.object_]:
-        """'shank' or 'holder', what a tool at hand is farther from clearing at tips (k, 3), mm.
-
-        Seen from a cell diagonal around, as the look-up sees them.
+        Returns these (k,) and its tips there (k, 3), mm.
         """
-        field = self.view.fields[cutter.like]
-        short = {name: np.full(len(tips), -np.inf) for name in ("shank", "holder")}
-        for d in field.discs:
-            limit = field.disc_limit(d, drop_tips(field.tree, tips[:, :2], field.disc_radius(d, 1.0), 0.0))
-            short[d.name] = np.maximum(short[d.name], limit - tips[:, 2] + 2 * LEVEL_TOLERANCE)
-        return np.where(short["holder"] >= short["shank"], "holder", "shank").astype(object)
+        of, tips = self.touches(cutter, samples.subset(rows))
+        slender = self.need(cutter, tips)[:, 0] / cutter.diameter
+        better = slender < out.slenderness[rows[of]]
+        mine = rows[of[better]]
+        out.cutter[mine], out.slenderness[mine] = cutter, slender[better]
+        return mine, tips[better]
 
     def named(self, cutter: Cutter, samples: SurfaceSamples) -> dict[str, object]:
         """The tool to buy for samples, asked whether it does: {} where it does for less than half of the area."""
-        fits, tips = self.touches(cutter, samples)
+        rows, tips = self.touches(cutter, samples)
         need = self.need(cutter, tips)
-        short = fits & (need[:, 0] <= MOST_SLENDER * cutter.diameter + 1e-9)
+        short = cutter.sold_on(need[:, 0])
         if not short.any():
             return {}
         neck, stickout = (float(v) for v in np.quantile(need[short], ALL_BUT, axis=0, method="higher"))
-        does = short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)
+        does = rows[short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)]
         share = float(samples.area[does].sum()) / max(float(samples.area.sum()), 1e-300)
         if share < DOES:
             return {}
@@ -145,9 +160,13 @@ class Buyer:
                 "like": cutter.like, "share": round(share, 3)}
 
 
-def _given(words: NDArray[np.object_]) -> Words:
-    """The reason of each row as it stands in (n,) ``words``."""
-    def of_rows(_cutter: Cutter, _tips: F64, of: NDArray[np.int64]) -> NDArray[np.object_]:
-        return np.asarray(words[of])
+def _stopped_by(field: TipField, tips: F64) -> NDArray[np.object_]:
+    """'shank' or 'holder', what a tool at hand is farther from clearing at tips (k, 3), mm.
 
-    return of_rows
+    Seen from a cell diagonal around, as the look-up sees them.
+    """
+    short = {name: np.full(len(tips), -np.inf) for name in ("shank", "holder")}
+    for d in field.discs:
+        limit = field.disc_limit(d, drop_tips(field.tree, tips[:, :2], field.disc_radius(d, 1.0), 0.0))
+        short[d.name] = np.maximum(short[d.name], limit - tips[:, 2] + 2 * LEVEL_TOLERANCE)
+    return np.where(short["holder"] >= short["shank"], "holder", "shank").astype(object)

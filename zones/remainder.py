@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from zones.catalogue import MOST_SLENDER
 from zones.faces import connection_of
-from zones.fixtures import above, covered, over_the_part
+from zones.fixtures import above, covered
 from zones.machinable import SEEN
 from zones.model import Decomposition
 from zones.needs import DOES, Buyer, Cutter
-from zones.reach import Clearances, TipField, touchable
+from zones.reach import Clearances, TipField
 from zones.regions import Labels
-from zones.sight import able
 from zones.view import View
 from zones.zoning import LEAST_ZONE_MM2
 
-ASKED_AT_MOST = 6000  # samples that are asked one by one; the rest follow the nearest in kind by random choice
+ASKED_AT_MOST = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
 # how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last
 GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "fixture": 3, "gap": 4, "corner": 5, "sharp corner": 6}
 NO_PASS, TOO_LITTLE = "no pass gets there", "less than a zone is made of"
@@ -203,13 +202,12 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
     for k in np.flatnonzero((few.normals[:, 2] <= SEEN) | (roof >= 0)):
         c = owner.get(int(part.mesh.face_ids[roof[k]])) if roof[k] >= 0 else None
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
-    clamped = view.obstacles is not view.tree
-    if clamped:
+    if buyer.clamped:
         reason[covered(few, view.obstacles) & (reason == "")] = "fixture"
-    _touched(few, view.fields, buyer, out, "pass")
+    _at_hand(few, view.fields, buyer, out, "pass")
     out.left[reason == "pass"] = TOO_LITTLE
-    if clamped:
-        _touched(few, over_the_part(view.fields, view.tree, part.bounds, buyer.clear), buyer, out, "fixture")
+    if buyer.clamped:
+        _at_hand(few, buyer.unclamped, buyer, out, "fixture")
     left = np.flatnonzero(reason == "")
     wants = buyer.wants(few.subset(left))
     reason[left], out.cutter[left], out.slenderness[left] = wants.reason, wants.cutter, wants.slenderness
@@ -217,11 +215,9 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
     return out
 
 
-def _touched(few: SurfaceSamples, fields: Mapping[str, TipField], buyer: Buyer, out: _Why, word: str) -> None:
+def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], buyer: Buyer, out: _Why, word: str) -> None:
     """Give ``word`` to samples without a reason that one of these tools touches, and note the stoutest such tool."""
-    for t in sorted(fields, key=lambda t: (-fields[t].tool.diameter, t)):
-        left = np.flatnonzero(out.reason == "")
-        normals = few.normals[left]
-        got = touchable(fields[t], few.points[left], normals, buyer.lift)[1]
-        rows = left[got & able(fields[t].tool, normals, max(buyer.cusp, 1e-6))]
-        out.reason[rows], out.tool[rows] = word, t
+    left = np.flatnonzero(out.reason == "")
+    tool = buyer.touched_by(few.subset(left), fields)
+    out.tool[left] = tool
+    out.reason[left[tool != ""]] = word

@@ -10,30 +10,22 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
-from tests.hand_parts import as_part, ball, box_mesh, joined, samples_of, terraces, tool
+from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones import proposal
 from zones.catalogue import DIAMETERS, MOST_SLENDER, catalogue
-from zones.proposal import LEAST_MM2, propose
-from zones.reach import Clearances, TipField, lattice_step, touchable
+from zones.needs import Buyer, Cutter
+from zones.proposal import propose
+from zones.reach import Clearances, touchable
+from zones.sight import able
+from zones.zoning import LEAST_ZONE_MM2
 
 LIFT = 0.002
-CLEAR = Clearances()
 HOLDER = (HolderSegment(10, 16, 8), HolderSegment(16, 16, 20))
 
 
-def anything(body, normals):
-    """A strategy for every normal, but that a sharp-cornered end leaves steps on what leans."""
-    upright = (normals[:, 2] > 1 - 1e-6) | (np.abs(normals[:, 2]) < 0.05)
-    return upright | (body.corner_radius > 0)
-
-
-def field_of(mesh, body, margin=5.0):
-    return TipField(TriangleTree(mesh), body, CLEAR, mesh.bounds, body.radius + margin, lattice_step(body))
-
-
-def takes(mesh, body, samples, margin=5.0):
-    return (touchable(field_of(mesh, body, margin), samples.points, samples.normals, LIFT)[1]
-            & anything(body, samples.normals))
+def takes(mesh, body, samples, margin=4.0):
+    field = field_of(mesh, body, margin=margin)
+    return touchable(field, samples.points, samples.normals, LIFT)[1] & able(body, samples.normals, field.cusp)
 
 
 def remainder(mesh, tools, density=8.0):
@@ -45,12 +37,23 @@ def remainder(mesh, tools, density=8.0):
     return s.subset(left)
 
 
-def asked(mesh, tools, samples, **limits):
-    fields = {t.id: field_of(mesh, t) for t in tools}
-    return propose(samples, fields, TriangleTree(mesh), as_part(mesh), LIFT, CLEAR, anything, **limits)
+def buyer_of(mesh, tools, samples):
+    tree = TriangleTree(mesh)
+    return Buyer(view_of(as_part(mesh), samples, {t.id: field_of(tree, t) for t in tools}), LIFT, Clearances())
 
 
-def grown(mesh, tools, found):
+def asked(mesh, tools, samples):
+    return propose(samples, buyer_of(mesh, tools, samples))
+
+
+def areas(found, samples):
+    """Area by what is said of the samples, mm²."""
+    area = samples.area[found.asked]
+    area = area * (samples.area.sum() / area.sum())
+    return {str(w): float(area[found.why == w].sum()) for w in set(found.why.tolist())}
+
+
+def grown(tools, found):
     """The proposed tools as they would be bought, in the holders they were measured with."""
     holders = {t.id: t.holder for t in tools}
     return [t.body(f"N{k}", 50 + k, holders[t.holder_of]) for k, t in enumerate(found.tools)]
@@ -70,25 +73,32 @@ def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
     mesh = channel()
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    assert found.tools and found.emptied_mm2 > 0.9 * float(left.area.sum())
-    for t, body, rows in zip(found.tools, grown(mesh, AT_HAND, found), found.rows, strict=True):
-        assert len(rows) and t.area_mm2 >= LEAST_MM2
-        for margin in (4.0, 4.13, 4.27):
-            assert takes(mesh, body, left.subset(rows), margin).all()
+    got = areas(found, left)
+    assert found.tools and got["taken"] > 0.9 * float(left.area.sum())
+    taken = left.subset(found.asked[found.why == "taken"])
+    for margin in (4.0, 4.13, 4.27):
+        by_tool = np.array([takes(mesh, body, taken, margin) for body in grown(AT_HAND, found)])
+        assert by_tool.any(axis=0).all()
+        scale = got["taken"] / float(taken.area.sum())
+        for k in range(len(by_tool)):  # each is worth its price: it alone takes a least zone
+            alone = by_tool[k] & ~np.delete(by_tool, k, axis=0).any(axis=0)
+            assert scale * float(taken.area[alone].sum()) >= LEAST_ZONE_MM2
+    for t in found.tools:
         assert t.neck_length_mm <= MOST_SLENDER * t.diameter_mm + 1e-9
         assert t.stickout_mm >= t.neck_length_mm + t.shank_diameter_mm - 1e-9
         assert t.flute_length_mm <= t.neck_length_mm
-    assert found.emptied_mm2 == pytest.approx(sum(t.area_mm2 for t in found.tools))
-    assert found.emptied_mm2 + sum(found.stays_mm2.values()) == pytest.approx(float(left.area.sum()))
 
 
 def test_no_shorter_neck_would_do():
     mesh = channel()
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    for t, body, rows in zip(found.tools, grown(mesh, AT_HAND, found), found.rows, strict=True):
-        shorter = replace(body, neck_length=t.neck_length_mm - 2.0)
-        assert not takes(mesh, shorter, left.subset(rows)).all()
+    taken = left.subset(found.asked[found.why == "taken"])
+    bodies = grown(AT_HAND, found)
+    got = np.array([takes(mesh, body, taken) for body in bodies])
+    for k, body in enumerate(bodies):
+        shorter = replace(body, neck_length=body.neck_length - 2.0)
+        assert not (np.delete(got, k, axis=0).any(axis=0) | takes(mesh, shorter, taken)).all()
 
 
 def test_a_longer_neck_of_a_cutter_at_hand_is_named_as_such():
@@ -102,7 +112,7 @@ def test_a_longer_neck_of_a_cutter_at_hand_is_named_as_such():
     found = asked(mesh, [short], left)
     (t,) = found.tools
     assert t.instead_of == "T1" and t.diameter_mm == 3.0 and t.neck_length_mm > 6.0 and t.stickout_mm >= 40.0
-    assert found.emptied_mm2 == pytest.approx(float(left.area.sum())) and found.stays_mm2 == {}
+    assert set(found.why) == {"taken"}
 
 
 def test_beside_a_high_wall_one_stout_tool_does():
@@ -113,7 +123,7 @@ def test_beside_a_high_wall_one_stout_tool_does():
                     & (s.points[:, 2] > 4.0))
     left = wall.subset(~takes(mesh, short, wall))
     found = asked(mesh, [short], left)
-    assert len(found.tools) == 1 and found.emptied_mm2 == pytest.approx(float(left.area.sum()))
+    assert len(found.tools) == 1 and set(found.why) == {"taken"}
 
 
 def test_under_a_roof_and_in_a_slot_too_narrow_nothing_is_proposed():
@@ -121,14 +131,16 @@ def test_under_a_roof_and_in_a_slot_too_narrow_nothing_is_proposed():
     s = samples_of(roof, 2.0, {2})
     under = s.subset((np.abs(s.points[:, :2] - 10) < 4.5).all(axis=1) & (s.points[:, 2] < 2.001))
     found = asked(roof, AT_HAND, under)
-    assert found.tools == () and found.stays_mm2 == {"undercut": pytest.approx(float(under.area.sum()))}
+    assert found.tools == () and set(found.why) == {"undercut"}
     slot = terraces([0, 8, 8.3, 16], [0, 12], [[14, 2, 14]])
     s = samples_of(slot, 8.0)
     deep = s.subset((s.points[:, 0] > 7.9) & (s.points[:, 0] < 8.4) & (s.points[:, 2] < 5.0) & (s.area > 0)
                     & (s.points[:, 1] > 1.0) & (s.points[:, 1] < 11.0) & (s.points[:, 2] > 2.5))
     found = asked(slot, AT_HAND, deep)
-    assert found.tools == () and found.stays_mm2 == {"slender": pytest.approx(float(deep.area.sum()))}
-    assert asked(slot, AT_HAND, deep, slenderness=100.0).emptied_mm2 == pytest.approx(float(deep.area.sum()))
+    assert found.tools == () and set(found.why) == {"slender"}
+    buyer, thin = buyer_of(slot, AT_HAND, deep), Cutter(0.2, 0.1, "T1", False)
+    rows, tips = buyer.touches(thin, deep)
+    assert len(rows) == len(deep) and (buyer.need(thin, tips)[:, 0] > MOST_SLENDER * 0.2).all()
 
 
 def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
@@ -136,11 +148,14 @@ def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
     s = samples_of(mesh, 4.0)
     top = s.subset((s.normals[:, 2] > 0.99) & (s.points[:, 2] > 10.9) & (s.area > 0))
     found = asked(mesh, AT_HAND, top)
-    assert found.tools == () and set(found.stays_mm2) == {"pass"}
+    assert found.tools == () and set(found.why) == {"pass"}
     left = remainder(mesh, AT_HAND)
-    found = asked(mesh, AT_HAND, left, least_mm2=1e6)
-    assert found.tools == () and found.stays_mm2["too little"] > 0.8 * float(left.area.sum())
-    assert asked(mesh, AT_HAND, left.subset(np.zeros(0, int))).stays_mm2 == {}
+    found = asked(mesh, AT_HAND, left)
+    few = found.asked[found.why == "taken"][:4]
+    assert float(left.area[few].sum()) < LEAST_ZONE_MM2
+    found = asked(mesh, AT_HAND, left.subset(few))
+    assert found.tools == () and set(found.why) == {"too little"}
+    assert asked(mesh, AT_HAND, left.subset(np.zeros(0, int))).tools == ()
 
 
 def test_lengths_of_the_catalogue():
@@ -150,26 +165,26 @@ def test_lengths_of_the_catalogue():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_cover_is_the_best_of_all_subsets(seed):
-    """Against every subset of ten tools: number of tools and area left, a tool worth ``least``."""
+    """Against every subset of ten tools: number of tools and area left, a tool worth a least zone."""
     rng = np.random.default_rng(seed)
-    area = rng.uniform(0.0, 1.0, 30)
+    area = rng.uniform(0.5, 2.0) * rng.uniform(0.0, 1.0, 30)
     candidates = []
     for _ in range(10):
         body = ball(float(rng.choice([1.0, 2.0, 4.0])), neck=float(rng.integers(2, 20)))
         rows = np.flatnonzero(rng.random(30) < 0.35)
-        candidates.append(proposal._Candidate(body, "", "", rows, np.zeros((len(rows), 2))))
-    least = float(rng.uniform(0.5, 2.0))
+        cutter = Cutter(body.diameter, body.corner_radius, "T1", bool(rng.random() < 0.3))
+        candidates.append(proposal._Candidate(cutter, body, rows, np.zeros((len(rows), 2))))
 
     def cost(chosen):
         got = np.zeros(30, bool)
         for c in chosen:
             got[c.rows] = True
-        ties = sum(proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + proposal.PER_NEW * (not c.at_hand)
+        ties = sum(proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + proposal.PER_NEW * (not c.cutter.at_hand)
                    - proposal.PER_STOUT * c.body.diameter / max(DIAMETERS) for c in chosen)
-        return len(chosen) + ties + float(area[~got & reachable].sum()) / least
+        return len(chosen) + ties + float(area[~got & reachable].sum()) / LEAST_ZONE_MM2
 
     reachable = np.zeros(30, bool)
     for c in candidates:
         reachable[c.rows] = True
     best = min(cost(s) for k in range(11) for s in combinations(candidates, k))
-    assert cost(proposal._fewest(candidates, area, least)) == pytest.approx(best, abs=2e-6)
+    assert cost(proposal._fewest(candidates, area)) == pytest.approx(best, abs=2e-6)
