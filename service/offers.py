@@ -151,7 +151,7 @@ def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDAr
         rows = mine[proposal.asked]
         why = np.where(proposal.why == "taken", "too little", proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
-        for reason in set(why[~taken[rows]].tolist()):
+        for reason in sorted(set(why[~taken[rows]].tolist())):
             stays[reason] = stays.get(reason, 0.0) + weight * float(area[rows[~taken[rows] & (why == reason)]].sum())
     whole = sum(stays.values())
     return {k: v * total / whole for k, v in sorted(stays.items())} if whole > 0.0 else {}
@@ -175,7 +175,8 @@ def _entry(setup: Setup, offer: Offer) -> dict[str, Any]:
     t = offer.proposed
     like = next(x for x in setup.tools if x.id == t.holder_of)
     lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
-    gauge = (like.gauge_length_mm or 0.0) - (like.stickout_mm or 0.0) + t.stickout_mm
+    assert like.gauge_length_mm is not None and like.stickout_mm is not None  # every Tool fills both in
+    gauge = like.gauge_length_mm - like.stickout_mm + t.stickout_mm
     entry = Tool(id=offer.body.id, number=offer.body.number, kind=t.kind, flutes=like.flutes,
                  center_cutting=like.center_cutting, gauge_length_mm=round(gauge, 4), max_rpm=like.max_rpm,
                  holder=like.holder, **lengths)
