@@ -143,21 +143,26 @@ class Buyer:
         return mine, tips[better]
 
     def named(self, cutter: Cutter, samples: SurfaceSamples) -> dict[str, object]:
-        """The tool to buy for samples, asked whether it does: {} where it does for less than half of the area."""
+        """The tool to buy for samples, asked whether it does: {} where it does for less than half of the area.
+
+        Its neck and stickout do for nearly all of the samples it touches, for all where that is too little.
+        """
         rows, tips = self.touches(cutter, samples)
         need = self.need(cutter, tips)
         short = cutter.sold_on(need[:, 0])
         if not short.any():
             return {}
-        neck, stickout = (float(v) for v in np.quantile(need[short], ALL_BUT, axis=0, method="higher"))
-        does = rows[short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)]
-        share = float(samples.area[does].sum()) / max(float(samples.area.sum()), 1e-300)
-        if share < DOES:
-            return {}
-        body = self.body(cutter)
-        return {"kind": body.kind, "diameter_mm": body.diameter, "corner_radius_mm": round(body.corner_radius, 6),
-                "neck_length_mm": neck, "shank_diameter_mm": body.shank_diameter, "stickout_mm": stickout,
-                "like": cutter.like, "share": round(share, 3)}
+        body, whole = self.body(cutter), max(float(samples.area.sum()), 1e-300)
+        for part in (ALL_BUT, 1.0):  # the longest necks only where what asks for them is half of the area
+            neck, stickout = (float(v) for v in np.quantile(need[short], part, axis=0, method="higher"))
+            does = rows[short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)]
+            share = float(samples.area[does].sum()) / whole
+            if share >= DOES:
+                return {"kind": body.kind, "diameter_mm": body.diameter,
+                        "corner_radius_mm": round(body.corner_radius, 6), "neck_length_mm": neck,
+                        "shank_diameter_mm": body.shank_diameter, "stickout_mm": stickout, "like": cutter.like,
+                        "share": round(share, 3)}
+        return {}
 
 
 def _stopped_by(field: TipField, tips: F64) -> NDArray[np.object_]:

@@ -149,27 +149,52 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
     else:
         turn = buyers[0].view.rotation @ buyer.view.rotation.T
         here = few if at == 0 else replace(few, points=few.points @ turn, normals=few.normals @ turn)
-        sells = why.slenderness[rows[0]] <= MOST_SLENDER  # of all or of none in a group
-        for mine, cutter in _stoutest(few, why, rows) if sells else [(rows, why.cutter[rows[0]])]:
-            need = buyer.named(cutter, here.subset(mine)) if sells else {}
-            if not need:  # only necks nobody sells get there
-                need = {"kind": "other process", "slenderness": round(float(why.slenderness[mine].min()), 1)}
-            yield mine, {**need, **access}
+        if why.slenderness[rows[0]] <= MOST_SLENDER:  # of all or of none in a group
+            for mine, need in _bought(few, here, why, rows, buyer):
+                yield mine, {**need, **access} if need else {}
+        else:
+            slender = round(float(why.slenderness[rows].min()), 1)
+            yield rows, {"kind": "other process", "slenderness": slender, **access}
+
+
+def _bought(few: SurfaceSamples, here: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
+            buyer: Buyer) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
+    """Samples of one group by the tool to buy, with that tool; ``here`` in the frame of the buyer.
+
+    Where one that was picked for several does for less than half of them, each is asked for the cutter of its own; {}
+    where that one does for less than half as well.
+    """
+    for mine, cutter in _stoutest(few, why, rows):
+        need = buyer.named(cutter, here.subset(mine))
+        own = _cutters(why, mine)
+        if need or len(own) == 1:
+            yield mine, need
+            continue
+        for cutter in own:
+            of = mine[why.cutter[mine] == cutter]
+            yield of, buyer.named(cutter, here.subset(of))
+
+
+def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[Cutter]:
+    """The cutters noted for some samples, stout to thin."""
+    return sorted(set(why.cutter[rows]), key=lambda c: -c.diameter)
 
 
 def _stoutest(few: SurfaceSamples, why: _Why,
               rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], Cutter]]:
     """Samples by cutter: the stoutest that does for half of the area, then the same of the rest while that is worth it.
 
-    What a cutter touches a thinner one of its kind touches too.
+    Where none does for half, the one that does for most. What a cutter touches a thinner one of its kind touches too,
+    but the neck has to be as long, and a thin cutter is not sold on it.
     """
     while len(rows):
-        cutters = sorted({why.cutter[k] for k in rows}, key=lambda c: -c.diameter)
         d = np.array([why.cutter[k].diameter for k in rows])
-        area = few.area[rows]
-        cutter = next(c for c in cutters if float(area[d >= c.diameter].sum()) >= DOES * float(area.sum()))
-        mine = d >= cutter.diameter
-        if float(area[~mine].sum()) < LEAST_ZONE_MM2:
+        neck, area = why.slenderness[rows] * d, few.area[rows]
+        does = [(c, (d >= c.diameter) & c.sold_on(neck)) for c in _cutters(why, rows)]
+        held = np.array([float(area[mine].sum()) for _, mine in does])
+        best = int(np.argmax(held >= min(DOES * float(area.sum()), held.max())))
+        cutter, mine = does[best]
+        if float(area[~mine].sum()) < LEAST_ZONE_MM2 and held[best] >= DOES * float(area.sum()):
             mine[:] = True
         yield rows[mine], cutter
         rows = rows[~mine]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields as fields_of
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
+from geometry.sampling import SurfaceSamples
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.catalogue import DIAMETERS, catalogue
@@ -229,6 +231,66 @@ def test_tools_asked_for_are_sold_and_do_what_they_are_named_for():
         got = touchable(field_of(mesh, bought_tool), r.samples.points, r.samples.normals, LIFT)[1]
         assert r.samples.area[got].sum() >= 0.5 * r.area
     assert any(r.would_need.get("kind") == "other process" and r.would_need["slenderness"] > 20 for r in found)
+
+
+def slots(length):
+    """Deep slots for cutters of 1.0, 0.5 and 0.2 that need necks of 18, 9 and 4 mm, and samples low on their walls.
+
+    The slot of the 0.5 is ``length`` + 1 long, the others 12, open at both ends.
+    """
+    xs, top = [0, 5, 6.1, 11, 11.58, 16, 16.3, 21], 20.0
+    floors = [top, 2.4, top, 11.4, top, 16.6, top]
+    short = [top if k == 3 else h for k, h in enumerate(floors)]
+    mesh = terraces(xs, [0, 11 - length, 12], [short, floors])
+    s = samples_of(mesh, 40.0)
+    by_slot = []
+    for k in (1, 3, 5):
+        inside = (s.points[:, 0] > xs[k] - 1e-6) & (s.points[:, 0] < xs[k + 1] + 1e-6)
+        up = s.points[:, 2] - floors[k] - 0.55 * (xs[k + 1] - xs[k])
+        low = (up > 0) & (up < 0.3) & (s.points[:, 1] > (12 - length if k == 3 else 0.0))
+        by_slot.append(s.subset(inside & low & (np.abs(s.normals[:, 0]) > 0.9) & (s.area > 0)))
+    return mesh, by_slot
+
+
+def together(parts):
+    return SurfaceSamples(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields_of(SurfaceSamples)))
+
+
+@pytest.mark.parametrize("length", [0.5, 6.0])
+def test_a_thinner_cutter_is_not_named_where_only_a_stouter_one_is_sold_on_the_neck(length):
+    """0.5 fits wherever 1.0 does, and with its own slot that is more than half, but it is not sold on a neck of 18."""
+    mesh, by_slot = slots(length)
+    left = together(by_slot)
+    parts = np.array([p.area.sum() for p in by_slot]) / left.area.sum()
+    assert parts[0] < 0.5 < parts[0] + parts[1]
+    body = ball(3.175, neck=10.0, shank=6.0)
+    found = stays(mesh, [body], left)
+    assert {r.reason for r in found} == {"gap"} and sum(r.area for r in found) == pytest.approx(float(left.area.sum()))
+    named = {r.would_need["diameter_mm"]: r for r in found}  # no 'other process': each is sold
+    assert len(named) == len(found) and set(named) == ({1.0, 0.2} if length < 1.0 else {1.0, 0.5, 0.2})
+    for d, r in named.items():
+        n = r.would_need
+        assert n["kind"] == "ball" and n["neck_length_mm"] <= 20 * d and n["share"] >= 0.9
+        bought_tool = replace(bought(body, n), stickout=n["stickout_mm"], shank_diameter=n["shank_diameter_mm"])
+        got = touchable(field_of(mesh, bought_tool), r.samples.points, r.samples.normals, LIFT)[1]
+        assert r.samples.area[got].sum() >= 0.9 * r.area
+
+
+def test_few_samples_with_most_of_the_area_decide_how_long_the_neck_is():
+    mesh = block(16.0)
+    body = ball(3.0, neck=2.0, shank=6.0)
+    s = wall_of_block(mesh, 12.0)
+    deep = np.flatnonzero((s.points[:, 2] > 4.0) & (s.points[:, 2] < 5.0))[:2]
+    rows = np.concatenate([deep, np.flatnonzero((s.points[:, 2] > 8.0) & (s.points[:, 2] < 13.0))])
+    area = s.area[rows]
+    area[:2] = area.sum()
+    s = replace(s.subset(rows), area=area)
+    left = out_of_reach(mesh, [body], s)
+    assert len(left) > 200
+    (r,) = stays(mesh, [body], left)
+    assert r.reason == "shank" and r.would_need["share"] == 1.0
+    got = touchable(field_of(mesh, bought(body, r.would_need)), left.points, left.normals, LIFT)[1]
+    assert got.all()
 
 
 def test_what_is_left_to_a_tool_at_hand_names_it_and_says_why():
