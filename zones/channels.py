@@ -37,6 +37,8 @@ SAMPLES_PER_WALL = 12_000
 # Local refinement: starts, random points a round, rounds, and how much the neighbourhood shrinks when the best is well
 # inside it (nearer than INNER of its radius); otherwise it only moves, along a slanting border for example.
 STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 12, 0.4, 0.5
+# Starts stand 4 and first neighbourhoods reach 3 of the steps at which so many places would cover the sides of a wall.
+STEPS_PER_WALL = 3000
 # Triangles are looked up once within this multiple of the first radius.
 AROUND = 4.0
 NEAREST, TRIANGLES = 800, 300
@@ -44,7 +46,8 @@ NEAREST, TRIANGLES = 800, 300
 INSETS = (1e-3, 1e-5)
 # The foot of a perpendicular lies inside a side where what is left along the side, after so many corrections, is this
 # share of the way, at most.
-ASKEW, FOOT_TURNS = 2e-3, 5
+ASKEW, FOOT_TURNS = 2e-3, 8
+LEAST_SLOPE = 0.05  # of the secant, below which a step is left as it was
 ALONG_RIM = np.array([-1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0])
 
 
@@ -207,6 +210,7 @@ class _Field:
             rows = np.flatnonzero(at >= 0)
             foot[rows], back = self.smooth.at(points[rows], triangles[rows])
             place, here = at[rows], near[rows]
+            step, before = np.ones(len(rows)), np.zeros((len(rows), 3))
             for turn in range(FOOT_TURNS):
                 start[rows], normal = self.smooth.at(here, side.triangles[place])
                 way = foot[rows] - start[rows]
@@ -214,7 +218,9 @@ class _Field:
                 along = way - s[:, None] * normal
                 if turn < FOOT_TURNS - 1:
                     # the foot on the facets is where the facet is square to the way, not the surface
-                    _, place, here = nearest(side.tree, here + along)
+                    step = _secant(step, before, along)
+                    _, place, here = nearest(side.tree, here + step[:, None] * along)
+                    before = along
             place = side.triangles[place]
             good = (s > self.skin) & (np.linalg.norm(along, axis=1) <= ASKEW * s)
             good &= np.einsum("ij,ij->i", normal, back) < FACING_DOT
@@ -292,7 +298,7 @@ class _Field:
         for start in found:
             if len(chosen) >= STARTS or start.distance > 1.2 * found[0].distance:
                 break
-            pitch = float(np.sqrt(self.walls[start.wall].area / SAMPLES_PER_WALL))
+            pitch = float(np.sqrt(self.walls[start.wall].area / STEPS_PER_WALL))
             if any(start.near(c, 4.0 * pitch) for c in chosen):
                 continue
             chosen.append(start)
@@ -337,6 +343,19 @@ class _Field:
             rows = rows[(low[rows, k] <= centre[k] + reach) & (high[rows, k] >= centre[k] - reach)]
         rows = rows[self.mesh.normals[side[rows]] @ self.mesh.normals[start.triangle] > 0]
         return side[rows], low[rows], high[rows]
+
+
+def _secant(step: F64, before: F64, along: F64) -> F64:
+    """Next steps towards a perpendicular foot, as multiples of what is left along a side.
+
+    step : (n,) float64, the last ones; before, along : (n, 3) float64, mm, what was left before and after them
+
+    On a side that bulges towards a point at distance s with radius r a step of all that is left turns the normal as
+    well: it overshoots by s / r, and for s > r never arrives. The secant through the last two gives 1 / (1 + s / r).
+    """
+    was = np.einsum("ij,ij->i", before, before)
+    slope = (1.0 - np.einsum("ij,ij->i", before, along) / np.maximum(was, 1e-300)) / step
+    return np.where((was > 0.0) & (np.abs(slope) > LEAST_SLOPE), 1.0 / np.where(slope == 0.0, 1.0, slope), step)
 
 
 def _regular(count: int, most: int) -> np.ndarray:
