@@ -47,7 +47,7 @@ INSETS = (1e-3, 1e-5)
 # The foot of a perpendicular lies inside a side where what is left along the side, after so many corrections, is this
 # share of the way, at most.
 ASKEW, FOOT_TURNS = 2e-3, 8
-LEAST_SLOPE = 0.05  # of the secant, below which a step is left as it was
+SLOPES = 0.05, 1e3  # of the secant; outside, where nothing is left to turn among others, a step is left as it was
 ALONG_RIM = np.array([-1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0])
 
 
@@ -355,7 +355,8 @@ def _secant(step: F64, before: F64, along: F64) -> F64:
     """
     was = np.einsum("ij,ij->i", before, before)
     slope = (1.0 - np.einsum("ij,ij->i", before, along) / np.maximum(was, 1e-300)) / step
-    return np.where((was > 0.0) & (np.abs(slope) > LEAST_SLOPE), 1.0 / np.where(slope == 0.0, 1.0, slope), step)
+    sane = (was > 0.0) & (np.abs(slope) > SLOPES[0]) & (np.abs(slope) < SLOPES[1])
+    return np.where(sane, 1.0 / np.where(sane, slope, 1.0), step)
 
 
 def _regular(count: int, most: int) -> np.ndarray:
