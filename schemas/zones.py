@@ -171,7 +171,8 @@ class ProposedTool(ReportModel):
     instead_of: Annotated[str | None, Field(description="Tool at hand with the same cutter.")] = None
     like: Annotated[str | None, Field(description="Tool at hand whose holder it was measured with.")] = None
     access: str
-    area_mm2: Annotated[float, Field(description="Of the remainder, what zones with it hold; it is asked for nothing else.")]
+    area_mm2: Annotated[float, Field(
+        description="Of the remainder, what zones with it hold; it is asked for nothing else.")]
     tool: Annotated[Tool | None, Field(description="The same as an entry for tools of the setup, complete.")] = None
 
 
