@@ -27,6 +27,7 @@ from zones.sections import SideCurve
 
 CLEAR = 0.02  # mm off the surface where a ray or a look-up starts, so that it does not fall on the border itself
 PITCH = 0.4  # mm between rays along a trace
+ENDS = 8  # halvings of the pitch between the last ray of a strip and the first one that is not of it
 FACING = -0.3  # n1·n2 below: two sides face each other
 FACING_SHARE = 0.2  # of a side that faces channels, below which it is an outside
 NEIGHBOURS = 12  # rays that are asked for the side a point lies on
@@ -130,11 +131,35 @@ def side_rays(part: Part, decomposition: Decomposition, curves: Sequence[SideCur
     channel = {frozenset(c.walls): c for c in d.channels}
     skin = 1e-6 * float(np.linalg.norm(part.bounds[1] - part.bounds[0]))
     holes = shapely.union_all(list(shadows)).buffer(CLEAR)
-    return [_side(curve, mesh, tree, owner, channel, holes, skin) for curve in curves]
+    look = _Look(mesh, tree, owner, channel, max(skin, CLEAR))
+    return [_side(curve, look, holes) for curve in curves]
 
 
-def _side(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: dict[int, str],
-          channel: dict[frozenset[str], Channel], holes: shapely.Geometry, skin: float) -> SideRays:
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What level rays are sent against: mesh and tree, walls by face, channels by walls, mm a ray starts off."""
+
+    mesh: TriangleMesh
+    tree: TriangleTree
+    owner: dict[int, str]
+    channel: dict[frozenset[str], Channel]
+    skin: float
+
+    def along(self, wall: str, start: F64, normal: F64, z: float) -> tuple[list[str], F64]:
+        """Channel of each ray of a wall, '' for none, and its length (n,) mm, 0 where it meets nothing.
+
+        start, normal : (n, 2) float64, mm and unit
+        """
+        way = np.column_stack([normal, np.zeros(len(start))])
+        far, hit = first_hits(self.tree, np.column_stack([start, np.full(len(start), z)]), way, self.skin)
+        facing = np.einsum("ij,ij->i", self.mesh.normals[hit], way) < FACING
+        met = ["" if h < 0 or not ok else self.owner.get(int(self.mesh.face_ids[h]), "")
+               for h, ok in zip(np.asarray(hit).tolist(), facing.tolist(), strict=True)]
+        named = [self.channel[p].id if m and (p := frozenset((wall, m))) in self.channel else "" for m in met]
+        return named, np.where(np.isfinite(far), far, 0.0)
+
+
+def _side(curve: SideCurve, look: _Look, holes: shapely.Geometry) -> SideRays:
     start, normal = spread(curve.points, curve.closed, PITCH)
     if len(start) < 2:
         return SideRays(start, normal, [""] * len(start), [])
@@ -142,18 +167,50 @@ def _side(curve: SideCurve, mesh: TriangleMesh, tree: TriangleTree, owner: dict[
     if not curve.closed:  # a ray from the very end of a side would graze the end of the one it meets
         inset[0] += CLEAR * np.array([normal[0, 1], -normal[0, 0]])
         inset[-1] -= CLEAR * np.array([normal[-1, 1], -normal[-1, 0]])
-    origin = np.column_stack([inset, np.full(len(start), curve.z)])
-    way = np.column_stack([normal, np.zeros(len(start))])
-    far, hit = first_hits(tree, origin, way, max(skin, CLEAR))
-    facing = np.einsum("ij,ij->i", mesh.normals[hit], way) < FACING
-    met = ["" if h < 0 or not ok else owner.get(int(mesh.face_ids[h]), "")
-           for h, ok in zip(np.asarray(hit).tolist(), facing.tolist(), strict=True)]
-    named = [channel[pair].id if m and (pair := frozenset((curve.wall, m))) in channel else "" for m in met]
-    length = np.where(np.isfinite(far), far, 0.0)
+    named, length = look.along(curve.wall, inset, normal, curve.z)
+    seen = list(named)
     _bridge(named, length, shapely.contains_xy(holes, start[:, 0], start[:, 1]), curve.closed)
-    foot = start + length[:, None] * normal
     runs = [run for run in runs_of(named, curve.closed) if len(run) > 1]
-    return SideRays(start, normal, named, [Strip(named[run[0]], start[run], foot[run]) for run in runs])
+    ends = _ends(curve, look, start, normal, named, seen, runs)
+    strips = []
+    for run, (first, last) in zip(runs, ends, strict=True):
+        base = np.vstack([first[:, :2], start[run], last[:, :2]])
+        foot = np.vstack([first[:, 2:], start[run] + length[run, None] * normal[run], last[:, 2:]])
+        strips.append(Strip(named[run[0]], base, foot))
+    return SideRays(start, normal, named, strips)
+
+
+def _ends(curve: SideCurve, look: _Look, start: F64, normal: F64, named: Sequence[str], seen: Sequence[str],
+          runs: Sequence[Sequence[int]]) -> list[tuple[F64, F64]]:
+    """Last ray before and after each run that still meets its wall, (0 or 1, 4) float64: start and foot, mm.
+
+    Between the last ray of a run and the next one the border is halved ENDS times: where a strip ends must not hang on
+    where the rays happen to start. An end of the curve, or a ray named after its neighbours, is left alone.
+
+    named, seen : channel of each ray after and before ``_bridge``
+    """
+    n = len(start)
+    cuts = [(r, side, inner, inner + step) for r, run in enumerate(runs)
+            for side, inner, step in ((0, run[0], -1), (1, run[-1], 1))
+            if run[0] != run[-1] and seen[inner] == named[inner] and (curve.closed or 0 <= inner + step < n)]
+    out = [[np.zeros((0, 4)), np.zeros((0, 4))] for _ in runs]
+    inner, outer = np.array([c[2] for c in cuts]), np.array([c[3] % n for c in cuts])
+    want = [seen[k] for k in inner.tolist()]
+    low, high = np.zeros(len(cuts)), np.ones(len(cuts))
+    best = np.zeros((len(cuts), 4))
+    for _ in range(ENDS if cuts else 0):
+        t = 0.5 * (low + high)
+        at = start[inner] + t[:, None] * (start[outer] - start[inner])
+        way = normal[inner] + t[:, None] * (normal[outer] - normal[inner])
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        found, length = look.along(curve.wall, at, way, curve.z)
+        ok = np.array([a == b for a, b in zip(found, want, strict=True)])
+        best[ok] = np.column_stack([at, at + length[:, None] * way])[ok]
+        low, high = np.where(ok, t, low), np.where(ok, high, t)
+    for k, (r, side, _, _) in enumerate(cuts):
+        if low[k] > 0.0:
+            out[r][side] = best[k:k + 1]
+    return [(a, b) for a, b in out]
 
 
 def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool) -> None:
