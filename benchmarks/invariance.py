@@ -118,7 +118,7 @@ def _by_kind(regions: dict[str, float]) -> dict[str, float]:
     """Areas by the words of the region without numbers: 'H over C', 'W', 'floor'."""
     out: dict[str, float] = {}
     for name, area in regions.items():
-        kind = " ".join(w[0] if w[0] in "HWC" else w for w in name.split())
+        kind = " ".join(w[0] if w[0] in "HWC" else w.split(".")[0] for w in name.split())
         out[kind] = out.get(kind, 0.0) + area
     return out
 

@@ -15,14 +15,15 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from geometry.mesh import F64
+from geometry.mesh import F64, I32
 from geometry.part import Part
-from zones.planmap import Area, PlanMap
+from zones.cover import cover_border
+from zones.planmap import PlanMap
 
 MATERIAL = -1  # number of what lies under something that stands above the level
 OPEN = 0  # number of the place outside all that stands
 NARROW = 0.05  # mm: half the diameter of the thinnest tool that is ever asked for; narrower is no place
-FACES_UP = 1e-6  # n_z above: a triangle that covers part of the plan
+FACES_UP = 1e-3  # n_z above: a triangle that covers part of the plan; of a steeper face NARROW is 50 mm high
 STEP = 1e-3  # mm, levels nearer than this are one
 NOTHING = shapely.Polygon()
 
@@ -39,9 +40,10 @@ class LevelPlaces:
     number: NDArray[np.int64]
 
     @staticmethod
-    def of(standing: shapely.Geometry, spans: shapely.Geometry = NOTHING) -> LevelPlaces:
-        """The places left by what covers ``standing`` (polygons, mm); what lies all under ``spans`` is none."""
-        plan = PlanMap.of([Area("material", standing)])
+    def of(border: F64, spans: shapely.Geometry = NOTHING) -> LevelPlaces:
+        """The places left by what stands in ``border`` (k, 2, 2), directed, mm; what lies all under ``spans`` is none.
+        """
+        plan = PlanMap.of_cover("material", border)
         number = np.full(len(plan.over), MATERIAL, np.int64)
         number[0] = OPEN
         count = 0
@@ -72,11 +74,12 @@ class LevelPlaces:
 class Places:
     """The places of a part at any level.
 
-    triangles : (n, 3, 3) float64, mm, what faces up, without connections
-    spans     : what connections cover in plan, mm; where they end at a leaning wall there is a hole in what it covers
+    vertices : (n, 3) float64, mm; faces : (m, 3), indices of what faces up, without connections
+    spans    : what connections cover in plan, mm; where they end at a leaning wall there is a hole in what it covers
     """
 
-    triangles: F64
+    vertices: F64
+    faces: I32
     spans: shapely.Geometry
     known: dict[int, LevelPlaces] = field(default_factory=dict)
 
@@ -84,35 +87,16 @@ class Places:
     def of(part: Part, spans: Iterable[int]) -> Places:
         """Of a part, mm, the access along +Z; ``spans`` are the faces of its connections with their fillets."""
         mesh = part.mesh
-        up, span = mesh.normals[:, 2] > FACES_UP, np.isin(mesh.face_ids, list(spans))
-        covered = standing(mesh.triangles[up & span], -np.inf)
-        return Places(np.asarray(mesh.triangles[up & ~span]), covered.buffer(NARROW))
+        # by the surface, not by the triangles: those of a steep twisted wall look up and down by turns
+        slope = mesh.normals[:, 2] if mesh.corner_normals is None else mesh.corner_normals[:, :, 2].mean(axis=1)
+        up = np.where(np.isfinite(slope), slope, mesh.normals[:, 2]) > FACES_UP
+        span = np.isin(mesh.face_ids, list(spans))
+        covered = PlanMap.of_cover("spans", cover_border(mesh.vertices, mesh.faces[up & span])).shape("spans")
+        return Places(mesh.vertices, mesh.faces[up & ~span], covered.buffer(NARROW))
 
     def at_level(self, level: float) -> LevelPlaces:
         """The places at a level, mm."""
         key = round(level / STEP)
         if key not in self.known:
-            self.known[key] = LevelPlaces.of(standing(self.triangles, key * STEP), self.spans)
+            self.known[key] = LevelPlaces.of(cover_border(self.vertices, self.faces, key * STEP), self.spans)
         return self.known[key]
-
-
-def standing(triangles: F64, level: float) -> shapely.Geometry:
-    """What triangles (n, 3, 3), mm, cover in plan with the part of them above ``level``, mm."""
-    above = triangles[:, :, 2] > level
-    count = above.sum(axis=1)
-    pieces = [triangles[count == 3]]
-    for left, lone in ((1, above), (2, ~above)):  # one corner above, or one below
-        some = triangles[count == left]
-        turn = (lone[count == left].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        a, b, c = np.take_along_axis(some, turn[:, :, None], axis=1).transpose(1, 0, 2)
-        p, q = _cut(a, b, level), _cut(a, c, level)
-        pieces.append(np.stack([a, p, q] if left == 1 else [p, b, c, q], axis=1))
-    rings = [shapely.polygons(np.concatenate([s, s[:, :1]], axis=1)[:, :, :2]) for s in pieces if len(s)]
-    shapes = np.concatenate(rings) if rings else np.zeros(0, object)
-    return shapely.union_all(shapes[shapely.area(shapes) > 1e-9]).buffer(STEP, join_style="mitre")
-
-
-def _cut(a: F64, b: F64, level: float) -> F64:
-    """Where the lines from a to b (n, 3) pass a level."""
-    t = (level - a[:, 2]) / (b[:, 2] - a[:, 2])
-    return np.asarray(a + t[:, None] * (b - a))

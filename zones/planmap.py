@@ -65,6 +65,23 @@ class PlanMap:
             over[:, k] = shapely.contains_xy(a.shape, inside[:, 0], inside[:, 1])
         return PlanMap(made, faces, tuple(a.name for a in areas), over)
 
+    @staticmethod
+    def of_cover(name: str, border: F64, grid: float = 1e-3, seed: int = 0) -> PlanMap:
+        """Map of one area, told by directed borders (k, 2, 2), mm, that make closed lines: where they wind round a
+        place counter-clockwise (``zones.cover``). Its cells are as large as can be."""
+        made = TrapezoidMap.of(border, grid, seed)
+        faces = made.faces()
+        inside = np.append(made.windings(faces) > 0, False)  # the last for what is outside of the box
+        cells = faces.merged(inside[faces.above] == inside[faces.below])
+        over = np.zeros((len(cells.doubled), 1), np.bool_)
+        over[cells.of_trapezoid, 0] = inside[faces.of_trapezoid]
+        return PlanMap(made, cells, (name,), over)
+
+    def shape(self, name: str) -> shapely.Geometry:
+        """What an area covers, from its cells, mm."""
+        cells = np.flatnonzero(self.over[:, self.names.index(name)])
+        return shapely.union_all([self.map.outline(self.faces, k) for k in cells.tolist()])
+
     def cell_at(self, xy: ArrayLike) -> NDArray[np.int64]:
         """(n,) cell of each place xy (n, 2), ``OUTSIDE`` beyond the box."""
         at = self.map.locate(xy)

@@ -44,6 +44,18 @@ class Faces:
     doubled: I64
     areas: F64
 
+    def merged(self, across: NDArray[np.bool_]) -> Faces:
+        """Faces joined across pieces; across : (n + 2,) bool. They are numbered as before, by their first trapezoid."""
+        both = across & (self.above >= 0) & (self.below >= 0)
+        f = len(self.doubled)
+        pairs = coo_matrix((np.ones(int(both.sum()), np.int8), (self.above[both], self.below[both])), shape=(f, f))
+        label = _by_first(connected_components(pairs, directed=False)[1])
+        doubled, areas = np.zeros(int(label.max()) + 1, np.int64), np.zeros(int(label.max()) + 1)
+        np.add.at(doubled, label, self.doubled)
+        np.add.at(areas, label, self.areas)
+        above, below = (np.where(side >= 0, label[side], -1) for side in (self.above, self.below))
+        return Faces(label[self.of_trapezoid], above, below, doubled, areas)
+
 
 @dataclass(frozen=True, eq=False)
 class TrapezoidMap:
@@ -149,18 +161,37 @@ class TrapezoidMap:
         rows, column = np.nonzero(self.neighbours[:, 2:] >= 0)
         pairs = (rows, self.neighbours[rows, column + 2])
         _, label = connected_components(coo_matrix((np.ones(len(rows), np.int8), pairs), shape=(t, t)), directed=False)
-        _, first, label = np.unique(label, return_index=True, return_inverse=True)
-        face = np.argsort(np.argsort(first))[label.ravel()].astype(np.int64)  # by the first trapezoid
+        face = _by_first(label)
         above = np.full(len(self.pieces), -1, np.int64)
         below = above.copy()
         above[self.bottom], below[self.top] = face, face
         p, q = self.points[self.pieces[:, 0]], self.points[self.pieces[:, 1]]
         # twice the area between piece and bottom of the box; sums may wrap round on the way, their result fits
         strip = (q[:, 0] - p[:, 0]) * (p[:, 1] + q[:, 1] - 2 * self.points[0, 1])
-        doubled = np.zeros(len(first), np.int64)
+        doubled = np.zeros(int(face.max()) + 1, np.int64)
         np.add.at(doubled, below[below >= 0], strip[below >= 0])
         np.subtract.at(doubled, above[above >= 0], strip[above >= 0])
         return Faces(face, above, below, doubled, doubled.astype(np.float64) * (0.5 * self.noding.grid**2))
+
+    def windings(self, faces: Faces) -> I64:
+        """(f,) how often the input segments wind round each face, counter-clockwise positive, 0 round the outer one.
+
+        The segments are taken from their first end to their second and have to make closed lines.
+        """
+        n, s = len(self.noding.pieces), self.noding.segments
+        ahead = (s[:, 0, 0] < s[:, 1, 0]) | ((s[:, 0, 0] == s[:, 1, 0]) & (s[:, 0, 1] < s[:, 1, 1]))
+        passed = np.zeros(n, np.int64)  # along each piece, from its lesser end, less those that come back
+        np.add.at(passed, np.repeat(np.arange(n), np.diff(self.noding.starts)),
+                  np.where(ahead, 1, -1)[self.noding.sources])
+        left, right = faces.above[:n], faces.below[:n]
+        out = np.zeros(len(faces.doubled), np.int64)
+        known = np.arange(len(out)) == 0
+        while not known.all():
+            up, down = known[right] & ~known[left], known[left] & ~known[right]
+            out[left[up]] = out[right[up]] + passed[up]
+            out[right[down]] = out[left[down]] - passed[down]
+            known[left[up]] = known[right[down]] = True
+        return out
 
     def outline(self, faces: Faces, face: int) -> shapely.Polygon | shapely.MultiPolygon:
         """One face as a polygon with its holes, mm; pieces with the face on both sides are left out."""
@@ -177,6 +208,12 @@ class TrapezoidMap:
         run = q[:, 0] - p[:, 0]
         rise = (q[:, 1] - p[:, 1]) * (x - p[:, 0])
         return np.where(run == 0, here, p[:, 1] + rise / np.maximum(run, 1))
+
+
+def _by_first(label: NDArray[np.int32]) -> I64:
+    """Labels (k,) numbered in the order in which they first stand."""
+    _, first, at = np.unique(label, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[at.ravel()].astype(np.int64)
 
 
 def insertion_order(points: I64, pieces: I64, seed: int) -> I64:

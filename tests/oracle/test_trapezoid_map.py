@@ -216,3 +216,29 @@ def test_the_order_is_a_permutation_by_rounds():
     one, two = (insertion_order(noding.hot, noding.pieces, seed) for seed in (1, 2))
     assert sorted(one.tolist()) == list(range(len(noding.pieces))) and not np.array_equal(one, two)
     assert np.array_equal(one, insertion_order(noding.hot, noding.pieces, 1))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_windings_are_the_turns_of_the_angle(seed):
+    rng = np.random.default_rng(seed)
+    lines = [rng.integers(0, 12, (int(rng.integers(3, 9)), 2)).astype(float) for _ in range(5)]
+    lines.append(lines[0][::-1])  # takes the first one back
+    lines.append(lines[1])  # goes round twice
+    segments = np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
+    plan = TrapezoidMap.of(segments, seed=seed)
+    faces = plan.faces()
+    found = plan.windings(faces)
+    at = rng.uniform(-0.5, 12.5, (400, 2))
+    near = shapely.distance(shapely.multilinestrings(segments), shapely.points(at)) < 0.01
+    a, b = (segments[None, :, k] - at[:, None] for k in (0, 1))
+    turned = np.arctan2(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=2)).sum(axis=1)
+    wanted = np.rint(turned / (2 * np.pi)).astype(int)
+    assert len(np.unique(wanted)) > 3 and near.sum() < 40
+    assert np.array_equal(found[faces.of_trapezoid[plan.locate(at)]][~near], wanted[~near])
+    inside = np.append(found != 0, False)
+    merged = faces.merged(inside[faces.above] == inside[faces.below])
+    assert merged.doubled.sum() == faces.doubled.sum() and merged.of_trapezoid[0] == 0
+    assert len(merged.doubled) < len(faces.doubled)
+    for k in range(len(merged.doubled)):
+        own = np.unique(faces.of_trapezoid[merged.of_trapezoid == k])
+        assert len(set(inside[own].tolist())) == 1 and merged.doubled[k] == faces.doubled[own].sum()

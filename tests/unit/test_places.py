@@ -14,7 +14,9 @@ from tests.decomposition_shapes import box, outline, plate, to_part
 from zones.categories import Categories
 from zones.decompose import decompose
 from zones.model import Decomposition
-from zones.places import MATERIAL, LevelPlaces, standing
+from zones.cover import cover_border
+from zones.places import FACES_UP, MATERIAL, LevelPlaces
+from zones.planmap import PlanMap
 from zones.planview import ChannelPlan
 from zones.regions import Labels, Region, Regioner, base_of, connections_of, place_of
 
@@ -97,7 +99,7 @@ def test_places_share_edges_not_points():
     # two squares of air that touch in a corner of a chequered block
     block = shapely.union_all([shapely.box(0, 0, 9, 9).difference(shapely.box(1, 1, 8, 8)),
                                shapely.box(1, 1, 4, 4), shapely.box(4, 4, 8, 8)])
-    places = LevelPlaces.of(block)
+    places = LevelPlaces.of(directed(block))
     a, b, outside, inside = places.at(np.array([[6.0, 2.0], [2.0, 6.0], [-3.0, 4.0], [2.0, 2.0]])).tolist()
     assert {a, b} == {1, 2} and outside == 0 and inside == MATERIAL
     assert b == 1  # it begins farther left
@@ -115,9 +117,57 @@ def test_where_a_web_ends_at_leaning_walls_is_no_place():
     assert all(r.own == (0,) and set(r.places.outlines) == {0} for r in plan.parting.regions.values())
 
 
+def directed(shape) -> np.ndarray:
+    """Borders of polygons, what they cover to the left."""
+    rings = [np.asarray(r.coords) for p in shapely.get_parts(shape)
+             for q in [shapely.orient_polygons(p)] for r in (q.exterior, *q.interiors)]
+    return np.concatenate([np.stack([r[:-1], r[1:]], axis=1) for r in rings])
+
+
 def test_what_stands_above_a_level():
     # an upright triangle roof: z from 0 at x = 0 to 10 at x = 10
-    roof = np.array([[[0.0, 0, 0], [10, 0, 10], [10, 5, 10]], [[0, 0, 0], [10, 5, 10], [0, 5, 0]]])
+    roof = np.array([[0.0, 0, 0], [10, 0, 10], [10, 5, 10], [0, 5, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
     for level in (2.0, 7.0):
-        assert standing(roof, level).area == pytest.approx(5 * (10 - level), abs=0.03)
-    assert standing(roof, 11.0).is_empty
+        covered = PlanMap.of_cover("roof", cover_border(roof, faces, level)).shape("roof")
+        assert covered.area == pytest.approx(5 * (10 - level), abs=0.01)
+        assert covered.bounds == pytest.approx((level, 0.0, 10.0, 5.0), abs=2e-3)
+    assert not len(cover_border(roof, faces, 11.0))
+    assert PlanMap.of_cover("roof", cover_border(roof, faces, 11.0)).shape("roof").is_empty
+
+
+@pytest.mark.parametrize("level", [3.0, 9.0, 15.5, 19.0])
+def test_what_a_part_covers_is_the_union_of_its_triangles(level):
+    part = to_part(tray(((20.0, 9.5), (40.0, 25.0)), bar=True).union(
+        outline("YZ", [(8, 2), (12, 2), (19, 30), (17, 30)], 8, (25, 0, 0))))
+    mesh = part.mesh
+    up = mesh.faces[mesh.normals[:, 2] > FACES_UP]
+    found = PlanMap.of_cover("part", cover_border(mesh.vertices, up, level)).shape("part")
+    pieces = []
+    for t in mesh.vertices[up]:
+        ring = [t[k] for k in range(3)]
+        kept = []
+        for a, b in zip(ring, ring[1:] + ring[:1], strict=True):  # Sutherland and Hodgman against the level
+            kept += [a] if a[2] > level else []
+            if (a[2] > level) != (b[2] > level):
+                kept.append(a + (level - a[2]) / (b[2] - a[2]) * (b - a))
+        if len(kept) > 2:
+            pieces.append(shapely.Polygon([p[:2] for p in kept]))
+    wanted = shapely.union_all(pieces).buffer(0)
+    assert wanted.area > 100
+    assert found.symmetric_difference(wanted).area < 2e-3 * wanted.length
+
+
+def test_folds_in_plan_do_not_matter():
+    # a steep strip whose triangles look up and down by turns, with its upper border at y = 1
+    x = np.linspace(0, 10, 11)
+    low = np.stack([x, np.where(np.arange(11) % 2, 0.02, -0.02), np.zeros(11)], axis=1)
+    top = np.stack([x, np.where(np.arange(11) % 2, -0.01, 0.01), np.full(11, 5.0)], axis=1)
+    back = np.stack([x, np.ones(11), np.full(11, 5.0)], axis=1)
+    v = np.concatenate([low, top, back])
+    k = np.arange(10)
+    bands = [np.concatenate([np.stack([o + k, o + k + 1, o + k + 12], axis=1),
+                             np.stack([o + k, o + k + 12, o + k + 11], axis=1)]) for o in (0, 11)]
+    covered = PlanMap.of_cover("strip", cover_border(v, np.concatenate(bands))).shape("strip")
+    assert covered.geom_type == "Polygon" and not covered.interiors
+    assert covered.area == pytest.approx(10.0, abs=0.15)
