@@ -38,6 +38,7 @@ FRUSTUM_SLICES = 6
 FEW = 4000  # queries below this are not worth waking a second thread for
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
 AIMED = 12  # free nodes a flat bottom is tried towards over a level place
+BELOW = 1.0  # mm under that: how low a tip is ever asked about
 BEYOND = 3.0  # lattice steps outside the flat: how far these may be
 INSIDE = 1.5e-3  # mm: a flat bottom is not asked to reach nearer than this to its own rim: lines are off by so much
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
@@ -154,13 +155,23 @@ class TipField:
 
     def _noncut(self, discs: tuple[Disc, ...]) -> F64:
         grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
-        for d in discs:
+        for d in (d for d in discs if self._can_meet(d)):
             limit = self.disc_limit(d, self._grid(self.coarse, self.disc_radius(d, 0.5), 0.0))
             grid = np.maximum(grid, limit)
         if discs:  # what stands beyond the grid is not known here, so the tool does not go there
             for edge in (grid[:1], grid[-1:], grid[:, :1], grid[:, -1:]):
                 edge[:] = np.inf
         return grid
+
+    def _can_meet(self, disc: Disc) -> bool:
+        """Whether a disc gets as low as anything stands while the tip is at the bottom of the obstacles or above it.
+
+        A ball that touches the lowest edge from the side has its tip a radius lower.
+        """
+        if not len(self.tree):
+            return False
+        bottom, top = float(self.tree.arrays.lower[0, 2]), float(self.tree.arrays.upper[0, 2])
+        return top + self.allowance + self.cusp - disc.height > bottom - self.grown_radius - BELOW
 
     def disc_radius(self, disc: Disc, diagonals: float) -> float:
         """Radius of a disc with the allowance and this many cell diagonals of the shank and holder grid, mm."""
