@@ -10,10 +10,23 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from geometry.mesh import F64, I32
+from geometry.mesh import F64, I32, TriangleMesh
 from zones.noding import I64
 
+FACES_UP = 1e-3  # n_z above: a triangle covers part of the plan; steeper ones 0.05 mm if they are 50 mm high
 THIN = 5e-4  # mm: what borders may be straightened by, half a step of the grid they are rounded to
+
+
+def upward(mesh: TriangleMesh) -> F64:
+    """(m,) how far each triangle looks up: n_z of the exact surface at its corners, its own where that has none.
+
+    Triangles of a steep twisted face look up and down by turns, its surface does not.
+    """
+    own = mesh.normals[:, 2]
+    if mesh.corner_normals is None:
+        return np.asarray(own)
+    slope = mesh.corner_normals[:, :, 2].mean(axis=1)
+    return np.where(np.isfinite(slope), slope, own)
 
 
 def cover_border(vertices: F64, faces: I32, level: float = -np.inf) -> F64:

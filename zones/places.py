@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
 from geometry.part import Part
-from zones.cover import cover_border
+from zones.cover import FACES_UP, cover_border, upward
 from zones.planmap import PlanMap
 
 MATERIAL = -1  # number of what lies under something that stands above the level
 OPEN = 0  # number of the place outside all that stands
 NARROW = 0.05  # mm: half the diameter of the thinnest tool that is ever asked for; narrower is no place
-FACES_UP = 1e-3  # n_z above: a triangle that covers part of the plan; of a steeper face NARROW is 50 mm high
 STEP = 1e-3  # mm, levels nearer than this are one
 NOTHING = shapely.Polygon()
 
@@ -87,9 +86,7 @@ class Places:
     def of(part: Part, spans: Iterable[int]) -> Places:
         """Of a part, mm, the access along +Z; ``spans`` are the faces of its connections with their fillets."""
         mesh = part.mesh
-        # by the surface, not by the triangles: those of a steep twisted wall look up and down by turns
-        slope = mesh.normals[:, 2] if mesh.corner_normals is None else mesh.corner_normals[:, :, 2].mean(axis=1)
-        up = np.where(np.isfinite(slope), slope, mesh.normals[:, 2]) > FACES_UP
+        up = upward(mesh) > FACES_UP
         span = np.isin(mesh.face_ids, list(spans))
         covered = PlanMap.of_cover("spans", cover_border(mesh.vertices, mesh.faces[up & span])).shape("spans")
         return Places(mesh.vertices, mesh.faces[up & ~span], covered.buffer(NARROW))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.part import Part
+from zones.cover import FACES_UP, cover_border, upward
 from zones.faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.parting import Parting
@@ -136,11 +137,11 @@ def footprints(part: Part, decomposition: Decomposition) -> list[Area]:
 
 
 def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:
-    t = part.mesh.triangles[np.isin(part.mesh.face_ids, faces)][:, :, :2]
-    e, f = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    wide = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) > 1e-9
-    ring = np.concatenate([t[wide], t[wide][:, :1]], axis=1)
-    return shapely.union_all(shapely.polygons(ring)).buffer(0.0)
+    mesh = part.mesh
+    own, slope = np.isin(mesh.face_ids, faces), upward(mesh)
+    sides = mesh.faces[own & (slope > FACES_UP)], mesh.faces[own & (slope < -FACES_UP)][:, ::-1]
+    covers = [PlanMap.of_cover("side", cover_border(mesh.vertices, f)).shape("side") for f in sides]
+    return shapely.union_all(covers).buffer(0.0)
 
 
 def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[Area]:

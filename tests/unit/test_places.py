@@ -12,10 +12,10 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import box, outline, plate, to_part
 from zones.categories import Categories
+from zones.cover import FACES_UP, cover_border
 from zones.decompose import decompose
 from zones.model import Decomposition
-from zones.cover import cover_border
-from zones.places import FACES_UP, MATERIAL, LevelPlaces
+from zones.places import MATERIAL, LevelPlaces
 from zones.planmap import PlanMap
 from zones.planview import ChannelPlan
 from zones.regions import Labels, Region, Regioner, base_of, connections_of, place_of
