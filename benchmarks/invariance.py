@@ -5,7 +5,8 @@
 Each part is read once as it is and once for every variant (turned, scaled and shuffled ones as arrays, inch and strips
 through STEP files), decomposed, and compared after its walls have been matched by place: walls, walls of every
 connection, channels with gaps (1 %), profile types, areas of all regions (1 % of the part). With ``--zones`` the
-suggested setup is zoned too, as it is and turned: region, form, tool and area (3 %) of every zone of 5 mm² or more.
+suggested setup is zoned too, as it is and turned: areas by kind of region, form and tool, of 5 mm² or more in one of the
+two (3 % or 2 mm²).
 """
 
 from __future__ import annotations
@@ -191,7 +192,7 @@ def strips_file(seed: int, recipe: str, step: Path) -> Path | None:
 
 
 def zone_table(step: Path, setup: dict[str, Any]) -> dict[tuple[str, str, str], float]:
-    """Area by kind of region, form and tool of the zones of a setup, those of 5 mm² and more."""
+    """Area by kind of region, form and tool of the zones of a setup, mm²."""
     from service.convert import parse_setup
     from service.prepare import prepare
 
@@ -199,10 +200,9 @@ def zone_table(step: Path, setup: dict[str, Any]) -> dict[tuple[str, str, str], 
     out: dict[tuple[str, str, str], float] = {}
     for z in ready.zones:
         area = float(ready.samples.area[z.samples].sum())
-        if area >= ZONE_LEAST:
-            kind = " ".join(w[0] if w[0] in "HWC" else w.split(".")[0] for w in z.region.split())
-            key = (kind, str(z.form), z.tool.id)
-            out[key] = out.get(key, 0.0) + area
+        kind = " ".join(w[0] if w[0] in "HWC" else w.split(".")[0] for w in z.region.split())
+        key = (kind, str(z.form), z.tool.id)
+        out[key] = out.get(key, 0.0) + area
     return out
 
 
@@ -240,7 +240,7 @@ def _zones_turned(step: Path) -> list[str]:
     x = [float(np.cos(ANGLE)), float(-np.sin(ANGLE)), 0.0]
     theirs = zone_table(step, {**setup, "placement": {"origin_mm": [5.0, -3.0, 0.0], "x_axis": x}})
     return [f"{key}: {theirs.get(key, 0.0):.1f} instead of {mine.get(key, 0.0):.1f} mm²"
-            for key in sorted({*mine, *theirs})
+            for key in sorted({*mine, *theirs}) if max(theirs.get(key, 0.0), mine.get(key, 0.0)) >= ZONE_LEAST
             if abs(theirs.get(key, 0.0) - mine.get(key, 0.0)) > max(2.0, ZONE_AREA * mine.get(key, 0.0))]
 
 
