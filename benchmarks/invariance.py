@@ -5,8 +5,8 @@
 Each part is read once as it is and once for every variant (turned, scaled and shuffled ones as arrays, inch and strips
 through STEP files), decomposed, and compared after its walls have been matched by place: walls, walls of every
 connection, channels with gaps (1 %), profile types, areas of all regions (1 % of the part). With ``--zones`` the
-suggested setup is zoned too, as it is and turned: areas by kind of region, form and tool, of 5 mm² or more in one of the
-two (3 % or 2 mm²).
+suggested setup is zoned too, as it is and turned: areas by kind of region, form and tool, of 5 mm² or more in one of
+the two (3 % or 2 mm²).
 """
 
 from __future__ import annotations
