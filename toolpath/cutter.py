@@ -6,16 +6,18 @@ import math
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
+from geometry.outline import Arc, Line, Outline
 from geometry.toolbody import ToolBody
 
 
 @dataclass(frozen=True)
 class Cutter:
-    """Ball, flat or bull-nose cutter; the tip is its lowest point.
+    """A cutter, or a whole assembly, of revolution; the tip is its lowest point.
 
-    diameter      : float, mm, > 0
-    corner_radius : float, mm: diameter/2 for a ball, 0 for a flat, between for a bull nose
+    diameter      : float, mm, > 0, the widest
+    corner_radius : float, mm: diameter/2 for a ball, 0 for a flat, between for a bull nose; of other shapes 0
     length        : float, mm, > 0, of the cutting part; above it the drop counts the same cylinder without end
+    outline       : Outline of any other shape; None for ball, flat and bull nose
 
     Raises
     ------
@@ -26,6 +28,7 @@ class Cutter:
     diameter: float
     corner_radius: float
     length: float
+    outline: Outline | None = None
 
     def __post_init__(self) -> None:
         for name in ("diameter", "length"):
@@ -52,6 +55,64 @@ class Cutter:
     def bull(cls, *, diameter: float, length: float, corner_radius: float) -> Cutter:
         """A bull-nose cutter, mm."""
         return cls(diameter, corner_radius, length)
+
+    @classmethod
+    def tapered(cls, *, diameter: float, tip_diameter: float, angle_deg: float, length: float) -> Cutter:
+        """A tapered ball: a ball of ``tip_diameter`` and a cone tangent to it up to ``diameter``, mm.
+
+        angle_deg : half the angle of the cone, between its side and the axis, > 0 and < 90
+        """
+        if not 0.0 < angle_deg < 90.0:
+            raise SetupError(f"the half angle of a tapered cutter must lie between 0 and 90 degrees, got {angle_deg}",
+                             code="bad_cutter", subjects=("angle_deg",), measured=angle_deg, limit=[0.0, 90.0])
+        r, half = 0.5 * tip_diameter, math.radians(angle_deg)
+        at, top = r * math.cos(half), 0.5 * diameter
+        if not 0.0 < at < top:
+            raise SetupError(f"a ball of {tip_diameter} mm is not narrower than a cutter of {diameter} mm",
+                             code="bad_cutter", subjects=("tip_diameter",), measured=tip_diameter, limit=diameter)
+        z = r * (1.0 - math.sin(half))
+        return cls(diameter, 0.0, length,
+                   Outline((Arc(at, z, (0.0, r)), Line(top, z + (top - at) / math.tan(half)))))
+
+    @classmethod
+    def barrel(cls, *, diameter: float, tip_diameter: float, side_radius: float, length: float) -> Cutter:
+        """A barrel: a ball of ``tip_diameter`` and a side of ``side_radius`` tangent to it, widest at ``diameter``, mm.
+
+        The side has its widest place where the cylinder above begins. tip_diameter < diameter < 2 side_radius.
+        """
+        r, widest = 0.5 * tip_diameter, 0.5 * diameter
+        if not 0.0 < r < widest < side_radius:
+            raise SetupError(f"a barrel of {diameter} mm with a tip of {tip_diameter} mm and a side radius of "
+                             f"{side_radius} mm does not close", code="bad_cutter", subjects=("side_radius",),
+                             measured=[tip_diameter, diameter, side_radius],
+                             limit="tip diameter < diameter < 2 side radius")
+        c = widest - side_radius
+        level = r + math.sqrt((side_radius - r) ** 2 - c * c)
+        k = side_radius / (side_radius - r)
+        join = (c - k * c, level + k * (r - level))
+        return cls(diameter, 0.0, length, Outline((Arc(*join, (0.0, r)), Arc(widest, level, (c, level)))))
+
+    @classmethod
+    def turned(cls, outline: Outline, *, length: float) -> Cutter:
+        """A cutter of any outline."""
+        return cls(2.0 * outline.radius, 0.0, length, outline)
+
+    @classmethod
+    def assembly(cls, tool: ToolBody) -> Cutter:
+        """Cutting part, shank and holder of a tool as one body, without clearances; the neck where it is wider."""
+        r, d = tool.corner_radius, 0.5 * tool.diameter - tool.corner_radius
+        pieces: list[Arc | Line] = [Line(d, 0.0)] if d > 0.0 else []
+        if r > 0.0:
+            pieces.append(Arc(d + r, r, (d, r)))
+        pieces.append(Line(d + r, max(r, tool.flute_length)))
+        z = tool.flute_length
+        for radius, top in ((0.5 * tool.neck_diameter, tool.neck_length), (0.5 * tool.shank_diameter, tool.stickout)):
+            pieces += [Line(radius, z), Line(radius, top)]
+            z = top
+        for s in tool.holder:
+            pieces += [Line(0.5 * s.diameter, z), Line(0.5 * s.diameter_top, z + s.length)]
+            z += s.length
+        return cls(2.0 * Outline(tuple(pieces)).radius, 0.0, tool.flute_length, Outline(tuple(pieces)))
 
     @classmethod
     def of(cls, tool: ToolBody) -> Cutter:

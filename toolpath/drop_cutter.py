@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
 from geometry.mesh import F64, TriangleMesh
+from geometry.turned import drop_turned
 from toolpath.cutter import Cutter
 
 
@@ -44,4 +45,6 @@ def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike
         tree = mesh
     else:
         raise TypeError(f"mesh must be a TriangleMesh or a TriangleTree, got {type(mesh).__name__}")
+    if cutter.outline is not None:
+        return drop_turned(tree, xy, cutter.outline)
     return drop_tips(tree, xy, cutter.radius, cutter.corner_radius)

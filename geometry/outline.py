@@ -1,0 +1,205 @@
+"""Outlines of bodies of revolution: lines and arcs from the tip outwards and upwards.
+
+A tool is turned: its half section is a chain of lines and arcs. What a drop meets of it is, at each radius, the lowest
+point there: the *lower outline*. Where that bends upwards all the way it is one convex body; where it bends down (a
+step to the shank, a cone that ends in a wider collar) another body begins, flat-bottomed from the axis to there, which
+adds nothing to the tool. So any tool is a stack of convex bodies, and its tip is the highest that one of them asks for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.errors import SetupError
+from geometry.kernels.outline import Stack
+from geometry.mesh import F64
+
+BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
+STEEPEST = 5.0  # slope of a paraboloid at its radius: at the rim the outline may be upright
+SAMPLES = 4096  # places at which they are held below it
+FLAT = 1e-12  # of the radius: shorter pieces are none
+LEAST = 1e-9  # mm a radius has to grow by to be wider
+CHORD = 1e-3  # mm by which chords of a hollow arc may stand out of it
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight piece to (rho, z), mm."""
+
+    rho: float
+    z: float
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A piece of a circle to (rho, z) round ``centre`` (rho, z), mm; bulging outwards unless ``hollow``."""
+
+    rho: float
+    z: float
+    centre: tuple[float, float]
+    hollow: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Half section of a tool from its tip, which is at (0, 0) or on the level z = 0.
+
+    pieces : Line and Arc in order, each from the end of the one before, the first from (0, 0); z never falls, rho may
+             (what is above a wider place is not met). After the last piece the tool goes on upwards as a cylinder.
+
+    Raises
+    ------
+    SetupError
+        A coordinate is not finite or negative, z falls, or an end does not lie on its circle; the subjects name the
+        piece.
+    """
+
+    pieces: tuple[Line | Arc, ...]
+
+    def __post_init__(self) -> None:
+        at = (0.0, 0.0)
+        for k, p in enumerate(self.pieces):
+            numbers = (p.rho, p.z, *(p.centre if isinstance(p, Arc) else ()))
+            if not all(map(math.isfinite, numbers)) or p.rho < 0.0:
+                raise _wrong(k, f"has the end ({p.rho}, {p.z}) mm", "finite, rho >= 0")
+            if p.z < at[1] - LEAST:
+                raise _wrong(k, f"falls from z = {at[1]} to {p.z} mm", "z never falls")
+            if isinstance(p, Arc):
+                a, b = math.dist(at, p.centre), math.dist((p.rho, p.z), p.centre)
+                if abs(a - b) > 1e-6 * max(a, b) or a <= 0.0:
+                    raise _wrong(k, f"begins {a} mm and ends {b} mm from its centre", "one radius")
+            at = (p.rho, p.z)
+        if not self.radius > 0.0:
+            raise SetupError("the outline of a tool has no width", code="bad_cutter", subjects=("outline",),
+                             measured=self.radius, limit=0.0, remedy="give it a piece with rho > 0")
+
+    @property
+    def radius(self) -> float:
+        """Largest radius, mm."""
+        return max((p.rho for p in self._cut), default=0.0)
+
+    @cached_property
+    def _cut(self) -> list[Line | Arc]:
+        """Pieces with hollow arcs as chords outside of them, arcs cut where they are widest."""
+        out: list[Line | Arc] = []
+        at = (0.0, 0.0)
+        for p in self.pieces:
+            if isinstance(p, Arc):
+                c, a = p.centre, math.dist(at, p.centre)
+                if p.hollow:
+                    out += _chords(at, p)
+                elif p.z > c[1] + LEAST:  # goes on above its widest place: what is there is not met
+                    out.append(Arc(c[0] + a, c[1], c))
+                else:
+                    out.append(p)
+            else:
+                out.append(p)
+            at = (p.rho, p.z)
+        return out
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The convex bodies as arrays for the kernels."""
+        bodies: list[tuple[float, list[F64]]] = []
+        rho, z, steepest = 0.0, 0.0, 0.0
+        widest = 0.0
+        rows: list[F64] = []
+        offset = 0.0
+        for p in self._cut:
+            if p.rho > widest + LEAST:
+                begin = (rho, z) if rho >= widest - LEAST else _where(rho, z, p, widest)
+                row = _row(begin, p)
+                if row[4] < steepest - 1e-9 or begin[1] > z + LEAST and not rows:
+                    bodies.append((offset, rows))
+                    offset, rows = begin[1], []
+                if not rows:
+                    offset = begin[1]
+                    if begin[0] > 0.0:
+                        rows.append(np.array([0.0, begin[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+                row[[2, 3]] -= offset
+                row[7] -= offset if row[8] > 0.0 else 0.0
+                rows.append(row)
+                widest, steepest = p.rho, float(row[5])
+            elif p.z > z + LEAST and rho >= widest - LEAST:
+                steepest = 1.0  # an upright stretch: whatever widens above it is another body
+            rho, z = p.rho, p.z
+        bodies.append((offset, rows))
+        bodies = [b for b in bodies if b[1]]
+        tables = [np.array(r) for _, r in bodies]
+        first = np.concatenate([[0], np.cumsum([len(t) for t in tables])]).astype(np.int64)
+        return Stack(np.concatenate(tables), first, np.stack([_bowls(t) for t in tables]),
+                     np.array([o for o, _ in bodies]))
+
+
+def _wrong(k: int, what: str, limit: str) -> SetupError:
+    return SetupError(f"piece {k + 1} of the outline {what}", code="bad_cutter", subjects=(f"piece {k + 1}",),
+                      limit=limit, remedy="give the half section from the tip upwards in mm")
+
+
+def _row(begin: tuple[float, float], p: Line | Arc) -> F64:
+    """One piece from ``begin`` on as a row for the kernels, z as it stands."""
+    if isinstance(p, Arc):
+        (c, level), a = p.centre, math.dist(begin, p.centre)
+        sines = [min(max((rho - c) / a, 0.0), 1.0) for rho in (begin[0], p.rho)]
+        return np.array([begin[0], p.rho, begin[1], p.z, *sines, c, level, a])
+    rise, run = p.z - begin[1], p.rho - begin[0]
+    sine = rise / math.hypot(rise, run)
+    return np.array([begin[0], p.rho, begin[1], p.z, sine, sine, 0.0, 0.0, 0.0])
+
+
+def _where(rho: float, z: float, p: Line | Arc, widest: float) -> tuple[float, float]:
+    """Where a piece from (rho, z) passes a radius."""
+    if isinstance(p, Arc):
+        (c, level), a = p.centre, math.dist((rho, z), p.centre)
+        return widest, level - math.sqrt(max(a * a - (widest - c) ** 2, 0.0))
+    return widest, z + (p.z - z) * (widest - rho) / (p.rho - rho)
+
+
+def _chords(at: tuple[float, float], p: Arc) -> list[Line | Arc]:
+    """A hollow arc as chords, which lie in the tool's air: the tool becomes larger by at most CHORD."""
+    (c, level), a = p.centre, math.dist(at, p.centre)
+    begin, end = (math.atan2(z - level, rho - c) for rho, z in (at, (p.rho, p.z)))
+    turn = math.remainder(end - begin, 2 * math.pi)
+    n = max(1, math.ceil(abs(turn) / (2 * math.acos(max(1.0 - CHORD / a, 0.0)))))
+    angles = begin + turn * np.arange(1, n) / n
+    inner = [Line(c + a * math.cos(t), level + a * math.sin(t)) for t in angles.tolist()]
+    return [*inner, Line(p.rho, p.z)]
+
+
+def _bowls(table: F64) -> F64:
+    """(BOWLS + 1, 4) paraboloids below an outline, as ``geometry.kernels.outline`` reads them.
+
+    Each leans at its radius as the outline does, up to STEEPEST. h is convex, so between two places of a fine division
+    it lies above the chord before them, produced; less k/2 rho^2 that is lowest at one of the two places, and the least
+    of all bounds c from below.
+    """
+    radius = float(table[-1, 1])
+    rho = np.union1d(np.linspace(0.0, radius, SAMPLES + 1), table[:, 1])
+    h, step = heights(table, rho), np.diff(rho)
+    chord = np.diff(h) / step
+    ahead = np.concatenate([[0.0], h[1:-1] + chord[:-1] * step[1:]])  # at each next place, on the chord before
+    at = np.linspace(0.0, radius, BOWLS + 1)
+    at[0] = 0.25 * at[1]
+    k = np.clip(np.searchsorted(rho, at) - 1, 0, len(step) - 1)
+    bend = np.maximum(np.minimum(chord[k], STEEPEST) / at, 1e-6 / radius)
+    half = 0.5 * bend[:, None]
+    low = np.minimum((h - half * rho**2).min(axis=1), (ahead - half * rho[1:] ** 2).min(axis=1))
+    rim = np.full(BOWLS + 1, np.inf)
+    if table[-1, 5] < 1.0:  # from the steepest chord to the rim on, taken over rho^2; the places leave out a little
+        rim[0] = (2.0 * (h[-1] - h[:-1]) / (radius**2 - rho[:-1] ** 2)).max() * (1.0 + 1e-6)
+        rim[1] = 1e-6 * radius
+    return np.column_stack([bend, low, np.full(BOWLS + 1, BOWLS / radius), rim])
+
+
+def heights(table: F64, rho: F64) -> F64:
+    """h at radii rho (any shape) float64, mm, within those of one body; table (k, 9), its rows for the kernels."""
+    k = np.minimum(np.searchsorted(table[:, 1], rho), len(table) - 1)
+    s = table[k]
+    t = np.clip(rho, s[..., 0], s[..., 1])
+    arc = s[..., 8] > 0.0
+    bow = s[..., 7] - np.sqrt(np.maximum(s[..., 8] ** 2 - (t - s[..., 6]) ** 2, 0.0))
+    return np.where(arc, bow, s[..., 2] + (t - s[..., 0]) * (s[..., 3] - s[..., 2]) / (s[..., 1] - s[..., 0]))
