@@ -65,7 +65,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
         raise GeometryError(f"out must be ({len(points)},) float64, got {result.shape} {result.dtype}",
                             code="bad_array", subjects=("out",))
     r, c = float(radius), float(corner_radius)
-    if _one_thread():
+    if one_thread():
         kernels.drop_range(tree.arrays, points, r, c, 0, len(points), result)
     else:
         kernels.drop_many_parallel(tree.arrays, points, r, c, result)
@@ -100,7 +100,7 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
     _check_radii(radius, corner_radius)
     out = np.empty(len(points), np.bool_)
     r, c = float(radius), float(corner_radius)
-    if _one_thread():
+    if one_thread():
         kernels.blocked_range(tree.arrays, points, r, c, 0, len(points), out)
     else:
         kernels.blocked_many_parallel(tree.arrays, points, r, c, out)
@@ -126,14 +126,15 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
                             f"{nx}, {ny}", code="bad_grid", subjects=("grid",))
     out = np.empty((int(ny), int(nx)))
     args: tuple[Any, ...] = (tree.arrays, float(x0), float(y0), float(step), float(radius), float(corner_radius))
-    if _one_thread():
+    if one_thread():
         kernels.grid_rows(*args, 0, len(out), out)  # type: ignore[call-arg]
     else:
         kernels.grid_parallel(*args, out)  # type: ignore[call-arg]
     return out
 
 
-def _one_thread() -> bool:
+def one_thread() -> bool:
+    """Whether numba has one thread, so that its threading layer is left alone."""
     return bool(numba.get_num_threads() == 1)
 
 

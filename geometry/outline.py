@@ -21,7 +21,6 @@ from geometry.mesh import F64
 BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
 STEEPEST = 5.0  # slope of a paraboloid at its radius: at the rim the outline may be upright
 SAMPLES = 4096  # places at which they are held below it
-FLAT = 1e-12  # of the radius: shorter pieces are none
 LEAST = 1e-9  # mm a radius has to grow by to be wider
 CHORD = 1e-3  # mm by which chords of a hollow arc may stand out of it
 
@@ -113,9 +112,9 @@ class Outline:
             if p.rho > widest + LEAST:
                 begin = (rho, z) if rho >= widest - LEAST else _where(rho, z, p, widest)
                 row = _row(begin, p)
-                if row[4] < steepest - 1e-9 or begin[1] > z + LEAST and not rows:
+                if rows and row[4] < steepest - 1e-9:
                     bodies.append((offset, rows))
-                    offset, rows = begin[1], []
+                    rows = []
                 if not rows:
                     offset = begin[1]
                     if begin[0] > 0.0:
@@ -128,7 +127,6 @@ class Outline:
                 steepest = 1.0  # an upright stretch: whatever widens above it is another body
             rho, z = p.rho, p.z
         bodies.append((offset, rows))
-        bodies = [b for b in bodies if b[1]]
         tables = [np.array(r) for _, r in bodies]
         first = np.concatenate([[0], np.cumsum([len(t) for t in tables])]).astype(np.int64)
         return Stack(np.concatenate(tables), first, np.stack([_bowls(t) for t in tables]),

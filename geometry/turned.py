@@ -6,13 +6,12 @@ The body is an ``Outline``, lines and arcs from the tip upwards. For balls, flat
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import finite_points
 from geometry.bvh import TriangleTree
-from geometry.drop import DropContacts
+from geometry.drop import DropContacts, one_thread
 from geometry.kernels import outline as kernels
 from geometry.mesh import F64
 from geometry.outline import Outline
@@ -37,7 +36,7 @@ def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
     """
     points = finite_points(xy, 2, "xy")
     out = np.empty(len(points))
-    if numba.get_num_threads() == 1:
+    if one_thread():
         kernels.drop_range(tree.arrays, points, outline.stack, 0, len(points), out)
     else:
         kernels.drop_many_parallel(tree.arrays, points, outline.stack, out)

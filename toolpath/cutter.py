@@ -112,7 +112,7 @@ class Cutter:
         for s in tool.holder:
             pieces += [Line(0.5 * s.diameter, z), Line(0.5 * s.diameter_top, z + s.length)]
             z += s.length
-        return cls(2.0 * Outline(tuple(pieces)).radius, 0.0, tool.flute_length, Outline(tuple(pieces)))
+        return cls.turned(Outline(tuple(pieces)), length=tool.flute_length)
 
     @classmethod
     def of(cls, tool: ToolBody) -> Cutter:

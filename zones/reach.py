@@ -37,8 +37,8 @@ LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
 FRUSTUM_SLICES = 6
 FEW = 4000  # queries below this are not worth waking a second thread for
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
+BELOW = 1.0  # mm: a tip is never asked about farther under the obstacles than this and its own radius
 AIMED = 12  # free nodes a flat bottom is tried towards over a level place
-BELOW = 1.0  # mm under that: how low a tip is ever asked about
 BEYOND = 3.0  # lattice steps outside the flat: how far these may be
 INSIDE = 1.5e-3  # mm: a flat bottom is not asked to reach nearer than this to its own rim: lines are off by so much
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
@@ -164,9 +164,9 @@ class TipField:
         return grid
 
     def _can_meet(self, disc: Disc) -> bool:
-        """Whether a disc gets as low as anything stands while the tip is at the bottom of the obstacles or above it.
+        """Whether a disc can get as low as anything stands, with the tip where it is ever asked about.
 
-        A ball that touches the lowest edge from the side has its tip a radius lower.
+        A ball that touches the lowest edge from the side has its tip a radius under the obstacles.
         """
         if not len(self.tree):
             return False

@@ -188,6 +188,8 @@ class TrapezoidMap:
         known = np.arange(len(out)) == 0
         while not known.all():
             up, down = known[right] & ~known[left], known[left] & ~known[right]
+            if not (up.any() or down.any()):
+                raise InternalError("a face of the trapezoidal map has no way to the outer one", code="broken_map")
             out[left[up]] = out[right[up]] + passed[up]
             out[right[down]] = out[left[down]] - passed[down]
             known[left[up]] = known[right[down]] = True

@@ -57,7 +57,7 @@ def plan_view(plan: ChannelPlan, path: Path) -> None:
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 {(high[1] - low[1]) * scale:.0f}" '
            'font-family="sans-serif" font-size="15">']
     for k, name in enumerate(names):
-        shape = shapely.union_all([map_.outline(faces, int(f)) for f in np.flatnonzero(area[:, k])])
+        shape = plan.plan.shape(name)
         hue = 0.55 + 0.13 * k
         fill = {"W": "#8a8f98", "C": "#e8730c"}.get(name[0]) or "#" + "".join(
             f"{int(255 * c):02x}" for c in colorsys.hsv_to_rgb(hue % 1, 0.22, 0.95))
@@ -66,8 +66,8 @@ def plan_view(plan: ChannelPlan, path: Path) -> None:
                        f'fill-opacity="{0.45 if name[0] == "C" else 1}" stroke="#333" stroke-width="0.8"/>')
     walls = " ".join(f"M{at(corners[t, [0]])}V{(high[1] - corners[t, 3, 1]) * scale:.1f}" for t in drawn)
     out.append(f'<path d="{walls}" fill="none" stroke="#000" stroke-opacity="0.18" stroke-width="0.4"/>')
-    for k, name in enumerate(names):
-        shape = shapely.union_all([map_.outline(faces, int(f)) for f in np.flatnonzero(area[:, k])])
+    for name in names:
+        shape = plan.plan.shape(name)
         p = shape.representative_point()
         out.append(f'<text x="{(p.x - low[0]) * scale:.0f}" y="{(high[1] - p.y) * scale + 5:.0f}" '
                    f'text-anchor="middle">{name}</text>')

@@ -259,7 +259,7 @@ def _bound(node, x, y, rows, bowls, best):
     if top <= best:
         return NOTHING
     a, b, sine, slant = node[5], node[6], node[8], node[9]
-    rho, h = touch(rows, sine, 1.0 / slant)
+    rho, _ = touch(rows, sine, 1.0 / slant)
     rho = max(rho, math.sqrt(near2))
     if rho <= 0.0:
         return top

@@ -134,3 +134,18 @@ def test_many_queries_answer_like_few():
     tips = rng.random((5000, 3)) * [22, 14, 10]
     np.testing.assert_array_equal(field.tips(tips[:, :2])[:100], field.tips(tips[:100, :2]))
     np.testing.assert_array_equal(field.blocked_by_cutter(tips)[:100], field.blocked_by_cutter(tips[:100]))
+
+
+@pytest.mark.parametrize("stickout", [12.0, 14.0, 16.0, 30.0])
+def test_discs_without_a_grid_block_nothing_a_grid_would(monkeypatch, stickout):
+    body = ball(3.0, neck=9.0, shank=5.0, stickout=stickout, holder=(HolderSegment(8, 14, 5), HolderSegment(20, 20, 9)))
+    mesh = walls()
+    some = field_of(mesh, body, allowance=0.1)
+    monkeypatch.setattr(type(some), "_can_meet", lambda _self, _disc: True)
+    every = field_of(mesh, body, allowance=0.1)
+    lower, upper = mesh.bounds
+    tips = lower - [4, 4, 2.6] + np.random.default_rng(7).random((20_000, 3)) * (upper - lower + [8, 8, 2.6])
+    blocked = every.blocked_by_body(tips)
+    assert 0.02 < blocked.mean() < 0.98
+    np.testing.assert_array_equal(some.blocked_by_body(tips), blocked)
+    assert (some.noncut < every.noncut).any()  # and there was something to leave out
