@@ -6,29 +6,48 @@ Notation
     rho      distance of a point from the axis in plan
     h(rho)   profile: 0 up to d, then r - sqrt(r^2 - (rho - d)^2) up to R; a wall without end above it
     tip      max over the points p of the mesh with rho < R of f(p) = z(p) - h(rho(p))
-f is concave on each triangle, since z is linear and h convex. So where the plane's own contact lies inside
-the triangle it is the answer; otherwise the maximum lies on an edge that faces the contact. A point at
-exactly rho = R touches the side of the cutter and lifts nothing. At R = 0 the tip is the height of the mesh.
+f is concave on each triangle, since z is linear and h convex. A point at exactly rho = R touches the side of the cutter
+and lifts nothing. At R = 0 the tip is the height of the mesh. The loops are those of ``geometry.kernels.revolved``.
 
-Traversal: a node cannot lift the tip above its bound, the maximum over the node's box of the node's covering
-plane (or top z) less a paraboloid that lies below h. The child with the higher bound goes first; what is left
-behind is one bit a level in a 64-bit trail, so that no stack is needed.
+Bound: a node cannot lift the tip above the maximum over its box of its covering plane (or top z) less a paraboloid that
+lies below h.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
 
-from geometry.kernels.bvh import CAREFUL, EDGES_ONLY, SOUND, TreeArrays
+from geometry.kernels import revolved
+from geometry.kernels.bvh import TreeArrays
 from geometry.kernels.options import KERNEL
+from geometry.kernels.revolved import NOTHING, arc_angle, for_shape, triangle_tip, walk
 
 BLOCK_TOLERANCE = 1e-9  # mm: a lift below this does not block
-ROOT_STEPS = 60
 RIM = 0.98  # tangents of h are taken no farther out than this part of the corner radius
-NOTHING = -np.inf
+
+
+class Bull(NamedTuple):
+    """A shape: ball (flat = 0), flat end (corner = 0) or bull nose; radius = corner + flat, mm."""
+
+    radius: float
+    corner: float
+    flat: float
+
+
+@njit(**KERNEL, inline="always")
+def bull_of(radius, corner_radius):
+    """Bull of a radius and a corner radius, mm; within a millionth of a nanometre of a ball or a flat end it is one."""
+    r = min(corner_radius, radius)
+    d = radius - r
+    if d <= 1e-12 * radius:  # so nothing underflows
+        r, d = radius, 0.0
+    elif r <= 1e-12 * radius:
+        r, d = 0.0, radius
+    return Bull(radius, r, d)
 
 
 @njit(**KERNEL, inline="always")
@@ -47,8 +66,7 @@ def _bull_edge(lo, hi, q, m, R, r, d):
     """Place u in [lo, hi] where m u - h(sqrt(q^2 + u^2)) is largest, with the profile's height there.
 
     m >= 0 is the slope of the edge, q its distance from the axis. The condition h' u / rho = m is solved in
-    theta, the angle of the profile's normal (rho = d + r sin theta, h' = tan theta): its left side grows with
-    theta from 0 to infinity, so the root is single and bracketed. Newton, halved when it leaves the bracket.
+    theta, the angle of the profile's normal (rho = d + r sin theta, h' = tan theta).
     """
     start = max(lo, 0.0)
     if hi <= start:
@@ -67,30 +85,7 @@ def _bull_edge(lo, hi, q, m, R, r, d):
     high = math.asin(min((rho - d) / r, 1.0))
     if math.sin(high) * hi <= m * math.cos(high) * rho:
         return hi, _profile(rho, r, d)
-    # The slope alone (a facet leaning like the edge) is a good start.
-    theta = min(max(math.atan(m), low), high)
-    if theta <= low or theta >= high:
-        theta = 0.5 * (low + high)
-    u = start
-    for _ in range(ROOT_STEPS):
-        s, c = math.sin(theta), math.cos(theta)
-        rho = d + r * s
-        u = math.sqrt(max((rho - q) * (rho + q), 0.0))
-        g = s * u - m * c * rho
-        if g > 0.0:
-            high = theta
-        else:
-            low = theta
-        step = 0.5 * (low + high) - theta
-        if u > 0.0:
-            slope = c * u + s * rho * r * c / u + m * (s * rho - r * c * c)
-            if slope > 0.0:
-                newton = -g / slope
-                if low < theta + newton < high:
-                    step = newton
-        theta += step
-        if abs(step) < 1e-11:
-            break
+    theta = arc_angle(low, high, q, m, d, r)
     s = math.sin(theta)
     rho = d + r * s
     u = min(max(math.sqrt(max((rho - q) * (rho + q), 0.0)), start), hi)
@@ -99,9 +94,42 @@ def _bull_edge(lo, hi, q, m, R, r, d):
     return u, r - r * math.cos(theta)
 
 
-@njit(**KERNEL)
-def _edge_bound(z0, ez, length, u0, lo, hi, q, r, d):
-    """No point of the edge lifts a bull nose above this: ``_bound`` for a line, and no root to find."""
+@for_shape(revolved.radius_of, Bull)
+def _radius(shape):
+    return shape.radius
+
+
+@for_shape(revolved.height_at, Bull)
+def _height(shape, rho):
+    return _profile(rho, shape.corner, shape.flat)
+
+
+@for_shape(revolved.touches_widely, Bull)
+def _widely(shape):
+    return False
+
+
+@for_shape(revolved.facet_contact, Bull)
+def _facet_contact(shape, nx, ny, nz):
+    r, d = shape.corner, shape.flat
+    cx, cy = -r * nx, -r * ny
+    if d > 0.0:
+        lean = math.sqrt(nx * nx + ny * ny)
+        if lean > 1e-14:
+            cx -= d * (nx / lean)
+            cy -= d * (ny / lean)
+    return cx, cy, r * (1.0 - nz)
+
+
+for_shape(revolved.lift_of, Bull)(triangle_tip)
+
+
+@for_shape(revolved.edge_bound, Bull)
+def _edge_bound(shape, z0, ez, length, u0, lo, hi, q):
+    """``_bound`` for a line, and no root to find; balls and flat ends have none anyway."""
+    r, d = shape.corner, shape.flat
+    if r <= 0.0 or d <= 0.0:
+        return np.inf
     m = ez / length
     near = lo if lo > 0.0 else (hi if hi < 0.0 else 0.0)
     near2 = q * q + near * near
@@ -119,115 +147,33 @@ def _edge_bound(z0, ez, length, u0, lo, hi, q, r, d):
     return z0 + (u - u0) * m - (r - root) - 0.5 * k * (q * q + u * u - rho0 * rho0)
 
 
-@njit(**KERNEL)
-def _edge(a, b, x, y, R, r, d, best):
-    """Tip that the edge a-b allows and the place of the contact on it (0 at a, 1 at b); -inf: no lift."""
-    if max(a[2], b[2]) <= best:
-        return NOTHING, 0.0
-    ax, ay = a[0] - x, a[1] - y
-    ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    l2 = ex * ex + ey * ey
-    if l2 < 1e-24:
-        t = 1.0 if ez > 0.0 else 0.0
-        rho2 = (ax + t * ex) ** 2 + (ay + t * ey) ** 2
-        if rho2 >= R * R:
-            return NOTHING, 0.0
-        return a[2] + t * ez - _profile(math.sqrt(rho2), r, d), t
-    length = math.sqrt(l2)
-    q = abs(ax * ey - ay * ex) / length
-    if q >= R:
-        return NOTHING, 0.0
-    half = math.sqrt((R - q) * (R + q))
-    u0 = (ax * ex + ay * ey) / length
-    u1 = u0 + length
-    lo, hi = max(u0, -half), min(u1, half)
-    if lo >= hi:
-        return NOTHING, 0.0
+@for_shape(revolved.edge_place, Bull)
+def _edge_place(shape, lo, hi, q, half, length, l2, ez):
+    r, d = shape.corner, shape.flat
     if r <= 0.0:
-        u = hi if ez > 0.0 else lo
-        height = 0.0
-    elif d <= 0.0:
+        return (hi if ez > 0.0 else lo), 0.0
+    if d <= 0.0:
         slant = math.sqrt(l2 + ez * ez)
         u = half * (ez / slant)
         if u < lo:
-            u = lo
-            height = R - math.sqrt(max((half - u) * (half + u), 0.0))
-        elif u > hi:
-            u = hi
-            height = R - math.sqrt(max((half - u) * (half + u), 0.0))
-        else:
-            height = R - half * (length / slant)
-    elif _edge_bound(a[2], ez, length, u0, lo, hi, q, r, d) <= best:
-        return NOTHING, 0.0
-    elif ez >= 0.0:
-        u, height = _bull_edge(lo, hi, q, ez / length, R, r, d)
-    else:
-        u, height = _bull_edge(-hi, -lo, q, -ez / length, R, r, d)
-        u = -u
-    t = min(max((u - u0) / length, 0.0), 1.0)
-    return a[2] + t * ez - height, t
+            return lo, r - math.sqrt(max((half - lo) * (half + lo), 0.0))
+        if u > hi:
+            return hi, r - math.sqrt(max((half - hi) * (half + hi), 0.0))
+        return u, r - half * (length / slant)
+    if ez >= 0.0:
+        return _bull_edge(lo, hi, q, ez / length, shape.radius, r, d)
+    u, h = _bull_edge(-hi, -lo, q, -ez / length, shape.radius, r, d)
+    return -u, h
 
 
-@njit(**KERNEL)
-def _triangle(v, facet, x, y, R, r, d, best):
-    """Tip that one triangle allows, and its contact point; at most ``best`` means no lift."""
-    p, q, s = v[0], v[1], v[2]
-    nx, ny, nz, quality = facet[0], facet[1], facet[2], facet[4]
-    w0 = w1 = w2 = -1.0
-    if quality != EDGES_ONLY:
-        cx, cy = -r * nx, -r * ny
-        if d > 0.0:
-            lean = math.sqrt(nx * nx + ny * ny)
-            if lean > 1e-14:
-                cx -= d * (nx / lean)
-                cy -= d * (ny / lean)
-        height = r * (1.0 - nz)
-        cx += x
-        cy += y
-        px, py, qx, qy, sx, sy = p[0] - cx, p[1] - cy, q[0] - cx, q[1] - cy, s[0] - cx, s[1] - cy
-        if quality == SOUND and p[2] + (nx * px + ny * py) / nz - height <= best:
-            return NOTHING, 0.0, 0.0, 0.0
-        side = facet[3]
-        w0, w1, w2 = side * (qx * sy - sx * qy), side * (sx * py - px * sy), side * (px * qy - qx * py)
-        if w0 >= 0.0 and w1 >= 0.0 and w2 >= 0.0:
-            total = w0 + w1 + w2
-            if total > 0.0:
-                w0, w1, w2 = w0 / total, w1 / total, w2 / total
-                cz = w0 * p[2] + w1 * q[2] + w2 * s[2]
-                if quality == CAREFUL:
-                    # The normal is rough: take the profile at the point itself, which is never too high.
-                    cx = w0 * p[0] + w1 * q[0] + w2 * s[0]
-                    cy = w0 * p[1] + w1 * q[1] + w2 * s[1]
-                    rho = math.sqrt((cx - x) ** 2 + (cy - y) ** 2)
-                    if rho < R:
-                        height = min(height, _profile(rho, r, d))
-                return cz - height, cx, cy, cz
-        if quality == CAREFUL:
-            w0 = w1 = w2 = -1.0
-    tip, t, edge = NOTHING, 0.0, 0
-    if w0 <= 0.0:
-        tip, t = _edge(q, s, x, y, R, r, d, best)
-    if w1 <= 0.0:
-        other, place = _edge(s, p, x, y, R, r, d, max(best, tip))
-        if other > tip:
-            tip, t, edge = other, place, 1
-    if w2 <= 0.0:
-        other, place = _edge(p, q, x, y, R, r, d, max(best, tip))
-        if other > tip:
-            tip, t, edge = other, place, 2
-    a, b = (q, s) if edge == 0 else ((s, p) if edge == 1 else (p, q))
-    return tip, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-
-
-@njit(**KERNEL)
-def _bound(node, x, y, R, r, d, best):
-    """No point of the node lifts the tip above this; -inf where that is clear to be no higher than best.
-
-    As a function of w = rho^2, h is convex, so h(rho) >= h(rho0) + k/2 (w - rho0^2) with k = h'(rho0) / rho0:
+@for_shape(revolved.node_bound, Bull)
+def _bound(shape, node, x, y, best):
+    """As a function of w = rho^2, h is convex, so h(rho) >= h(rho0) + k/2 (w - rho0^2) with k = h'(rho0) / rho0:
     a paraboloid below the cutter, whatever its kind. Less that, the covering plane has its maximum over the
     box where each coordinate has its own. rho0 is where the plane itself would touch (k = tan / rho0, for a
     flat end the multiplier of rho <= R), or the nearest point of the box if that is farther out.
     """
+    R, r, d = shape.radius, shape.corner, shape.flat
     if node[4] <= best:
         return NOTHING
     x_lo, x_hi, y_lo, y_hi = node[0] - x, node[1] - x, node[2] - y, node[3] - y
@@ -263,78 +209,27 @@ def _bound(node, x, y, R, r, d, best):
 
 
 @njit(**KERNEL)
-def descend(tree: TreeArrays, x, y, radius, corner_radius, start, first_only):
-    """Highest lift above ``start``: tip, place in leaf order (-1: nothing lifts) and contact point.
-
-    first_only stops at the first triangle that lifts at all.
-    """
-    r = min(corner_radius, radius)
-    d = radius - r
-    # Within a millionth of a nanometre for any cutter, and nothing underflows.
-    if d <= 1e-12 * radius:
-        r, d = radius, 0.0
-    elif r <= 1e-12 * radius:
-        r, d = 0.0, radius
-    best, slot, cx, cy, cz = start, -1, np.nan, np.nan, np.nan
-    column, child, parent = tree.column, tree.child, tree.parent
-    node = 0
-    trail = np.uint64(0)
-    one = np.uint64(1)
-    if _bound(column[0], x, y, radius, r, d, best) <= best:
-        return best, slot, cx, cy, cz
-    while True:
-        inner = child[node]
-        if inner >= 0:
-            left = _bound(column[inner], x, y, radius, r, d, best)
-            right = _bound(column[inner + 1], x, y, radius, r, d, best)
-            if left > best or right > best:
-                trail <<= one
-                if left > best and right > best:
-                    trail |= one
-                node = inner if left >= right else inner + 1
-                continue
-        else:
-            for i in range(tree.first[node], tree.first[node] + tree.size[node]):
-                tip, px, py, pz = _triangle(tree.corners[i], tree.facets[i], x, y, radius, r, d, best)
-                if tip > best:
-                    best, slot, cx, cy, cz = tip, i, px, py, pz
-                    if first_only:
-                        return best, slot, cx, cy, cz
-        # Back to the nearest sibling that was left behind and may still lift.
-        while True:
-            if trail == 0:
-                return best, slot, cx, cy, cz
-            while trail & one == 0:
-                trail >>= one
-                node = parent[node]
-            trail ^= one
-            node = ((node - 1) ^ 1) + 1
-            if _bound(column[node], x, y, radius, r, d, best) > best:
-                break
-
-
-@njit(**KERNEL)
 def drop_tip(tree: TreeArrays, x, y, radius, corner_radius):
     """Lowest tip height over (x, y) that leaves the mesh untouched, mm; -inf where nothing is below."""
-    return descend(tree, x, y, radius, corner_radius, NOTHING, False)[0]
+    return walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)[0]
 
 
 @njit(**KERNEL)
 def drop_tip_below(tree: TreeArrays, x, y, radius, corner_radius, z_start):
     """The larger of z_start and ``drop_tip``: cheap where z_start is close to the answer."""
-    return descend(tree, x, y, radius, corner_radius, z_start, False)[0]
+    return walk(tree, bull_of(radius, corner_radius), x, y, z_start, False)[0]
 
 
 @njit(**KERNEL)
 def is_blocked(tree: TreeArrays, x, y, z, radius, corner_radius):
     """Whether some triangle would lift the tip from z by more than 1e-9 mm."""
-    return descend(tree, x, y, radius, corner_radius, z + BLOCK_TOLERANCE, True)[1] >= 0
+    return walk(tree, bull_of(radius, corner_radius), x, y, z + BLOCK_TOLERANCE, True)[1] >= 0
 
 
 @njit(**KERNEL)
 def drop_tip_contact(tree: TreeArrays, x, y, radius, corner_radius):
     """``drop_tip`` with the triangle of the mesh (-1: none) and the contact point (NaN: none)."""
-    tip, slot, cx, cy, cz = descend(tree, x, y, radius, corner_radius, NOTHING, False)
+    tip, slot, cx, cy, cz = walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)
     return tip, (tree.order[slot] if slot >= 0 else -1), cx, cy, cz
 
 

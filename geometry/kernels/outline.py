@@ -6,8 +6,8 @@ Notation
     h(rho)   lower outline of the body, 0 <= rho <= R: convex, not falling, of lines and arcs; a wall without end at R
     phi      angle of the outline, h' = tan phi; grows with rho, by a jump where two pieces meet in a corner
     tip      max over the points p of the mesh with rho < R of f(p) = z(p) - h(rho(p))
-f is concave on each triangle, as in ``geometry.kernels.drop``: a triangle is touched where its plane leans as the
-outline does, or on an edge that faces that place.
+f is concave on each triangle: it is touched where its plane leans as the outline does, or on an edge. The loops are
+those of ``geometry.kernels.revolved``.
 
 Rows of an outline, one for each piece: rho0, rho1, h0, h1, sin phi at its beginning and at its end, centre of the arc
 (rho, z) and its radius, 0 for a line. A paraboloid row (k, c): c + k/2 rho^2 <= h(rho) for all rho <= R.
@@ -22,11 +22,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from geometry.kernels.bvh import CAREFUL, EDGES_ONLY, SOUND, TreeArrays
+from geometry.kernels import revolved
 from geometry.kernels.options import KERNEL
+from geometry.kernels.revolved import NOTHING, arc_angle, for_shape, triangle_tip, walk
 
-ROOT_STEPS = 60
-NOTHING = -np.inf
 RHO0, RHO1, H0, H1, SIN0, SIN1, CENTRE, LEVEL, ARC = range(9)
 
 F64 = NDArray[np.float64]
@@ -47,6 +46,13 @@ class Stack(NamedTuple):
     first: NDArray[np.int64]
     bowls: F64
     offset: F64
+
+
+class Turned(NamedTuple):
+    """A shape: one body of a stack, its own part of ``Stack.rows`` and ``Stack.bowls``."""
+
+    rows: F64
+    bowls: F64
 
 
 @njit(**KERNEL)
@@ -95,34 +101,13 @@ def _on_arc(s, q, m):
         half = math.sqrt(max((a - q) * (a + q), 0.0))
         slant = math.sqrt(1.0 + m * m)
         return half * (m / slant), s[LEVEL] - half / slant
-    theta = min(max(math.atan(m), low), high)
-    if theta <= low or theta >= high:
-        theta = 0.5 * (low + high)
-    for _ in range(ROOT_STEPS):
-        sine, cosine = math.sin(theta), math.cos(theta)
-        rho = c + a * sine
-        u = math.sqrt(max((rho - q) * (rho + q), 0.0))
-        g = sine * u - m * cosine * rho
-        if g > 0.0:
-            high = theta
-        else:
-            low = theta
-        step = 0.5 * (low + high) - theta
-        if u > 0.0:
-            slope = cosine * u + sine * rho * a * cosine / u + m * (sine * rho - a * cosine * cosine)
-            if slope > 0.0:
-                newton = -g / slope
-                if low < theta + newton < high:
-                    step = newton
-        theta += step
-        if abs(step) < 1e-11:
-            break
+    theta = arc_angle(low, high, q, m, c, a)
     rho = c + a * math.sin(theta)
     return math.sqrt(max((rho - q) * (rho + q), 0.0)), s[LEVEL] - a * math.cos(theta)
 
 
 @njit(**KERNEL)
-def _edge_place(rows, lo, hi, q, m):
+def _place(rows, lo, hi, q, m):
     """Place u in [lo, hi] where m u - h(sqrt(q^2 + u^2)) is largest, with h there; slope m >= 0, distance q.
 
     tan(phi) u / rho grows with u, so the pieces are passed outwards until it reaches m.
@@ -158,94 +143,54 @@ def _edge_place(rows, lo, hi, q, m):
     return hi, height(rows, math.sqrt(q * q + hi * hi))
 
 
-@njit(**KERNEL)
-def _edge(a, b, x, y, rows, best):
-    """Tip that the edge a-b allows and the place of the contact on it (0 at a, 1 at b); -inf: no lift."""
-    if max(a[2], b[2]) <= best:
-        return NOTHING, 0.0
-    radius = rows[rows.shape[0] - 1, RHO1]
-    ax, ay = a[0] - x, a[1] - y
-    ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    l2 = ex * ex + ey * ey
-    if l2 < 1e-24:
-        t = 1.0 if ez > 0.0 else 0.0
-        rho2 = (ax + t * ex) ** 2 + (ay + t * ey) ** 2
-        if rho2 >= radius * radius:
-            return NOTHING, 0.0
-        return a[2] + t * ez - height(rows, math.sqrt(rho2)), t
-    length = math.sqrt(l2)
-    q = abs(ax * ey - ay * ex) / length
-    if q >= radius:
-        return NOTHING, 0.0
-    half = math.sqrt((radius - q) * (radius + q))
-    u0 = (ax * ex + ay * ey) / length
-    lo, hi = max(u0, -half), min(u0 + length, half)
-    if lo >= hi:
-        return NOTHING, 0.0
+@for_shape(revolved.radius_of, Turned)
+def _radius(shape):
+    return shape.rows[shape.rows.shape[0] - 1, RHO1]
+
+
+@for_shape(revolved.height_at, Turned)
+def _height(shape, rho):
+    return height(shape.rows, rho)
+
+
+@for_shape(revolved.touches_widely, Turned)
+def _widely(shape):
+    # a level facet is touched all over a flat bottom, a cone along a line: the edges have the rest of it
+    return True
+
+
+@for_shape(revolved.facet_contact, Turned)
+def _facet_contact(shape, nx, ny, nz):
+    lean = math.sqrt(nx * nx + ny * ny)
+    rho, h = touch(shape.rows, lean, nz)
+    if lean > 1e-14:
+        return -rho * (nx / lean), -rho * (ny / lean), h
+    return 0.0, 0.0, h
+
+
+@for_shape(revolved.edge_bound, Turned)
+def _edge_bound(shape, z0, ez, length, u0, lo, hi, q):
+    return np.inf
+
+
+@for_shape(revolved.edge_place, Turned)
+def _edge_place(shape, lo, hi, q, half, length, l2, ez):
     if ez >= 0.0:
-        u, h = _edge_place(rows, lo, hi, q, ez / length)
-    else:
-        u, h = _edge_place(rows, -hi, -lo, q, -ez / length)
-        u = -u
-    t = min(max((u - u0) / length, 0.0), 1.0)
-    return a[2] + t * ez - h, t
+        return _place(shape.rows, lo, hi, q, ez / length)
+    u, h = _place(shape.rows, -hi, -lo, q, -ez / length)
+    return -u, h
 
 
-@njit(**KERNEL)
-def _triangle(v, facet, x, y, rows, best):
-    """Tip that one triangle allows, and its contact point; at most ``best`` means no lift."""
-    p, q, s = v[0], v[1], v[2]
-    nx, ny, nz, quality = facet[0], facet[1], facet[2], facet[4]
-    w0 = w1 = w2 = -1.0
-    if quality != EDGES_ONLY:
-        lean = math.sqrt(nx * nx + ny * ny)
-        rho, h = touch(rows, lean, nz)
-        cx, cy = x, y
-        if lean > 1e-14:
-            cx -= rho * (nx / lean)
-            cy -= rho * (ny / lean)
-        px, py, qx, qy, sx, sy = p[0] - cx, p[1] - cy, q[0] - cx, q[1] - cy, s[0] - cx, s[1] - cy
-        if quality == SOUND and p[2] + (nx * px + ny * py) / nz - h <= best:
-            return NOTHING, 0.0, 0.0, 0.0
-        side = facet[3]
-        w0, w1, w2 = side * (qx * sy - sx * qy), side * (sx * py - px * sy), side * (px * qy - qx * py)
-        if w0 >= 0.0 and w1 >= 0.0 and w2 >= 0.0:
-            total = w0 + w1 + w2
-            if total > 0.0:
-                w0, w1, w2 = w0 / total, w1 / total, w2 / total
-                cz = w0 * p[2] + w1 * q[2] + w2 * s[2]
-                if quality == CAREFUL:
-                    # The normal is rough: take the outline at the point itself, which is never too high.
-                    cx = w0 * p[0] + w1 * q[0] + w2 * s[0]
-                    cy = w0 * p[1] + w1 * q[1] + w2 * s[1]
-                    rho = math.sqrt((cx - x) ** 2 + (cy - y) ** 2)
-                    if rho < rows[rows.shape[0] - 1, RHO1]:
-                        h = min(h, height(rows, rho))
-                return cz - h, cx, cy, cz
-        # a level facet is touched all over a flat bottom, a cone along a line: the edges have the rest of it
-        w0 = w1 = w2 = -1.0
-    tip, t, edge = NOTHING, 0.0, 0
-    if w0 <= 0.0:
-        tip, t = _edge(q, s, x, y, rows, best)
-    if w1 <= 0.0:
-        other, place = _edge(s, p, x, y, rows, max(best, tip))
-        if other > tip:
-            tip, t, edge = other, place, 1
-    if w2 <= 0.0:
-        other, place = _edge(p, q, x, y, rows, max(best, tip))
-        if other > tip:
-            tip, t, edge = other, place, 2
-    a, b = (q, s) if edge == 0 else ((s, p) if edge == 1 else (p, q))
-    return tip, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+for_shape(revolved.lift_of, Turned)(triangle_tip)
 
 
-@njit(**KERNEL)
-def _bound(node, x, y, rows, bowls, best):
-    """No point of the node lifts the tip above this; -inf where that is clear to be no higher than best.
+@for_shape(revolved.node_bound, Turned)
+def _bound(shape, node, x, y, best):
+    """h lies above each paraboloid of ``bowls``, so the covering plane less the paraboloid is a bound.
 
-    h lies above each paraboloid of ``bowls``, so the node's top less the paraboloid at the nearest point of its box is
-    a bound, and so is its covering plane less the paraboloid, largest where each coordinate has its own maximum.
+    It is largest where each coordinate has its own maximum. The top less h at the nearest point of the box is another.
     """
+    rows, bowls = shape.rows, shape.bowls
     if node[4] <= best:
         return NOTHING
     radius = rows[rows.shape[0] - 1, RHO1]
@@ -277,57 +222,14 @@ def _bound(node, x, y, rows, bowls, best):
 
 
 @njit(**KERNEL)
-def descend(tree: TreeArrays, x, y, rows, bowls, start, first_only):
-    """Highest lift above ``start``: tip, place in leaf order (-1: nothing lifts) and contact point.
-
-    first_only stops at the first triangle that lifts at all. The way through the tree is that of the drop kernel.
-    """
-    best, slot, cx, cy, cz = start, -1, np.nan, np.nan, np.nan
-    column, child, parent = tree.column, tree.child, tree.parent
-    node = 0
-    trail = np.uint64(0)
-    one = np.uint64(1)
-    if _bound(column[0], x, y, rows, bowls, best) <= best:
-        return best, slot, cx, cy, cz
-    while True:
-        inner = child[node]
-        if inner >= 0:
-            left = _bound(column[inner], x, y, rows, bowls, best)
-            right = _bound(column[inner + 1], x, y, rows, bowls, best)
-            if left > best or right > best:
-                trail <<= one
-                if left > best and right > best:
-                    trail |= one
-                node = inner if left >= right else inner + 1
-                continue
-        else:
-            for i in range(tree.first[node], tree.first[node] + tree.size[node]):
-                tip, px, py, pz = _triangle(tree.corners[i], tree.facets[i], x, y, rows, best)
-                if tip > best:
-                    best, slot, cx, cy, cz = tip, i, px, py, pz
-                    if first_only:
-                        return best, slot, cx, cy, cz
-        while True:
-            if trail == 0:
-                return best, slot, cx, cy, cz
-            while trail & one == 0:
-                trail >>= one
-                node = parent[node]
-            trail ^= one
-            node = ((node - 1) ^ 1) + 1
-            if _bound(column[node], x, y, rows, bowls, best) > best:
-                break
-
-
-@njit(**KERNEL)
 def _lowest(tree, x, y, stack):
     """Tip of a stack of bodies, the place in leaf order that holds it up and the contact point."""
     best, slot = NOTHING, -1
     px = py = pz = np.nan
     for b in range(stack.offset.shape[0]):
-        rows = stack.rows[stack.first[b] : stack.first[b + 1]]
+        shape = Turned(stack.rows[stack.first[b] : stack.first[b + 1]], stack.bowls[b])
         up = stack.offset[b]
-        tip, s, cx, cy, cz = descend(tree, x, y, rows, stack.bowls[b], best + up, False)
+        tip, s, cx, cy, cz = walk(tree, shape, x, y, best + up, False)
         if s >= 0:
             best, slot, px, py, pz = tip - up, s, cx, cy, cz
     return best, slot, px, py, pz

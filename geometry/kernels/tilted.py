@@ -20,8 +20,9 @@ import numpy as np
 from numba import njit, prange
 
 from geometry.kernels.bvh import STACK, TreeArrays, facet_row
-from geometry.kernels.drop import BLOCK_TOLERANCE, _bound, _triangle
+from geometry.kernels.drop import BLOCK_TOLERANCE, bull_of
 from geometry.kernels.options import KERNEL
+from geometry.kernels.revolved import lift_of, node_bound
 
 FACING = 0.05  # covering planes steeper than this (n_z over n_xy) are not used, as in the tree itself
 
@@ -56,10 +57,8 @@ def _may_enter(lower, upper, column, t, x, y, z, floor, widest, bodies):
             sine, slant = lean / length, length / nz
     row = (cx - ex, cx + ex, cy - ey, cy + ey, top, a, b, c, sine, slant)
     for k in range(bodies.shape[0]):
-        R = bodies[k, 0]
-        r = min(bodies[k, 1], R)
         start = z + bodies[k, 2] + BLOCK_TOLERANCE
-        if _bound(row, x, y, R, r, R - r, start) > start:
+        if node_bound(bull_of(bodies[k, 0], bodies[k, 1]), row, x, y, start) > start:
             return True
     return False
 
@@ -77,15 +76,8 @@ def _enters(tree, i, t, x, y, z, floor, widest, bodies):
         return False
     facet = facet_row(p, q, s)
     for k in range(bodies.shape[0]):
-        R = bodies[k, 0]
-        r = min(bodies[k, 1], R)
-        d = R - r
-        if d <= 1e-12 * R:
-            r, d = R, 0.0
-        elif r <= 1e-12 * R:
-            r, d = 0.0, R
         start = z + bodies[k, 2] + BLOCK_TOLERANCE
-        if _triangle((p, q, s), facet, x, y, R, r, d, start)[0] > start:
+        if lift_of(bull_of(bodies[k, 0], bodies[k, 1]), (p, q, s), facet, x, y, start)[0] > start:
             return True
     return False
 
