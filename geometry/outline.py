@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -75,6 +75,14 @@ class Outline:
         if not self.radius > 0.0:
             raise SetupError("the outline of a tool has no width", code="bad_cutter", subjects=("outline",),
                              measured=self.radius, limit=0.0, remedy="give it a piece with rho > 0")
+
+    @classmethod
+    @lru_cache(maxsize=64)
+    def bull(cls, radius: float, corner_radius: float) -> Outline:
+        """A ball (corner_radius = radius), a flat end (0) or a bull nose, mm; the same object for the same radii."""
+        flat = (Line(radius - corner_radius, 0.0),) if radius > corner_radius else ()
+        arc = (Arc(radius, corner_radius, (radius - corner_radius, corner_radius)),) if corner_radius else ()
+        return cls((*flat, *arc))
 
     @property
     def radius(self) -> float:

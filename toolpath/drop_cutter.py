@@ -1,14 +1,33 @@
-"""Drop-cutter: the lowest tip heights of a cutter over a mesh."""
+"""Drop-cutter and push-cutter: where a cutter first touches a mesh on its way down, or along a horizontal direction."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
 from numpy.typing import ArrayLike
 
+from geometry import drop, push, turned
 from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
-from geometry.mesh import F64, TriangleMesh
-from geometry.turned import drop_turned
+from geometry.mesh import F64, I32, TriangleMesh
+from geometry.outline import Outline
 from toolpath.cutter import Cutter
+
+
+@dataclass(frozen=True, eq=False)
+class CutterContacts:
+    """Where a cutter stops, and at what.
+
+    value    : (n,) float64, mm, what ``drop_cutter`` or ``push_cutter`` gives
+    point    : (n, 3) float64, mm, cutter contact; NaN where nothing is touched
+    triangle : (n,) int32, triangle of the mesh; -1 where nothing is touched
+    face_id  : (n,) int32, its B-rep face as in ``TriangleMesh.face_ids``; -1 where nothing is touched
+    """
+
+    value: F64
+    point: F64
+    triangle: I32
+    face_id: I32
 
 
 def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike) -> F64:
@@ -37,14 +56,76 @@ def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike
     >>> drop_cutter(floor, Cutter.ball(diameter=3, length=9), [[2, 2], [50, 50]])
     array([  2., -inf])
     """
+    tree = _tree(mesh, cutter)
+    if cutter.outline is not None:
+        return turned.drop_turned(tree, xy, cutter.outline)
+    return drop.drop_tips(tree, xy, cutter.radius, cutter.corner_radius)
+
+
+def drop_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike) -> CutterContacts:
+    """``drop_cutter`` with what holds each tip up; parameters and errors as there."""
+    tree = _tree(mesh, cutter)
+    if cutter.outline is not None:
+        got = turned.turned_contacts(tree, xy, cutter.outline)
+    else:
+        got = drop.drop_contacts(tree, xy, cutter.radius, cutter.corner_radius)
+    return CutterContacts(got.z, got.point, got.triangle, _faces(tree, got.triangle))
+
+
+def push_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLike, direction: ArrayLike) -> F64:
+    """How far the cutter, coming from far away, gets along a horizontal direction until it first touches the mesh.
+
+    mesh      : TriangleMesh, or a TriangleTree over it where it is used again
+    cutter    : Cutter, upright (+z)
+    tips      : (n, 3) float64, mm, a point on the way of each tip
+    direction : (2,) float64, of any length above 0
+
+    Returns
+    -------
+    (n,) float64, mm
+        From the given tip along the direction; negative where the cutter has to stop before it, +inf where nothing is
+        in its way. Exact for the mesh to 1e-9 mm over the sine of the angle between the direction and what is touched.
+
+    Raises
+    ------
+    GeometryError
+        ``tips`` is not (n, 3) finite numbers, the direction is zero or not finite, or a vertex of the mesh is not.
+    TypeError
+        ``mesh`` or ``cutter`` is something else.
+
+    Examples
+    --------
+    >>> from geometry.mesh import TriangleMesh
+    >>> wall = TriangleMesh([[9, -9, 0], [9, 9, 0], [9, 0, 8]], [[0, 1, 2]])
+    >>> push_cutter(wall, Cutter.flat(diameter=4, length=9), [[0, 0, 1], [0, 40, 1]], [1, 0])
+    array([ 7., inf])
+    """
+    tree = _tree(mesh, cutter)
+    return push.push_stops(tree, tips, direction, _outline(cutter))
+
+
+def push_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLike,
+                  direction: ArrayLike) -> CutterContacts:
+    """``push_cutter`` with what ends each way; parameters and errors as there."""
+    tree = _tree(mesh, cutter)
+    got = push.push_contacts(tree, tips, direction, _outline(cutter))
+    return CutterContacts(got.distance, got.point, got.triangle, _faces(tree, got.triangle))
+
+
+def _tree(mesh: TriangleMesh | TriangleTree, cutter: Cutter) -> TriangleTree:
     if not isinstance(cutter, Cutter):
         raise TypeError(f"cutter must be a Cutter, got {type(cutter).__name__}")
     if isinstance(mesh, TriangleMesh):
-        tree = TriangleTree(mesh)
-    elif isinstance(mesh, TriangleTree):
-        tree = mesh
-    else:
-        raise TypeError(f"mesh must be a TriangleMesh or a TriangleTree, got {type(mesh).__name__}")
-    if cutter.outline is not None:
-        return drop_turned(tree, xy, cutter.outline)
-    return drop_tips(tree, xy, cutter.radius, cutter.corner_radius)
+        return TriangleTree(mesh)
+    if isinstance(mesh, TriangleTree):
+        return mesh
+    raise TypeError(f"mesh must be a TriangleMesh or a TriangleTree, got {type(mesh).__name__}")
+
+
+def _outline(cutter: Cutter) -> Outline:
+    return cutter.outline if cutter.outline is not None else Outline.bull(cutter.radius, cutter.corner_radius)
+
+
+def _faces(tree: TriangleTree, triangle: I32) -> I32:
+    ids = np.append(tree.mesh.face_ids, np.int32(-1))  # the last for those that touch nothing
+    return np.asarray(ids[triangle])

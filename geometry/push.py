@@ -1,0 +1,81 @@
+"""How far a body of revolution gets along a horizontal direction: the push, twin of the drop.
+
+The body is an ``Outline``, upright, and goes on upwards as a cylinder without end. Threads and bytes are as in
+``geometry.drop``. Theory: docs/theory/drop.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import finite_points
+from geometry.bvh import TriangleTree
+from geometry.drop import one_thread
+from geometry.errors import GeometryError
+from geometry.kernels import push as kernels
+from geometry.mesh import F64, I32
+from geometry.outline import Outline
+
+
+@dataclass(frozen=True, eq=False)
+class PushContacts:
+    """Stops with what is touched there.
+
+    distance : (n,) float64, mm, from the given tip along the direction; +inf where nothing is in the way
+    triangle : (n,) int32, triangle of the mesh that is touched; -1 where none
+    point    : (n, 3) float64, mm, where it is touched; NaN where nothing is
+    """
+
+    distance: F64
+    triangle: I32
+    point: F64
+
+
+def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outline: Outline) -> F64:
+    """How far a body that comes from far away gets along a direction until it first touches the mesh.
+
+    tree      : TriangleTree
+    tips      : (n, 3) float64, mm, a point of each way; the body's tip passes through it
+    direction : (2,) float64, of any length above 0
+    outline   : Outline
+
+    Returns
+    -------
+    (n,) float64, mm
+        From the given tip on; negative where the body has to stop before it, +inf where nothing is in the way. Exact
+        for mesh and outline to 1e-9 mm over the sine of the angle between the direction and what is touched.
+
+    Raises
+    ------
+    GeometryError
+        The tips are not as above, or the direction is zero or not finite; the subjects name what.
+    """
+    points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
+    out = np.empty(len(points))
+    if one_thread():
+        kernels.push_range(tree.arrays, points, dx, dy, outline.stack, 0, len(points), out)
+    else:
+        kernels.push_many_parallel(tree.arrays, points, dx, dy, outline.stack, out)
+    return out
+
+
+def push_contacts(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outline: Outline) -> PushContacts:
+    """``push_stops`` with the triangle and the point that end each way; parameters and errors as there."""
+    points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
+    n = len(points)
+    stop, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))
+    kernels.contact_range(tree.arrays, points, dx, dy, outline.stack, 0, n, stop, triangle, contact)
+    return PushContacts(stop, triangle, contact)
+
+
+def _unit(direction: ArrayLike) -> tuple[float, float]:
+    d = np.asarray(direction, dtype=np.float64)
+    if d.shape == (2,) and np.isfinite(d).all() and d.any():
+        d = d / np.abs(d).max()  # so that no square under- or overflows
+        x, y = (d / np.hypot(*d)).tolist()
+        return x, y
+    raise GeometryError(f"a direction is two finite numbers, not both 0, got {d.tolist()}", code="bad_direction",
+                        subjects=("direction",), measured=d.tolist(), remedy="give (x, y) of the way")
