@@ -40,9 +40,10 @@ class TriangleTree:
 def _arrays(mesh: TriangleMesh, leaf_size: int) -> TreeArrays:
     if len(mesh.faces) == 0:
         return _empty()
-    triangles = mesh.triangles
+    triangles = mesh.vertices[mesh.faces]  # not mesh.triangles, which would stay
     lower, upper, child, parent, first, count, order = build_nodes(triangles, leaf_size)
-    corners = np.ascontiguousarray(triangles[order])
+    corners = triangles[order]
+    del triangles
     column = column_rows(lower, upper, child, parent, first, count, corners)
     return TreeArrays(lower, upper, column, child, parent, first, count, order, corners, facet_rows(corners))
 

@@ -23,6 +23,7 @@ from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
 from geometry.mesh import F64, I32
+from geometry.order import in_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +66,14 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
         raise GeometryError(f"out must be ({len(points)},) float64, got {result.shape} {result.dtype}",
                             code="bad_array", subjects=("out",))
     r, c = float(radius), float(corner_radius)
-    if one_thread():
-        kernels.drop_range(tree.arrays, points, r, c, 0, len(points), result)
-    else:
-        kernels.drop_many_parallel(tree.arrays, points, r, c, result)
+
+    def call(at: F64, tips: Any) -> None:
+        if one_thread():
+            kernels.drop_range(tree.arrays, at, r, c, 0, len(at), tips)
+        else:
+            kernels.drop_many_parallel(tree.arrays, at, r, c, tips)
+
+    in_order(call, points, len(tree), result)
     return result
 
 
@@ -100,10 +105,14 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
     _check_radii(radius, corner_radius)
     out = np.empty(len(points), np.bool_)
     r, c = float(radius), float(corner_radius)
-    if one_thread():
-        kernels.blocked_range(tree.arrays, points, r, c, 0, len(points), out)
-    else:
-        kernels.blocked_many_parallel(tree.arrays, points, r, c, out)
+
+    def call(at: F64, blocked: Any) -> None:
+        if one_thread():
+            kernels.blocked_range(tree.arrays, at, r, c, 0, len(at), blocked)
+        else:
+            kernels.blocked_many_parallel(tree.arrays, at, r, c, blocked)
+
+    in_order(call, points, len(tree), out)
     return out
 
 

@@ -7,6 +7,7 @@ The body is an ``Outline``, upright, and goes on upwards as a cylinder without e
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,7 @@ from geometry.drop import one_thread
 from geometry.errors import GeometryError
 from geometry.kernels import push as kernels
 from geometry.mesh import F64, I32
+from geometry.order import in_order
 from geometry.outline import Outline
 
 
@@ -55,10 +57,14 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
     """
     points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
     out = np.empty(len(points))
-    if one_thread():
-        kernels.push_range(tree.arrays, points, dx, dy, outline.stack, 0, len(points), out)
-    else:
-        kernels.push_many_parallel(tree.arrays, points, dx, dy, outline.stack, out)
+
+    def call(at: F64, stops: Any) -> None:
+        if one_thread():
+            kernels.push_range(tree.arrays, at, dx, dy, outline.stack, 0, len(at), stops)
+        else:
+            kernels.push_many_parallel(tree.arrays, at, dx, dy, outline.stack, stops)
+
+    in_order(call, points, len(tree), out)
     return out
 
 

@@ -6,6 +6,8 @@ The body is an ``Outline``, lines and arcs from the tip upwards. For balls, flat
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,6 +16,7 @@ from geometry.bvh import TriangleTree
 from geometry.drop import DropContacts, one_thread
 from geometry.kernels import outline as kernels
 from geometry.mesh import F64
+from geometry.order import in_order
 from geometry.outline import Outline
 
 
@@ -36,10 +39,14 @@ def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
     """
     points = finite_points(xy, 2, "xy")
     out = np.empty(len(points))
-    if one_thread():
-        kernels.drop_range(tree.arrays, points, outline.stack, 0, len(points), out)
-    else:
-        kernels.drop_many_parallel(tree.arrays, points, outline.stack, out)
+
+    def call(at: F64, tips: Any) -> None:
+        if one_thread():
+            kernels.drop_range(tree.arrays, at, outline.stack, 0, len(at), tips)
+        else:
+            kernels.drop_many_parallel(tree.arrays, at, outline.stack, tips)
+
+    in_order(call, points, len(tree), out)
     return out
 
 
