@@ -16,7 +16,6 @@ time. A local variable must not bear the name of a compiled function.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,10 +29,10 @@ ROOT_STEPS = 60
 NOTHING = -np.inf
 
 
-def for_shape(operation: Callable[..., Any], kind: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def for_shape(operation: Any, kind: type) -> Any:
     """Decorator: the function below is what ``operation`` does for shapes of one kind, a class of named tuples."""
 
-    def register(body: Callable[..., Any]) -> Callable[..., Any]:
+    def register(body: Any) -> Any:
         @overload(operation, jit_options={"error_model": KERNEL["error_model"]}, strict=False)
         def choose(shape, *others):  # type: ignore[no-untyped-def]
             return body if getattr(shape, "instance_class", None) is kind else None
