@@ -86,6 +86,7 @@ def memory_at(cells: int) -> float:
 
 def on_convex(quick: bool) -> None:
     """The convex surface: ours on one thread and two, the peer, and what grows with the facets."""
+    memory = memory_at(1000)  # before this process grows: a child begins with its parent's figure
     xy = lattice()
     shuffled = np.random.default_rng(0).permutation(xy)
     both = min(2, numba.config.NUMBA_NUM_THREADS)
@@ -122,7 +123,7 @@ def on_convex(quick: bool) -> None:
     for kind, name in enumerate(("in rows", "shuffled")):
         a, b = times[400, 1, kind], times[20, 1, kind]
         print(f"320,000 facets over 800, one thread, {name}: {a / b:.2f}")
-    print(f"most memory at 2,000,000 facets: {memory_at(1000):.2f} GiB", flush=True)
+    print(f"most memory at 2,000,000 facets: {memory:.2f} GiB", flush=True)
 
 
 def main() -> None:
