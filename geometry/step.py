@@ -43,12 +43,16 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
     check_tolerances(chord, angle)
     request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "chord": chord, "angle": angle,
                                "placement": placement.as_dict() if placement else None}
+    return Part.from_bytes(ask_reader(request, time_limit, memory_limit))
+
+
+def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
+    """What the child of ``geometry.step_child`` answers; limits in s and bytes, errors as ``read_part`` has them."""
     command = [sys.executable, "-m", "geometry.step_child"]
     try:
-        data = run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
+        return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
     except ResourceError as error:
         raise _by_the_part(error) from None
-    return Part.from_bytes(data)
 
 
 def _by_the_part(error: ResourceError) -> ResourceError | PartError:

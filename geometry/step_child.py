@@ -1,4 +1,4 @@
-"""Entry of the reader's child process: request on stdin, part or error in the result file.
+"""Entry of the reader's child process: request on stdin, part, patches or error in the result file.
 
 Kept free of heavy imports at module level so that limits stand before the CAD kernel is loaded.
 """
@@ -30,11 +30,17 @@ def main() -> int:
 
 def _load(request: dict) -> bytes:
     from geometry.frames import Placement
-    from geometry.occ.loading import load_part
 
     placement = request.pop("placement")
+    where = Placement(**placement) if placement else None
     try:
-        return load_part(placement=Placement(**placement) if placement else None, **request).to_bytes()
+        if request.pop("wanted", "part") == "patches":
+            from geometry.occ.patches import load_patches
+
+            return load_patches(placement=where, **request)
+        from geometry.occ.loading import load_part
+
+        return load_part(placement=where, **request).to_bytes()
     except CamError:
         raise
     except Exception as problem:

@@ -1,0 +1,55 @@
+"""The three test surfaces of Gupta (2016), tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
+
+Row 0 of the tables for the concave and the convex surface is printed with slips (x = 37 for 37.5 and, on the convex one, the
+points of another row); the surfaces are symmetric, which says what was meant, and they are mended here. On the freeform
+surface two points look misprinted as well, but nothing says what they should be: it is used as printed.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
+
+STEP = 12.5
+
+
+class Kind(StrEnum):
+    """Which of the surfaces."""
+
+    CONCAVE = "concave"
+    CONVEX = "convex"
+    FREEFORM = "freeform"
+
+
+# Heights of P_ij: row i at y = 12.5 i, column j at x = 12.5 j.
+_CONVEX = 15.0 + 2.5 * np.minimum(np.arange(5), 4 - np.arange(5))
+_HEIGHTS = {
+    Kind.CONVEX: np.add.outer(_CONVEX - 15.0, _CONVEX),
+    Kind.CONCAVE: 40.0 - np.add.outer(_CONVEX - 15.0, _CONVEX),
+    Kind.FREEFORM: np.add.outer(_CONVEX - 15.0, _CONVEX),
+}
+# As printed: the third and fourth point of row 0, and the first of row 3, which is also the first of row 4.
+_PRINTED = {(0, 2): (37.5, 0.0, 17.5), (0, 3): (37.0, 0.0, 25.0), (3, 0): (0.0, 50.0, 15.0)}
+
+
+def surface(kind: Kind | str) -> NurbsSurface:
+    """One of the surfaces, its material below it.
+
+    kind : Kind or its value
+    Returns NurbsSurface, mm; u runs along y and v along x, both from 0 to 2.
+    """
+    return NurbsSurface.from_control_points(control_points(Kind(kind)), 4, side=-1)
+
+
+def control_points(kind: Kind) -> F64:
+    """The control points P_ij, (5, 5, 3) float64, mm, as the module says."""
+    y, x = np.meshgrid(STEP * np.arange(5), STEP * np.arange(5), indexing="ij")
+    points = np.stack([x, y, _HEIGHTS[kind]], axis=-1)
+    if kind is Kind.FREEFORM:
+        for place, printed in _PRINTED.items():
+            points[place] = printed
+    return points
