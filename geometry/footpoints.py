@@ -62,12 +62,11 @@ def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | Non
     found = _search(surface, given, np.clip(uv, *surface.domain) if start is None else uv)
     # a pole is a trap: there no way along the collapsed side leads on
     stuck = np.flatnonzero(np.isnan(surface.normals(found.uv)[:, 0]))
-    if len(stuck):
-        again = _search(surface, given[stuck], _starts(surface, given[stuck], regular=True))
-        better = again.distance < found.distance[stuck]
-        rows = stuck[better]
-        found.uv[rows], found.points[rows], found.distance[rows] = (again.uv[better], again.points[better],
-                                                                    again.distance[better])
+    again = _search(surface, given[stuck], _starts(surface, given[stuck]))
+    better = again.distance < found.distance[stuck]
+    rows = stuck[better]
+    found.uv[rows], found.points[rows] = again.uv[better], again.points[better]
+    found.distance[rows] = again.distance[better]
     return found
 
 
@@ -78,7 +77,8 @@ def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
     left = np.einsum("pi,pi->p", foot - given, foot - given)
     rows = np.arange(len(given))
     for _ in range(ROUNDS):
-        step = np.clip(_newton(surface, given[rows], uv[rows]), REACH * (low - high), REACH * (high - low))
+        step = _newton(surface, given[rows], uv[rows])
+        step /= np.maximum(np.abs(step / (REACH * (high - low))).max(axis=1, keepdims=True), 1.0)
         far = (np.abs(step) > ENOUGH * (high - low)).any(axis=1)
         rows, step = rows[far], step[far]
         gained = np.zeros(len(rows), bool)
@@ -100,7 +100,7 @@ def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
     return FootPoints(uv, foot, np.sqrt(left))
 
 
-def _starts(surface: NurbsSurface, points: F64, regular: bool = False) -> F64:
+def _starts(surface: NurbsSurface, points: F64) -> F64:
     ways = []
     for axis, knots in enumerate((surface.knots_u, surface.knots_v)):
         low, high = surface.domain[:, axis]
@@ -109,9 +109,9 @@ def _starts(surface: NurbsSurface, points: F64, regular: bool = False) -> F64:
         share = np.arange(count) / count
         ways.append(np.append((ends[:-1, None] + np.diff(ends)[:, None] * share).ravel(), high))
     uv = np.stack(np.meshgrid(*ways, indexing="ij"), axis=-1).reshape(-1, 2)
-    if regular:
-        uv = uv[np.isfinite(surface.normals(uv)[:, 0])]
-    return uv[cKDTree(surface.points(uv)).query(points)[1]] if len(points) and len(uv) else np.zeros((len(points), 2))
+    regular = np.isfinite(surface.normals(uv)[:, 0])
+    uv = uv[regular] if regular.any() else uv
+    return uv[cKDTree(surface.points(uv)).query(points)[1]] if len(points) else np.zeros((0, 2))
 
 
 def _newton(surface: NurbsSurface, points: F64, uv: F64) -> F64:

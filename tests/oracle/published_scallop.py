@@ -1,8 +1,8 @@
-"""The scallop of Gupta (2016), 3.3.1, and the passes it asks for, 3.3.2. For tests alone: the product measures envelopes.
+"""The scallop of Gupta (2016), 3.3.1, and the passes it asks for, 3.3.2. The product measures envelopes instead.
 
-Two balls with centres C1, C2 stand one side step apart, across the feed. I_C is the lower of the two places where the circle
-both spheres share meets the vertical plane through C1 and C2; a ray from there along w, in that plane and square to C1 C2,
-meets the facets at I_stl. The scallop is the way between the two.
+Two balls with centres C1, C2 stand one side step apart, across the feed. I_C is the lower of the two places where the
+circle both spheres share meets the vertical plane through C1 and C2; a ray from there along w, in that plane and square
+to C1 C2, meets the facets at I_stl. The scallop is the way between the two.
 """
 
 from __future__ import annotations
