@@ -1,8 +1,9 @@
-"""The three test surfaces of Gupta (2016), tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
+"""The three test surfaces of Jain (2016), tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
 
-Row 0 of the tables for the concave and the convex surface is printed with slips (x = 37 for 37.5, and points that belong
-elsewhere). The surfaces are symmetric, which says what was meant; mended, their facets have the areas the thesis prints.
-The freeform table has two rows that look misprinted as well, 0 and 3, but nothing says what they should be: as printed.
+Row 0 of the tables for the concave and the convex surface is printed with slips (x = 37 for 37.5, and points that
+belong elsewhere). The surfaces are symmetric, which says what was meant; mended, their facets have the areas the thesis
+prints. The freeform table has two rows that look misprinted as well, 0 and 3, but nothing says what they should be: it
+is used as printed.
 """
 
 from __future__ import annotations

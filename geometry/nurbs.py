@@ -1,6 +1,6 @@
 """NURBS surfaces: points, derivatives, normals, curvatures, and their iso-parametric facets.
 
-Notation (Gupta 2016, equations 3.6 and 3.7, where n and m are one less)
+Notation (Jain 2016, equations 3.6 and 3.7, where n and m are one less)
     P_ij, h_ij   control points (n, m, 3) and weights (n, m)
     k, l         orders in u and v, degree plus one
     t            knots, n + k and m + l of them; u runs from t[k - 1] to t[n]

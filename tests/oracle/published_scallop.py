@@ -1,4 +1,4 @@
-"""The scallop of Gupta (2016), 3.3.1, and the passes it asks for, 3.3.2. The product measures envelopes instead.
+"""The scallop of Jain (2016), 3.3.1, and the passes it asks for, 3.3.2. The product measures envelopes instead.
 
 Two balls with centres C1, C2 stand one side step apart, across the feed. I_C is the lower of the two places where the
 circle both spheres share meets the vertical plane through C1 and C2; a ray from there along w, in that plane and square

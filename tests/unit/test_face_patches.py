@@ -10,19 +10,26 @@ import cadquery as cq  # noqa: E402
 
 from geometry.errors import GeometryError, StepError  # noqa: E402
 from geometry.exact import ExactFaces  # noqa: E402
-from geometry.facepatches import read_patches  # noqa: E402
+from geometry.facepatches import patches_from_bytes, read_patches  # noqa: E402
 from geometry.frames import Placement  # noqa: E402
+from geometry.occ.loading import load_part  # noqa: E402
+from geometry.occ.patches import load_patches  # noqa: E402
 from geometry.step import read_part  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 
 PLACE = Placement((1, 2, 3), (0.1, 1, 0.2), (1, 0, 0))
 
 
-def misses(path, chord=0.02):
+def read_here(path):
+    """Part and patches without child processes, which take seconds to start."""
+    part = load_part(path, placement=PLACE, chord=0.02, angle=0.3)
+    return part, patches_from_bytes(load_patches(path, placement=PLACE))
+
+
+def misses(path, read=read_here):
     """Nodes against patches at their parameters: largest distance (mm) inside faces, and of all; least cosine between
     normals; largest deviation the patches own to (mm)."""
-    part, patches = (read(path, placement=PLACE, **more) for read, more in
-                     ((read_part, {"chord": chord, "angle": 0.3}), (read_patches, {})))
+    part, patches = read(path)
     assert list(patches) == [f.number for f in part.faces]
     mesh = part.mesh
     pairs = np.unique(np.stack([mesh.faces.ravel(), np.repeat(mesh.face_ids, 3)], axis=1), axis=0)
@@ -43,7 +50,8 @@ def misses(path, chord=0.02):
 
 
 def test_faces_of_the_demo_part_lie_on_their_patches(demo_files):
-    inside, border, cosine, deviation = misses(demo_files[0])
+    inside, border, cosine, deviation = misses(
+        demo_files[0], lambda p: (read_part(p, placement=PLACE, chord=0.02), read_patches(p, placement=PLACE)))
     assert inside < 1e-12 and border < 2e-6 and cosine > 1 - 1e-12 and deviation < 1e-12
 
 
@@ -75,10 +83,10 @@ def test_every_kind_of_surface(shape, tmp_path):
 
 
 def test_curvature_is_that_of_the_exact_face(demo_files):
-    part = read_part(demo_files[0], placement=PLACE, chord=0.02)
+    part, patches = read_here(demo_files[0])
     exact = ExactFaces(demo_files[0], placement=PLACE)
     face = max((f for f in part.faces if f.surface in ("bspline", "extrusion")), key=lambda f: f.area).number
-    patch = read_patches(demo_files[0], [face], placement=PLACE)[face]
+    patch = patches[face]
     rows = part.mesh.face_ids == face
     uv, points = part.uv[rows].reshape(-1, 2)[:40], part.mesh.triangles[rows].reshape(-1, 3)[:40]
     assert np.allclose(patch.surface.curvature(patch.parameters(uv)), exact.evaluate(face, points).curvature, atol=1e-5)
