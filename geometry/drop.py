@@ -25,6 +25,7 @@ from geometry.kernels import drop as kernels
 from geometry.mesh import F64, I32
 from geometry.order import in_order
 
+FEW = 4000  # queries below this are not worth waking a second thread for
 
 @dataclass(frozen=True, eq=False)
 class DropContacts:
@@ -68,7 +69,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     r, c = float(radius), float(corner_radius)
 
     def call(at: F64, tips: Any) -> None:
-        if one_thread():
+        if one_thread(len(at)):
             kernels.drop_range(tree.arrays, at, r, c, 0, len(at), tips)
         else:
             kernels.drop_many_parallel(tree.arrays, at, r, c, tips)
@@ -107,7 +108,7 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
     r, c = float(radius), float(corner_radius)
 
     def call(at: F64, blocked: Any) -> None:
-        if one_thread():
+        if one_thread(len(at)):
             kernels.blocked_range(tree.arrays, at, r, c, 0, len(at), blocked)
         else:
             kernels.blocked_many_parallel(tree.arrays, at, r, c, blocked)
@@ -135,16 +136,16 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
                             f"{nx}, {ny}", code="bad_grid", subjects=("grid",))
     out = np.empty((int(ny), int(nx)))
     args: tuple[Any, ...] = (tree.arrays, float(x0), float(y0), float(step), float(radius), float(corner_radius))
-    if one_thread():
+    if one_thread(nx * ny):
         kernels.grid_rows(*args, 0, len(out), out)  # type: ignore[call-arg]
     else:
         kernels.grid_parallel(*args, out)  # type: ignore[call-arg]
     return out
 
 
-def one_thread() -> bool:
-    """Whether numba has one thread, so that its threading layer is left alone."""
-    return bool(numba.get_num_threads() == 1)
+def one_thread(queries: int) -> bool:
+    """Whether numba's threading layer is left alone: it has one thread, or the queries are not worth waking another."""
+    return queries < FEW or bool(numba.get_num_threads() == 1)
 
 
 def _check_radii(radius: float, corner_radius: float) -> None:

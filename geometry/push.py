@@ -59,7 +59,7 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
     out = np.empty(len(points))
 
     def call(at: F64, stops: Any) -> None:
-        if one_thread():
+        if one_thread(len(at)):
             kernels.push_range(tree.arrays, at, dx, dy, outline.stack, 0, len(at), stops)
         else:
             kernels.push_many_parallel(tree.arrays, at, dx, dy, outline.stack, stops)

@@ -41,7 +41,7 @@ def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
     out = np.empty(len(points))
 
     def call(at: F64, tips: Any) -> None:
-        if one_thread():
+        if one_thread(len(at)):
             kernels.drop_range(tree.arrays, at, outline.stack, 0, len(at), tips)
         else:
             kernels.drop_many_parallel(tree.arrays, at, outline.stack, tips)

@@ -26,7 +26,6 @@ from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
-from geometry.kernels.drop import blocked_range, drop_range
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
@@ -35,7 +34,6 @@ from zones.machinable import LEVEL, SEEN
 LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
 FRUSTUM_SLICES = 6
-FEW = 4000  # queries below this are not worth waking a second thread for
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
 BELOW = 1.0  # mm: a tip is never asked about farther under the obstacles than this and its own radius
 AIMED = 12  # free nodes a flat bottom is tried towards over a level place
@@ -257,12 +255,7 @@ class TipField:
     def tips(self, xy: F64) -> F64:
         """Tip limit (n,) mm of the whole assembly at xy (n, 2) mm; exact for the cutting part."""
         xy = np.ascontiguousarray(xy, dtype=np.float64)
-        if len(xy) < FEW:
-            out = np.empty(len(xy))
-            drop_range(self.tree.arrays, xy, self.grown_radius, self.grown_corner, 0, len(xy), out)
-        else:
-            out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner)
-        out += self.allowance
+        out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse_row, xy)))
 
     @property
@@ -274,11 +267,7 @@ class TipField:
         """(n,) bool: the cutting part would enter the obstacles at tips (n, 3) mm."""
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
-        if len(lowered) >= FEW:
-            return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
-        out = np.empty(len(lowered), np.bool_)
-        blocked_range(self.tree.arrays, lowered, self.grown_radius, self.grown_corner, 0, len(lowered), out)
-        return out
+        return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: shank or holder would come nearer than their clearance at tips (n, 3) mm."""

@@ -10,7 +10,7 @@ import pytest
 from drop_shapes import CUTTERS, SHAPES, smooth
 
 from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
+from geometry.drop import FEW, drop_tips
 from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
 from geometry.mesh import TriangleMesh
@@ -187,7 +187,7 @@ def test_paraboloids_lie_below_the_outline(cutter):
 
 def test_the_same_bytes_on_one_thread_and_two():
     mesh = smooth()
-    tree, xy = TriangleTree(mesh), points_over(mesh, 3000, seed=6)
+    tree, xy = TriangleTree(mesh), points_over(mesh, FEW + 1000, seed=6)
     threads, out = numba.get_num_threads(), []
     try:
         for n in (1, min(2, numba.config.NUMBA_NUM_THREADS)):

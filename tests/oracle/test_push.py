@@ -12,6 +12,7 @@ from naive_drop import drop as naive
 from test_outline import TURNED
 
 from geometry.bvh import TriangleTree
+from geometry.drop import FEW
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.outline import heights
@@ -155,7 +156,7 @@ def test_no_bound_hides_a_triangle(tool):
 
 def test_the_same_bytes_on_one_thread_and_two():
     tree = TriangleTree(smooth())
-    tips, d = ways(tree.mesh, 3000, seed=6)
+    tips, d = ways(tree.mesh, FEW + 1000, seed=6)
     threads, out = numba.get_num_threads(), []
     try:
         for n in (1, min(2, numba.config.NUMBA_NUM_THREADS)):

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many, drop_contacts, drop_grid, drop_tips
+from geometry.drop import FEW, blocked_many, drop_contacts, drop_grid, drop_tips
 from geometry.mesh import TriangleMesh
 from geometry.rays import first_hits
 
@@ -76,13 +76,13 @@ def test_one_and_two_threads_give_the_same_bytes(cutter):
     mesh, _ = _soup(7, 400)
     tree = TriangleTree(mesh)
     rng = np.random.default_rng(8)
-    tips = rng.random((3000, 3)) * [20, 20, 10]
-    ways = rng.normal(size=(3000, 3))
+    tips = rng.random((FEW + 1000, 3)) * [20, 20, 10]
+    ways = rng.normal(size=(FEW + 1000, 3))
 
     def everything():
         t, hit = first_hits(tree, tips, ways)
         return [a.tobytes() for a in (drop_tips(tree, tips[:, :2], *cutter), blocked_many(tree, tips, *cutter),
-                                      drop_grid(tree, 0.0, 0.0, 0.5, 40, 40, *cutter), t, hit,
+                                      drop_grid(tree, 0.0, 0.0, 0.25, 80, 80, *cutter), t, hit,
                                       drop_contacts(tree, tips[:, :2], *cutter).point)]
 
     before = numba.get_num_threads()
