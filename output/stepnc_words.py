@@ -13,7 +13,7 @@ from toolpath.motion import Motion, Workingstep
 
 def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
     """Unit normal of the planes the cutting passes lie in: Z for level passes, else across the main XY direction."""
-    if step.strategy != "zigzag":
+    if step.strategy not in ("zigzag", "one_way"):
         return (0.0, 0.0, 1.0)
     double = 0.0 + 0.0j  # directions, not senses: angles are doubled, so that zig and zag add up
     for trajectory in step.trajectories:

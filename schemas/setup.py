@@ -140,6 +140,8 @@ class Operations(WireModel):
     exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave alone.")] = []
     cut_direction: Annotated[Literal["climb", "conventional", "either"], Field(
         description="Direction of cut on walls.")] = "climb"
+    pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
+        description="Passes over shallow area. auto: zigzag or spiral, whichever is less way.")] = "auto"
 
     @model_validator(mode="after")
     def _check(self) -> Operations:

@@ -32,6 +32,7 @@ from service.sides import Side, file_name, in_first_frame, in_setup_frame, joine
 from service.version import VERSION
 from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
+from toolpath.strategies.zigzag import Pattern
 from verify.model import ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.view import View, turned_samples
@@ -205,7 +206,7 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
-                        ops.cut_direction == "either")
+                        ops.cut_direction == "either", Pattern(ops.pattern))
 
 
 def _fixtures(ready: Prepared, view: View) -> tuple[np.ndarray, ...]:

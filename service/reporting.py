@@ -224,7 +224,8 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
     out["scallop_mm"] = {"requested": ready.setup.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
     out["passes"], out["cutting_length_mm"], out["machining_time_s"] = 0, 0.0, 0.0
     if plan is not None:
-        out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes)
+        out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes,
+                   rejected=[*out["rejected"], *plan.rejected])
     if step is not None:
         out.update(cutting_length_mm=r(cutting_length(step), 1), machining_time_s=r(step_time(step), 1), step=step.id)
     if result is not None:

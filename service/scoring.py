@@ -54,7 +54,7 @@ class Score:
             here = turned_samples(self.samples.subset(mine), view.rotation @ ready.views[0].rotation.T)
             out.append(Checks(np.vstack([here.points, view.samples.points[edge]]),
                               np.vstack([here.normals, view.samples.normals[edge]]),
-                              np.vstack([self.tips[mine], z.tips[border]])))
+                              np.vstack([self.tips[mine], z.tips[border]]), PROOF_DENSITY ** -0.5))
         return out
 
     def without(self, plan: Plan, zones: Sequence[ZoneArea]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:

@@ -265,6 +265,14 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0
     settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either)
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
-    checks = [Checks(samples.points[z.samples], samples.normals[z.samples], z.tips) for z in zones]
+    checks = [Checks(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
     plan = plan_job(zones, checks, fields, cut, stock, settings)
     return Case(part, tree, samples, view, fields, zones, settings, before, plan)
+
+
+SURFACES = {
+    "dome": lambda: dome(),
+    "valley": lambda: slope_field(lambda x, y: 0.08 * x * x - 0.03 * y * y),
+    "ripples": lambda: slope_field(lambda x, y: 0.3 * np.sin(2.0 * x) * np.cos(y)),
+    "walls": walls,
+}

@@ -46,7 +46,7 @@ class Workingstep:
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
     operation : 'roughing' or 'finishing'
-    strategy  : 'layers', 'zlevel', 'zigzag', 'floor'
+    strategy  : 'layers', 'zlevel', 'floor', 'zigzag', 'one_way', 'spiral'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     """

@@ -20,17 +20,23 @@ from toolpath.levels import Line, dilated
 from toolpath.linking import FLUTE_SHARE, RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
+from toolpath.sidestep import Promise, Target
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
+from toolpath.strategies.zigzag import Pattern
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
 
+LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
+LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
 LATTICE_CARE = 1.5
+
+DRAGGED = (Pattern.ZIGZAG, Pattern.ONE_WAY, Pattern.SPIRAL)  # lines that come in their order of machining
 
 Progress = Callable[[float], None]
 
@@ -54,6 +60,7 @@ class PlanSettings:
     clearance       : height of rapid moves across
     rapid_floor     : height down to which a rapid may go
     either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
+    pattern         : of passes over shallow area
     """
 
     scallop_height: float
@@ -67,6 +74,7 @@ class PlanSettings:
     finishing: bool = True
     climb: bool = True
     either_way: bool = False
+    pattern: Pattern = Pattern.AUTO
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +83,13 @@ class Checks:
 
     points, normals : (k, 3) float64, mm and unit
     tips            : (k, 3) float64, mm, an admissible tip that touches each
+    spacing         : mm, about, between neighbours
     """
 
     points: F64
     normals: F64
     tips: F64
+    spacing: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +100,7 @@ class ZonePlan:
     side_step: mm between passes as laid out
     passes   : cutting passes between links
     left     : (k,) indices into the zone's checks that the planner's own measure finds above the budget
+    rejected : other patterns with their figures
     """
 
     zone: ZoneArea
@@ -98,6 +109,7 @@ class ZonePlan:
     side_step: float
     passes: int
     left: NDArray[np.int64]
+    rejected: tuple[dict[str, object], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,18 +239,19 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
     residual = ResidualMap(points + settings.stock_allowance * normals, normals,
                            margin=1.5 * settings.scallop_height)
     linker = Linker(field, stock, _motions(cut, settings))
-    name, spacing, rounds = _strategy(zone, checks, field, cut, settings)
+    strategy = _strategy(zone, checks, field, cut, settings)
+    name, spacing = strategy.name, strategy.side_step
     thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
     budget = PASS_SHARE * settings.scallop_height
     skin, slope = SKIN * field.tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
     failing = np.arange(len(points))
     for k in range(REFINEMENTS + 2 if len(points) else 0):
-        groups = rounds(k, checks.tips[failing]) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
+        groups = strategy.rounds(k, failing) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
         for lines in groups:
-            if name != "zigzag":
+            if name not in DRAGGED:
                 lines = nearest_order(lines, linker.at, settings.either_way)
             for line in lines:
-                if name != "zigzag":
+                if name not in DRAGGED:
                     line = _turned(line, settings)
                 before = len(linker.trajectories)
                 for layer in zigzag.skimmed(line, stock, field.tool, skin, slope):
@@ -251,25 +264,37 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
             break
     failing = np.flatnonzero(residual.residual > settings.scallop_height)
     if not linker.passes:
-        return None, ZonePlan(zone, None, name, spacing, 0, failing)
+        return None, ZonePlan(zone, None, name, spacing, 0, failing, strategy.rejected)
     faces = " ".join(f"F{f}" for f in zone.faces[:12])
     step = _step(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing", name,
                  field.tool, cut, spacing, linker, settings)
-    return step, ZonePlan(zone, step_id, name, spacing, linker.passes, failing)
+    return step, ZonePlan(zone, step_id, name, spacing, linker.passes, failing, strategy.rejected)
 
 
-Rounds = Callable[[int, F64], list[list[Line]]]
+Rounds = Callable[[int, NDArray[np.int64]], list[list[Line]]]
+"""Lines of round k for the samples (indices into the zone's checks) that still need some."""
+
+
+@dataclass(frozen=True)
+class _Strategy:
+    """Name, distance between passes in mm, rounds, and what was considered and not taken."""
+
+    name: str
+    side_step: float
+    rounds: Rounds
+    rejected: tuple[dict[str, object], ...] = ()
 
 
 def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
-              settings: PlanSettings) -> tuple[str, float, Rounds]:
-    """Name, distance between passes, and the passes of round k for the tips that still need some."""
+              settings: PlanSettings) -> _Strategy:
+    """How a zone is finished."""
     tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
     cusp = CUSP_SHARE * settings.scallop_height
     if zone.form is Form.STEEP:
         step = zlevel.level_step(tool, normals, cusp, cut.step_down)
 
-        def waterlines(k: int, tips: F64) -> list[list[Line]]:
+        def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+            tips = checks.tips[failing]
             if k == 0:
                 levels, window = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
             else:
@@ -277,24 +302,25 @@ def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
                 levels = zlevel.lowest_of_groups(tips[:, 2], window)
             return zlevel.waterlines(field, tips, levels, 1.001 * window, chord)
 
-        return "zlevel", step, waterlines
+        return _Strategy("zlevel", step, waterlines)
     flat = tool.radius - tool.corner_radius
     if zone.form is Form.LEVEL and flat > 0:
 
-        def planes(k: int, tips: F64) -> list[list[Line]]:
-            return floor.planes(field, tips, chord, k) if k <= floor.MOST_FINER else []
+        def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+            return floor.planes(field, checks.tips[failing], chord, k) if k <= floor.MOST_FINER else []
 
-        return "floor", 1.6 * flat, planes
-    side = zigzag.side_step(tool.corner_radius, normals, cusp)
-    x_first = zigzag.along_x(dilated(field.lattice.mask(checks.tips[:, :2]), 3.0))
+        return _Strategy("floor", 1.6 * flat, planes)
+    promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
+                      LINK_S * cut.feed / 60.0)
+    target = Target(checks.points, checks.normals, checks.tips, checks.spacing)
+    layout = zigzag.laid(field, target, promise, settings.pattern)
 
-    def parallel(k: int, tips: F64) -> list[list[Line]]:
-        if k == 0:
-            return [zigzag.passes(field, tips, side, 0.0, chord, x_first, min(side, 0.3 * tool.radius))]
-        width = side / 2.0 ** k
-        return [zigzag.passes(field, tips, 2.0 * width, 0.5, chord, x_first, width)]
+    def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        return [list(layout.lines) if k == 0 else layout.between(k, failing)]
 
-    return "zigzag", side, parallel
+    return _Strategy(str(layout.pattern), layout.side_step, dragged, tuple(
+        {"strategy": str(other), "reason": "more way, links counted", "value": round(way, 1),
+         "limit": round(layout.way, 1)} for other, way in layout.rejected))
 
 
 def _step(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,

@@ -13,8 +13,9 @@ from geometry.drop import drop_tips
 from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense
+from toolpath.cutter import Cutter
 from toolpath.levels import contours, thinned
-from toolpath.strategies import zigzag
+from toolpath.sidestep import Dragged, Promise, Swath, Target
 
 RADIUS = 12.0
 SHAPES = {
@@ -87,9 +88,13 @@ def test_the_scallop_of_parallel_passes_falls_with_the_square_of_the_side_step(l
     tips = points + r * normal - [0.0, 0.0, r]
     steps = np.array([0.8, 0.4, 0.2, 0.1])
     left = []
+    dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree)
     for step in steps:
-        lines = zigzag.passes(field, tips, float(step), 0.3, 1e-4, True, float(step))
-        centres = cKDTree(np.vstack([dense(line.points, 0.01) for line in lines]) + [0.0, 0.0, r])
+        promise = Promise(1.0, 1e-4, 0.3, 1.0)
+        swath = Swath(dragged, Target(points, np.tile(normal, (len(points), 1)), tips, 0.05), promise, 0.0)
+        at = step * np.arange(math.floor(swath.t[0] / step), math.ceil(swath.t[-1] / step) + 1)
+        lines = [line for t in at.tolist() for line in swath.pass_at(t, float(step)).lines]
+        centres = cKDTree(np.vstack([dense(line, 0.01) for line in lines]) + [0.0, 0.0, r])
         # highest place that is in no ball along the normals: distance of ball from plane, brute force
         left.append(max(_uncut(centres, points, normal, r)))
     along = steps * math.hypot(1.0, lean)

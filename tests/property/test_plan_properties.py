@@ -51,7 +51,7 @@ def held():
 CASES = {
     "walls": lambda: plan_part(low_walls(), [ball(3.0)]),
     "walls from a block": lambda: plan_part(low_walls(), [tool(3.0, 0.0, "T1"), ball(2.5, "T2")], near_net=False),
-    "walls with holder": lambda: plan_part(low_walls(), [held()]),
+    "walls with holder": lambda: plan_part(low_walls(), [held()], density=100.0),  # as the product samples
     "corner": lambda: plan_part(corner(), [ball(3.0), tool(4.0, 0.0, "T2")]),
     "dome": lambda: plan_part(dome(size=8.0), [ball(4.0)], near_net=False),
     "valley": lambda: plan_part(valley(), [ball(3.0)]),

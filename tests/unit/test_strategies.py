@@ -1,4 +1,4 @@
-"""Strategies against formulas and slow twins: waterlines, parallel passes, level planes, layers, single touches."""
+"""Strategies against formulas and slow twins: waterlines, level planes, layers, single touches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
-from tests.hand_parts import ball, box_mesh, corner, dome, field_of, samples_of, slope_field, terraces, tool, walls
+from tests.hand_parts import SURFACES, ball, box_mesh, corner, field_of, samples_of, slope_field, terraces, tool, walls
 from tests.plan_checks import dense
 from toolpath.levels import Line
 from toolpath.stock import StockMap
@@ -186,108 +186,7 @@ def test_waterlines_lie_on_the_offset_of_a_leaning_wall(body):
         assert np.abs(at @ normal - body.corner_radius).max() <= CHORD + 1e-3 * field.lattice.step + LEVEL_TOLERANCE
 
 
-# -- parallel passes ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("slope", [0.0, 0.3, 0.7])
-@pytest.mark.parametrize("cusp", [0.002, 0.01, 0.05])
-def test_the_side_step_leaves_the_cusp_to_second_order(cusp, slope):
-    r = 1.5
-    normals = np.tile([0.0, -math.sin(slope), math.cos(slope)], (30, 1))
-    step = zigzag.side_step(r, normals, cusp) / math.cos(slope)  # along the surface
-    left = r - math.sqrt(r * r - step * step / 4.0)
-    assert cusp * (1.0 - 1e-9) <= left <= cusp * (1.0 + cusp / r)
-
-
-def test_the_side_step_follows_the_steepest_slope_and_has_limits():
-    wide = zigzag.side_step(1.5, np.zeros((0, 3)), 0.01)
-    assert wide == pytest.approx(math.sqrt(8 * 0.01 * 1.5))
-    slopes = np.tile([0.0, 0.0, 1.0], (100, 1))
-    slopes[:10] = [0.0, 0.6, 0.8]
-    assert zigzag.side_step(1.5, slopes, 0.01) == pytest.approx(0.8 * wide)
-    slopes[3:10] = [0.0, 0.0, 1.0]
-    assert zigzag.side_step(1.5, slopes, 0.01) == pytest.approx(wide)
-    assert zigzag.side_step(1.5, leaning(0.01, 5), 0.01) == pytest.approx(0.2 * wide)
-    assert zigzag.side_step(0.0, slopes, 0.01) == zigzag.SIDE_STEP_FLOOR
-
-
-def test_passes_run_the_way_that_takes_fewer_of_them():
-    mask = np.zeros((40, 60), bool)
-    mask[5:12, 3:50] = True
-    assert zigzag.along_x(mask) and not zigzag.along_x(mask.T)
-
-
-SURFACES = {
-    "dome": lambda: dome(),
-    "valley": lambda: slope_field(lambda x, y: 0.08 * x * x - 0.03 * y * y),
-    "ripples": lambda: slope_field(lambda x, y: 0.3 * np.sin(2.0 * x) * np.cos(y)),
-    "walls": walls,
-}
-
-
-def test_a_pass_is_within_its_tolerance_at_a_kink():
-    body, tol = tool(3.0, 0.6), 0.004
-    field = field_of(SURFACES["ripples"](), body)
-    points, tips = reached(field, field.tree.mesh, lambda s: s.normals[:, 2] > 0.3, 8.0)
-    worst = 0.0
-    for line in zigzag.passes(field, tips, 0.45, 0.25, tol, True, 0.3):
-        p = dense(line.points, 0.01)
-        worst = max(worst, float((p[:, 2] - drop_tips(field.tree, p[:, :2], body.radius, body.corner_radius)).max()))
-    assert worst <= 1.5 * tol
-
-
-@pytest.mark.parametrize("x_first", [True, False])
-@pytest.mark.parametrize("body", [ball(3.0), tool(3.0, 0.6)], ids=kind)
-@pytest.mark.parametrize("name", SURFACES)
-def test_passes_cover_the_area_on_the_tip_limit(name, body, x_first):
-    mesh, tol, step = SURFACES[name](), 0.004, 0.45
-    field = field_of(mesh, body)
-    points, tips = reached(field, mesh, lambda s: s.normals[:, 2] > 0.3, 8.0)
-    lines = zigzag.passes(field, tips, step, 0.25, tol, x_first, 0.3)
-    across, along = (1, 0) if x_first else (0, 1)
-    for line in lines:
-        places = line.points[:, across] / step - 0.25
-        assert np.ptp(places) < 1e-9 and abs(places[0] - round(places[0])) < 1e-9
-        p = dense(line.points, 0.02)
-        limit = drop_tips(field.tree, p[:, :2], body.radius, body.corner_radius)
-        slope = np.diff(p[:, 2]) / np.diff(p[:, along])
-        off = (p[:-1, 2] - limit[:-1]) / np.hypot(1.0, slope)  # across the path
-        gentle = np.abs(slope) < 3.0
-        assert off[gentle].min(initial=0.0) >= -tol
-        assert off[gentle].max(initial=0.0) <= 1.5 * tol
-    # a pass on either side of every tip, no farther than the step, and at the same height of the surface
-    walked = np.vstack([dense(line.points, 0.05) for line in lines])
-    tree = cKDTree(walked[:, :2])
-    assert tree.query(tips[:, :2])[0].max() <= 0.5 * step + 0.05
-    # to and fro
-    ways = [np.sign(line.points[-1, along] - line.points[0, along])
-            for line in lines if line.length > 0.5 * np.ptp(tips[:, along])]
-    assert {-1.0, 1.0} <= set(ways)
-
-
-def test_every_second_pass_is_walked_back():
-    mesh = dome()
-    field = field_of(mesh, ball(3.0))
-    _, tips = reached(field, mesh, lambda s: s.face == 2, 4.0)
-    lines = zigzag.passes(field, tips, 1.0, 0.0, 0.004, True, 0.3)
-    assert len(lines) >= 12
-    ways = np.sign([line.points[-1, 0] - line.points[0, 0] for line in lines])
-    assert (ways[1:] == -ways[:-1]).all()
-    assert (np.diff([line.points[0, 1] for line in lines]) > 0).all()
-    assert zigzag.passes(field, tips[:0], 1.0, 0.0, 0.004, True, 0.3) == []
-
-
-def test_passes_are_broken_at_a_wall_and_never_climb_it_in_one_move():
-    mesh, body = terraces([0, 6, 12], [0, 8], [[2, 7]]), ball(3.0)
-    field = field_of(mesh, body)
-    _, tips = reached(field, mesh, lambda s: s.normals[:, 2] > 0.5, 4.0)
-    lines = zigzag.passes(field, tips, 0.8, 0.0, 0.004, True, 0.3)
-    below = [line for line in lines if line.points[:, 2].max() < 2.001]
-    above = [line for line in lines if line.points[:, 2].min() > 7.0 - body.radius - 0.1]  # over the rim, not down it
-    assert len(below) >= 8 and len(above) >= 8 and len(below) + len(above) == len(lines)
-    for line in lines:
-        p = dense(line.points, 0.01)
-        assert (p[:, 2] >= drop_tips(field.tree, p[:, :2], body.radius, body.radius) - 0.05).all()
+# -- stock in the way -------------------------------------------------------------------------------------------
 
 
 class Discs:

@@ -1,98 +1,133 @@
-"""Parallel passes dragged over shallow area, to and fro."""
+"""Passes dragged over shallow area: straight ones to and fro or one way, or a spiral."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.follow import follow
-from toolpath.levels import Line, dense, dilated, pieces_where, thinned, true_runs
+from toolpath.cutter import Cutter
+from toolpath.direction import best_direction
+from toolpath.levels import Line, dense, pieces_where
+from toolpath.sidestep import Dragged, Pass, Promise, Swath, Target, lay_out
 from toolpath.stock import StockMap
+from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach import TipField
 
-SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
-STEEPEST = 4.0
-SIDE_STEP_FLOOR = 0.02
+LEAST_STEP = 0.02  # mm between passes of a round
+WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried
 
 
-def side_step(corner_radius: float, normals: F64, cusp: float) -> float:
-    """Distance between parallel passes in plan that leaves a given cusp.
+class Pattern(StrEnum):
+    """How passes over shallow area follow each other."""
 
-    corner_radius : mm; normals : (n, 3) float64 of the area; cusp : mm, along the normal
-    Returns mm: sqrt(8 h r) along the surface, times the cosine of the steepest slope across (95 % quantile).
-    Second order in h/r; tighter convex places are found by measuring.
+    AUTO = "auto"
+    """Zigzag or spiral, whichever is less way."""
+    ZIGZAG = "zigzag"
+    """Straight passes, to and fro."""
+    ONE_WAY = "one_way"
+    """Straight passes, all walked the same way."""
+    SPIRAL = "spiral"
+    """Rings from the border inwards, joined turn by turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Passes of an area, and what is needed to put more between them.
+
+    pattern   : ZIGZAG, ONE_WAY or SPIRAL
+    swath     : the area along the feed
+    places    : (k,) float64, mm, where whole passes lie; distance from the border for a spiral
+    lines     : in order of machining
+    way       : mm, with what links cost
+    rejected  : patterns that would be more way, with it
     """
-    if not len(normals):
-        return math.sqrt(8.0 * cusp * corner_radius)
-    cosine = float(np.quantile(normals[:, 2], 0.05))
-    return max(SIDE_STEP_FLOOR, math.sqrt(8.0 * cusp * corner_radius) * max(cosine, 0.2))
+
+    pattern: Pattern
+    swath: Swath
+    places: F64
+    lines: tuple[Line, ...]
+    way: float
+    rejected: tuple[tuple[Pattern, float], ...] = ()
+
+    @property
+    def side_step(self) -> float:
+        """Distance between neighbouring whole passes in plan that is usual, mm; of a single one, what it began with."""
+        return float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
+
+    def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
+        """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.
+
+        failing : indices of the samples of the area
+        """
+        swath, step, parts = self.swath.subset(failing), self.side_step, 2 ** k
+        if not len(swath.t):
+            return []
+        at = np.array([swath.t[0] - step, swath.t[-1] + step])
+        if self.pattern is not Pattern.SPIRAL and len(self.places):
+            at = np.concatenate([self.places[:1] - step, self.places, self.places[-1:] + step])
+        # the area may have gaps across the passes: no two places are farther apart than a step there
+        most = np.maximum(np.ceil(np.diff(at) / (1.5 * step)), 1.0)
+        at = np.interp(np.arange(most.sum() + 1.0), np.concatenate([[0.0], np.cumsum(most)]), at)
+        grid = np.interp(np.arange(parts * (len(at) - 1) + 1) / parts, np.arange(len(at)), at)
+        made = [swath.pass_at(t, max(width, LEAST_STEP))
+                for t, width in zip(grid[1::2].tolist(), (0.5 * (grid[2::2] - grid[:-1:2])).tolist(), strict=True)]
+        return one_way(made) if self.pattern is Pattern.ONE_WAY else to_and_fro(made)
 
 
-def along_x(mask: NDArray[np.bool_]) -> bool:
-    """Whether passes along x are fewer than passes along y over a mask (ny, nx)."""
-    rows = np.count_nonzero(np.diff(mask.astype(np.int8), axis=1) == 1)
-    cols = np.count_nonzero(np.diff(mask.astype(np.int8), axis=0) == 1)
-    return bool(rows <= cols)
+def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = Pattern.AUTO) -> Layout:
+    """Passes over an area: in the best direction of feed, or as a spiral.
 
-
-def passes(field: TipField, tips: F64, step: float, shift: float, tolerance: float, x_first: bool,
-           overrun: float) -> list[Line]:
-    """Parallel passes over the places where the tool touches an area.
-
-    field     : TipField
-    tips      : (n, 3) float64, mm, tips that touch the samples of the area
-    step      : mm between passes in plan
-    shift     : passes lie at (k + shift) * step, so that two sets interleave
-    tolerance : mm, chordal
-    x_first   : passes run along x, else along y
-    overrun   : mm the passes run past the area
-
-    Returns
-    -------
-    list of Line
-        In order across, every second one reversed.
+    field   : TipField
+    target  : Target, tips with the allowance of the field
+    promise : Promise
+    pattern : Pattern
     """
-    lat = field.lattice
-    if not len(tips):
-        return []
-    mask = dilated(lat.mask(tips[:, :2]), max(1.5, overrun / lat.step))
-    across = 1 if x_first else 0
-    where = (field.tree.arrays, field.noncut, field.coarse_row)
-    shape = (field.grown_radius, field.grown_corner, field.allowance)
-    origin, count = (lat.y0, lat.ny) if x_first else (lat.x0, lat.nx)
-    lo, hi = tips[:, across].min() - overrun, tips[:, across].max() + overrun
+    dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance)
+    swath = Swath(dragged, target, promise, best_direction(dragged, target, promise))
+    made = []
+    if pattern is not Pattern.SPIRAL:
+        passes = lay_out(swath)
+        straight = one_way(passes) if pattern is Pattern.ONE_WAY else to_and_fro(passes)
+        kind = Pattern.ONE_WAY if pattern is Pattern.ONE_WAY else Pattern.ZIGZAG
+        made.append(_layout(kind, swath, [p.at for p in passes if p.whole], straight))
+    if pattern is Pattern.SPIRAL or (pattern is Pattern.AUTO and _of_a_piece(made[0])):
+        rings = Rings(dragged, target, promise)
+        places = [p.at for p in lay_out(rings, subdivide=False)]
+        made.append(_layout(Pattern.SPIRAL, swath, places, [Line(p, False) for p in spiralled(rings, places)]))
+    made.sort(key=lambda m: m.way)
+    return replace(made[0], rejected=tuple((m.pattern, m.way) for m in made[1:]))
+
+
+def _of_a_piece(straight: Layout) -> bool:
+    """Whether an area is large and whole enough for a spiral to be tried."""
+    return WORTH_A_SPIRAL <= len(straight.places) and len(straight.lines) <= 2 * len(straight.places)
+
+
+def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line]) -> Layout:
+    way = sum(line.length for line in lines) + swath.promise.link * len(lines)
+    return Layout(pattern, swath, np.array(places), tuple(lines), way)
+
+
+def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
+    """Passes as lines in order across, every second one that has any walked back."""
     out: list[Line] = []
     flip = False
-    for k in range(math.floor(lo / step - shift), math.ceil(hi / step - shift) + 1):
-        at = (k + shift) * step
-        row = round((at - origin) / lat.step)
-        if not 0 <= row < count:
-            continue
-        cells = mask[row, :] if x_first else mask[:, row]
-        found: list[Line] = []
-        for a, b in _joined(true_runs(cells), field.tool.radius / lat.step):
-            p = (lat.x0 + lat.step * a, at) if x_first else (at, lat.y0 + lat.step * a)
-            q = (lat.x0 + lat.step * (b - 1), at) if x_first else (at, lat.y0 + lat.step * (b - 1))
-            points, broken = follow(*where, *p, *q, *shape, min(lat.step, 0.15), 0.5 * tolerance, SMALLEST, STEEPEST)
-            for i, j in true_runs(~broken[:-1]):
-                found.append(Line(thinned(points[i:j + 1], 0.5 * tolerance), False))
-        out.extend([line.reversed() for line in reversed(found)] if flip else found)
-        flip ^= bool(found)
+    for p in passes:
+        lines = [Line(q, False) for q in p.lines]
+        out.extend([line.reversed() for line in reversed(lines)] if flip else lines)
+        flip ^= bool(lines)
     return out
 
 
-def _joined(runs: list[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
-    out: list[tuple[int, int]] = []
-    for a, b in runs:
-        if out and a - out[-1][1] < gap:
-            out[-1] = (out[-1][0], b)
-        else:
-            out.append((a, b))
-    return out
+def one_way(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
+    """Passes as lines in order across, all walked the same way: every chip is cut in the same sense."""
+    return [Line(q, False) for p in passes for q in p.lines]
 
 
 def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float) -> list[Line]:

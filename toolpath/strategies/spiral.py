@@ -1,0 +1,117 @@
+"""A spiral over shallow area: rings at growing distance from its border, joined turn by turn.
+
+Place across the passes is the distance of a tip from the border of all tips in plan, so a ring is a level line of
+that distance and ``toolpath.sidestep`` brackets from ring to ring as it does from line to line. Where one closed ring
+follows the other, the way goes over from ring to ring along the whole turn: neighbouring turns are then nowhere
+farther apart than the rings are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64
+from toolpath.follow import pieces
+from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
+from toolpath.sidestep import Dragged, Family, Pass, Promise, Target, strip_width
+from zones.reach import Lattice
+
+NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
+SMOOTH = 1.0  # lattice steps, of the distance field
+
+
+class Rings(Family):
+    """Rings at distances from the border of the tips."""
+
+    def __init__(self, dragged: Dragged, target: Target, promise: Promise) -> None:
+        tips = target.tips[:, :2]
+        step = max(0.5 * target.spacing, 0.05 * dragged.cutter.radius)
+        near = max(1, int(np.ceil(NEAR * target.spacing / step)))
+        bounds = np.array([tips.min(axis=0), tips.max(axis=0)])
+        self.lattice = lat = Lattice.over(bounds, (2 * near + 4) * step, step)
+        disc = np.hypot(*np.mgrid[-near:near + 1, -near:near + 1]) <= near
+        mask = ndimage.binary_closing(lat.mask(tips), disc)
+        far = ndimage.distance_transform_edt(mask) * step
+        self.far = np.ascontiguousarray(ndimage.gaussian_filter(far, SMOOTH))
+        self.inside = np.ascontiguousarray(ndimage.binary_dilation(mask, iterations=2))
+        at = (tips[:, ::-1] - [lat.y0, lat.x0]).T / step
+        t = ndimage.map_coordinates(self.far, at, order=1)
+        rise = np.column_stack([ndimage.map_coordinates(g, at, order=1) for g in np.gradient(self.far)[::-1]])
+        length = np.linalg.norm(rise, axis=1, keepdims=True)
+        across = np.where(length > 1e-9, rise / np.maximum(length, 1e-9), [1.0, 0.0])
+        cells = np.floor(tips / strip_width(dragged, target)).astype(np.int64)
+        cells -= cells.min(axis=0)
+        super().__init__(dragged, target, promise, t, cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], across)
+
+    def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
+        """As in ``Family``; a ring is whole or is not there."""
+        lines = [p for way in self.ways(t) for p in pieces(self.dragged.limit, way, self.step, self.promise.chord)]
+        return Pass(t, tuple(lines), only is None)
+
+    def ways(self, t: float) -> list[F64]:
+        """Level lines of the distance: (n, 2) float64 mm each; a closed one repeats its first point."""
+        ids, starts, closed = trace(self.far < t, self.inside, SEGMENTS)
+        xy = np.empty((len(ids), 2))
+        linear_crossings(ids, self.far, t, self.lattice.x0, self.lattice.y0, self.lattice.step, xy)
+        out = []
+        for k in range(len(starts) - 1):
+            way = xy[starts[k]:starts[k + 1]]
+            if len(way) > 2:
+                out.append(np.vstack([way, way[:1]]) if closed[k] else way)
+        return out
+
+
+def spiralled(rings: Rings, places: list[float]) -> list[F64]:
+    """Rings at ``places`` (mm, ascending) as tip paths (n, 3) mm, joined to spirals where ring follows ring.
+
+    A path begins with its outermost ring, whole, goes over to the next ring along each turn, and ends with its
+    innermost ring, whole. Where rings part or join, or one is open, a new path begins.
+    """
+    out: list[F64] = []
+    chain: list[F64] = []
+
+    def close() -> None:
+        if chain:
+            out.extend(pieces(rings.dragged.limit, _joined(chain), rings.step, rings.promise.chord))
+        chain.clear()
+
+    for t in places:
+        ways = rings.ways(t)
+        if len(ways) == 1 and _closed(ways[0]):
+            chain.append(ways[0])
+            continue
+        close()
+        out.extend(p for way in ways for p in pieces(rings.dragged.limit, way, rings.step, rings.promise.chord))
+    close()
+    return out
+
+
+def _closed(way: F64) -> bool:
+    return bool((way[0] == way[-1]).all())
+
+
+def _joined(rings: list[F64]) -> F64:
+    """One way through closed rings (n, 2), outermost first."""
+    way = [rings[0]]
+    before = rings[0]
+    for ring in rings[1:]:
+        start = int(cKDTree(ring[:-1]).query(before[0])[1])
+        ring = np.vstack([ring[start:-1], ring[:start + 1]])
+        a, b = _shares(before), _shares(ring)
+        u = np.union1d(a, b)
+        turn = (1.0 - u)[:, None] * _at(before, a, u) + u[:, None] * _at(ring, b, u)
+        way.append(turn[1:])
+        before = ring
+    return np.vstack([*way, before[1:]])
+
+
+def _shares(way: F64) -> F64:
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    return np.asarray(s / s[-1])
+
+
+def _at(way: F64, shares: F64, u: F64) -> F64:
+    return np.column_stack([np.interp(u, shares, way[:, c]) for c in range(2)])
