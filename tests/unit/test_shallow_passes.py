@@ -21,12 +21,12 @@ def kind(body):
     return body.kind
 
 
-def laid(field, keep, density, scallop, pattern=Pattern.ZIGZAG, chord=0.004):
+def laid(field, keep, density, scallop, pattern=Pattern.ZIGZAG, chord=0.004, climb=True):
     """Layout over what the tool reaches of a mesh, and those points, normals and tips."""
     samples = with_normals(field.tree.mesh, keep, density)
     able, _, tips = touchable(field, samples.points, samples.normals, 0.0)
     target = Target(samples.points[able], samples.normals[able], tips[able], density ** -0.5)
-    return zigzag.laid(field, target, Promise(scallop, chord, 0.3, 20.0), pattern), target
+    return zigzag.laid(field, target, Promise(scallop, chord, 0.3, 20.0), pattern, climb), target
 
 
 def with_normals(mesh, keep, density):
@@ -61,6 +61,10 @@ def test_every_second_pass_is_walked_back_and_one_way_is_not():
         assert len(layout.lines) == len(layout.places) >= 8
         ways = np.sign([(line.points[-1, :2] - line.points[0, :2]) @ layout.swath.feed for line in layout.lines])
         assert (ways[1:] == (-ways[:-1] if turns else ways[:-1])).all()
+        if not turns:  # the stock is to the left of the feed, so climb milling goes against it
+            other, _ = laid(field, lambda s: s.face == 2, 20.0, 0.05, pattern, climb=False)
+            assert (ways == -1).all() and len(other.lines) == len(layout.lines)
+            np.testing.assert_array_equal(other.lines[0].points, layout.lines[0].points[::-1])
         at = np.array([line.points[0, :2] @ layout.swath.side for line in layout.lines])
         np.testing.assert_allclose(at, layout.places, atol=1e-9)
         assert (np.diff(at) > 0).all()
@@ -93,3 +97,14 @@ def test_refining_puts_passes_only_where_samples_fail():
         at = {round(float(line.points[0, :2] @ layout.swath.side), 6) for line in lines}
         assert not at & set(np.round(layout.places, 6).tolist())
     assert layout.between(1, failing[:0]) == []
+
+
+@pytest.mark.parametrize("climb", [True, False])
+def test_a_spiral_goes_inwards_with_the_stock_on_the_side_asked_for(climb):
+    field = field_of(dome(), ball(3.0))
+    layout, _ = laid(field, lambda s: np.hypot(*s.points[:, :2].T) < 4.0, 20.0, 0.03, Pattern.SPIRAL, climb=climb)
+    line, = layout.lines
+    x, y = line.points[:, 0], line.points[:, 1]
+    turned = np.unwrap(np.arctan2(y, x))
+    assert np.hypot(x[0], y[0]) > 3.0 > 0.6 > np.hypot(x[-1], y[-1])
+    assert bool(turned[-1] < turned[0]) is climb  # clockwise: stock, inside, on the right

@@ -2,8 +2,8 @@
 
 Place across the passes is the distance of a tip from the border of all tips in plan, so a ring is a level line of
 that distance and ``toolpath.sidestep`` brackets from ring to ring as it does from line to line. Where one closed ring
-follows the other, the way goes over from ring to ring along the whole turn: neighbouring turns are then nowhere
-farther apart than the rings are.
+follows the other, the way goes over from ring to ring along the whole turn, at equal shares of their lengths. On a
+round area turns are as far apart as the rings; beside a bay they may be a little farther, which measuring finds.
 """
 
 from __future__ import annotations
@@ -64,11 +64,13 @@ class Rings(Family):
         return out
 
 
-def spiralled(rings: Rings, places: list[float]) -> list[F64]:
+def spiralled(rings: Rings, places: list[float], climb: bool = True) -> list[F64]:
     """Rings at ``places`` (mm, ascending) as tip paths (n, 3) mm, joined to spirals where ring follows ring.
 
     A path begins with its outermost ring, whole, goes over to the next ring along each turn, and ends with its
     innermost ring, whole. Where rings part or join, or one is open, a new path begins.
+
+    climb : walked clockwise, with the stock inside on the right, else the other way
     """
     out: list[F64] = []
     chain: list[F64] = []
@@ -79,7 +81,7 @@ def spiralled(rings: Rings, places: list[float]) -> list[F64]:
         chain.clear()
 
     for t in places:
-        ways = rings.ways(t)
+        ways = [way[::-1] for way in rings.ways(t)] if climb else rings.ways(t)
         if len(ways) == 1 and _closed(ways[0]):
             chain.append(ways[0])
             continue

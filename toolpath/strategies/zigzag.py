@@ -45,6 +45,7 @@ class Layout:
     places    : (k,) float64, mm, where whole passes lie; distance from the border for a spiral
     lines     : in order of machining
     way       : mm, with what links cost
+    climb     : one way and spiral have the stock on the right, else on the left; to and fro has it on either side
     rejected  : patterns that would be more way, with it
     """
 
@@ -53,12 +54,14 @@ class Layout:
     places: F64
     lines: tuple[Line, ...]
     way: float
+    climb: bool
     rejected: tuple[tuple[Pattern, float], ...] = ()
 
     @property
     def side_step(self) -> float:
         """Distance between neighbouring whole passes in plan that is usual, mm; of a single one, what it began with."""
-        return float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
+        usual = float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
+        return max(usual, LEAST_STEP)
 
     def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
         """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.
@@ -77,29 +80,35 @@ class Layout:
         grid = np.interp(np.arange(parts * (len(at) - 1) + 1) / parts, np.arange(len(at)), at)
         made = [swath.pass_at(t, max(width, LEAST_STEP))
                 for t, width in zip(grid[1::2].tolist(), (0.5 * (grid[2::2] - grid[:-1:2])).tolist(), strict=True)]
-        return one_way(made) if self.pattern is Pattern.ONE_WAY else to_and_fro(made)
+        return one_way(made, self.climb) if self.pattern is Pattern.ONE_WAY else to_and_fro(made)
 
 
-def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = Pattern.AUTO) -> Layout:
+def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = Pattern.AUTO,
+         climb: bool = True) -> Layout:
     """Passes over an area: in the best direction of feed, or as a spiral.
 
     field   : TipField
     target  : Target, tips with the allowance of the field
     promise : Promise
     pattern : Pattern
+    climb   : as in ``Layout``
     """
     dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance)
     swath = Swath(dragged, target, promise, best_direction(dragged, target, promise))
     made = []
     if pattern is not Pattern.SPIRAL:
         passes = lay_out(swath)
-        straight = one_way(passes) if pattern is Pattern.ONE_WAY else to_and_fro(passes)
+        straight = one_way(passes, climb) if pattern is Pattern.ONE_WAY else to_and_fro(passes)
         kind = Pattern.ONE_WAY if pattern is Pattern.ONE_WAY else Pattern.ZIGZAG
-        made.append(_layout(kind, swath, [p.at for p in passes if p.whole], straight))
+        made.append(_layout(kind, swath, [p.at for p in passes if p.whole], straight, climb))
     if pattern is Pattern.SPIRAL or (pattern is Pattern.AUTO and _of_a_piece(made[0])):
         rings = Rings(dragged, target, promise)
         places = [p.at for p in lay_out(rings, subdivide=False)]
-        made.append(_layout(Pattern.SPIRAL, swath, places, [Line(p, False) for p in spiralled(rings, places)]))
+        turns = [Line(p, False) for p in spiralled(rings, places, climb)]
+        if turns:
+            made.append(_layout(Pattern.SPIRAL, swath, places, turns, climb))
+    if not made:  # too small for a ring
+        return laid(field, target, promise, Pattern.ZIGZAG, climb)
     made.sort(key=lambda m: m.way)
     return replace(made[0], rejected=tuple((m.pattern, m.way) for m in made[1:]))
 
@@ -109,9 +118,9 @@ def _of_a_piece(straight: Layout) -> bool:
     return WORTH_A_SPIRAL <= len(straight.places) and len(straight.lines) <= 2 * len(straight.places)
 
 
-def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line]) -> Layout:
+def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line], climb: bool) -> Layout:
     way = sum(line.length for line in lines) + swath.promise.link * len(lines)
-    return Layout(pattern, swath, np.array(places), tuple(lines), way)
+    return Layout(pattern, swath, np.array(places), tuple(lines), way, climb)
 
 
 def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
@@ -125,9 +134,13 @@ def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
     return out
 
 
-def one_way(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
-    """Passes as lines in order across, all walked the same way: every chip is cut in the same sense."""
-    return [Line(q, False) for p in passes for q in p.lines]
+def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
+    """Passes as lines in order across, all walked the same way: against the feed for climb milling, else along it.
+
+    The next pass, where the stock is, lies to the left of the feed.
+    """
+    lines = [Line(q, False) for p in passes for q in p.lines]
+    return [line.reversed() for line in lines] if climb else lines
 
 
 def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float) -> list[Line]:
