@@ -29,7 +29,8 @@ from geometry.toolbody import ToolBody  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.direction import best_direction  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
-from toolpath.sidestep import Dragged, Pass, Promise, Swath, Target, lay_out  # noqa: E402
+from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
+from toolpath.sidestep import lay_out  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
 
 # Table A.1, uv 0.025: radius, scallop, then passes, tool positions and seconds on each surface

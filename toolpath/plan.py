@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from toolpath.family import Promise, Target
 from toolpath.levels import Line, dilated
 from toolpath.linking import FLUTE_SHARE, RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
-from toolpath.sidestep import Promise, Target
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from toolpath.strategies.zigzag import Pattern

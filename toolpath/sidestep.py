@@ -1,11 +1,8 @@
 """Distance between neighbouring passes, bracketed on what they truly leave.
 
-Passes lie side by side, one at each place t across. Which samples two neighbours A and B answer for is read off the
-tips that touch them: those with a tip between A and B. There the lower of the two swept envelopes is measured along
-the normal, in every strip across the passes at the sample it leaves highest, and from there on the ridge between the
-two is walked to, because samples miss its crest. What is left grows with the distance, about with its square, so the
-widest step that keeps the promise is bracketed by a few trials, each a tip path on the true limit. Going on greedily
-takes the fewest straight passes of a direction: two neighbours answer for what is between them and for nothing else.
+What is left between two passes grows with their distance, about with its square, so the widest step that keeps the
+promise is bracketed by a few trials, each a tip path on the true limit (``toolpath.family`` measures). Going on
+greedily takes the fewest passes of a family: two neighbours answer for what is between them and for nothing else.
 
 Where one narrow spot would set the step for a whole pass (thesis, section 5.2.v) the step may be wider and the spot
 gets a piece of a pass of its own, if that is less way in all.
@@ -14,275 +11,21 @@ gets a piece of a pass of its own, if that is less way in all.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
-from geometry.kernels.outline import ARC
 from geometry.mesh import F64
-from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
-from toolpath.follow import KINK, Limit, pieces
-from toolpath.roots import roots
+from toolpath.family import FLOOR, I64, Family, Pass, strip_width
 
-I64 = NDArray[np.int64]
-
-FLOOR = 0.02  # mm: passes are never closer
 TRIALS = 7
 FULL = 0.97  # of what may be left: a step that leaves this much is wide enough
 AIM = 0.985
-BEGIN = 0.992  # of the closed form on a plane: wide enough, and kept at the first trial
 GROWTH = 1.6  # most a trial is wider than the one before
 DEEPEST = 5  # times a narrow spot is halved
-CLIMB = 2.0  # mm a pass may be above the tips it serves for each mm they are beside it
-CREST = 1e-6  # mm: two envelopes this near each other have met
 SHARES = (0.9, 0.75, 0.5)  # of the strips that a wider step may satisfy
-
-
-@dataclass(frozen=True)
-class Dragged:
-    """A cutter that is dragged over a part.
-
-    cutter    : Cutter, for what it leaves
-    limit     : Limit, lowest tip over a place, of the whole assembly
-    ground    : TriangleTree of what is finished
-    allowance : mm, material to be left on it
-    """
-
-    cutter: Cutter
-    limit: Limit
-    ground: TriangleTree
-    allowance: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """Samples to be finished.
-
-    points, normals : (n, 3) float64, mm and unit, n_z > 0, out of the material
-    tips            : (n, 3) float64, mm, an admissible tip that touches each
-    spacing         : mm, about, between neighbours
-    """
-
-    points: F64
-    normals: F64
-    tips: F64
-    spacing: float
-
-    def subset(self, which: I64) -> Target:
-        """The samples ``which`` alone."""
-        return Target(self.points[which], self.normals[which], self.tips[which], self.spacing)
-
-
-@dataclass(frozen=True)
-class Promise:
-    """What passes have to keep, mm.
-
-    scallop   : largest distance along the normal that is left
-    chord     : tolerance of the tip path
-    overrun   : by how much passes run past the last tip they serve
-    link      : way that one more piece costs, for weighing pieces against closer passes
-    """
-
-    scallop: float
-    chord: float
-    overrun: float
-    link: float
-
-
-@dataclass(frozen=True, eq=False)
-class Pass:
-    """One straight pass.
-
-    at    : mm, its place across the passes
-    lines : (n, 3) float64 polylines of tips, mm, along growing s
-    whole : False for a piece at a narrow spot
-    """
-
-    at: float
-    lines: tuple[F64, ...]
-    whole: bool = True
-
-    @property
-    def length(self) -> float:
-        """Way in all, mm."""
-        return sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in self.lines)
-
-
-class Family(ABC):
-    """Passes side by side over a target: one at each place t across, samples in order of the place of their tip.
-
-    dragged, target, promise : as above
-    t      : (n,) float64, mm, place of each sample's tip; ascending, and so are the arrays below
-    strips : (n,) int64, the strip across the passes that each sample lies in
-    across : (n, 2) float64, unit, the way t grows at each sample
-    """
-
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, t: F64, strips: I64, across: F64) -> None:
-        self.dragged, self.target, self.promise = dragged, target, promise
-        # what a pass through its own tip leaves too high, no pass mends: it may not set the step of all
-        lift = dragged.limit(np.ascontiguousarray(target.tips[:, :2])) - target.tips[:, 2]
-        order = np.flatnonzero(lift * target.normals[:, 2] <= 0.5 * promise.scallop)
-        order = order[np.argsort(t[order], kind="stable")]
-        self.t, self.strips, self.across = t[order], strips[order], across[order]
-        self.points, self.normals, self.tips = target.points[order], target.normals[order], target.tips[order]
-        self.spacing = target.spacing
-
-    @abstractmethod
-    def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
-        """The pass at t, over the tips within ``window`` mm of it (those of the samples ``only`` where given)."""
-
-    @property
-    def guess(self) -> float:
-        """A step to begin with, mm: what leaves the scallop on a level plane, just about."""
-        cutter = self.dragged.cutter
-        r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
-        h = min(self.promise.scallop, r)
-        return max(FLOOR, min(BEGIN * 2.0 * math.sqrt(max(2.0 * r * h - h * h, 0.0)), r))
-
-    @property
-    def step(self) -> float:
-        """Longest piece of a way before it is looked at, mm.
-
-        What stands out by c, the path's share of the chord, lifts the least circle of the cutter, radius r, over
-        2 sqrt(2 r c): as far apart are the quarters of a piece.
-        """
-        cutter = self.dragged.cutter
-        r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
-        if cutter.outline is not None:
-            arcs = cutter.outline.stack.rows[:, ARC]
-            r = float(arcs[arcs > 0.0].min(initial=cutter.radius))
-        return max(min(8.0 * math.sqrt(2.0 * r * 0.5 * KINK * self.promise.chord), 0.5 * r), 0.02)
-
-    def between(self, a: float, b: float) -> slice:
-        """Samples with a < t <= b."""
-        i, j = np.searchsorted(self.t, [a, b], side="right").tolist()
-        return slice(i, j)
-
-    def left(self, here: slice | I64, *passes: Envelope) -> tuple[F64, I64]:
-        """What passes leave in each strip across: (k,) mm and the k strips, of the samples ``here``."""
-        points, normals, strips = self.points[here], self.normals[here], self.strips[here]
-        if not len(points):
-            return np.zeros(0), np.zeros(0, np.int64)
-        up = np.minimum.reduce([e.heights(points[:, :2]) for e in passes]) - points[:, 2]
-        over = up * normals[:, 2]
-        order = np.lexsort((over, strips))
-        last = order[np.concatenate([np.diff(strips[order]) != 0, [True]])]
-        points, normals = points[last], normals[last]
-        worst = np.minimum.reduce([e.along(points, normals) for e in passes])
-        if len(passes) == 2:
-            worst = np.maximum(worst, self._crest(points, normals, self.across[here][last], *passes))
-        return worst - self.dragged.allowance, strips[last]
-
-    def _crest(self, points: F64, normals: F64, across: F64, a: Envelope, b: Envelope) -> F64:
-        """Height of the crest between two passes over the surface beside each point (n,), mm; -inf where none is near.
-
-        Across the passes the one envelope rises and the other falls; they are equal in one place, which is looked for
-        no farther from the sample than samples are apart.
-        """
-        most = np.full(len(points), 1.5 * self.spacing)
-
-        def places(w: F64, k: I64) -> F64:
-            return np.asarray(points[k, :2] + w[:, None] * across[k])
-
-        def apart(w: F64, k: I64) -> F64:
-            with np.errstate(invalid="ignore"):
-                apart = np.asarray(a.heights(places(w, k)) - b.heights(places(w, k)))
-            return np.where(np.isnan(apart), np.copysign(np.inf, w), apart)  # beside both
-
-        every = np.arange(len(points))
-        f_lo, f_hi = apart(-most, every), apart(most, every)
-        k = np.flatnonzero((f_lo < 0.0) & (f_hi > 0.0))
-        out = np.full(len(points), -np.inf)
-        w = roots(lambda x, which: apart(x, k[which]), -most[k], most[k], f_lo[k], f_hi[k], CREST)
-        xy = places(w, k)
-        ground = drop_tips(self.dragged.ground, xy, 0.0, 0.0)
-        # at the rim of a flat end an envelope jumps, and the crest is on one side of the jump
-        low = np.full(len(k), -np.inf)
-        for aside in (-2.0 * CREST, 2.0 * CREST):
-            beside = places(w + aside, k)
-            height = np.minimum(a.heights(beside), b.heights(beside))
-            low = np.where(np.isfinite(height), np.maximum(low, height), low)
-        # ground that is not the sample's own surface any more is a matter of the samples there
-        nz = normals[k, 2]
-        slope = np.sqrt(np.maximum(1.0 - nz**2, 0.0)) / np.maximum(nz, 1e-9)
-        own = np.abs(ground - points[k, 2]) <= (slope + 0.3) * np.abs(w) + 1e-3
-        with np.errstate(invalid="ignore"):
-            over = (low - ground) * nz
-        out[k] = np.where(own & np.isfinite(over), over, -np.inf)
-        return out
-
-    def envelope(self, p: Pass) -> Envelope:
-        """The swept envelope of a pass."""
-        return Envelope(p.lines, self.dragged.cutter)
-
-
-class Swath(Family):
-    """Straight passes along one direction of feed.
-
-    angle : rad, of the feed from x
-    """
-
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, angle: float) -> None:
-        # the ends of a quarter turn are exact, so that passes along an axis stay on a line of the program
-        c, s = round(math.cos(angle), 15), round(math.sin(angle), 15)
-        self.angle, self.feed, self.side = angle, np.array([c, s]), np.array([-s, c])
-        strips = np.floor((target.points[:, :2] @ self.feed) / strip_width(dragged, target)).astype(np.int64)
-        across = np.broadcast_to(self.side, (len(target.points), 2))
-        super().__init__(dragged, target, promise, target.tips[:, :2] @ self.side, strips, across)
-        self.s = self.tips[:, :2] @ self.feed
-
-    def subset(self, which: I64) -> Swath:
-        """The same with the samples ``which`` of the target alone."""
-        return Swath(self.dragged, self.target.subset(which), self.promise, self.angle)
-
-    def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
-        """As in ``Family``."""
-        i, j = np.searchsorted(self.t, [t - window, t + window]).tolist()
-        mine = np.arange(i, j) if only is None else i + np.flatnonzero(only[i:j])
-        mine = mine[np.argsort(self.s[mine], kind="stable")]
-        lines = self._lines(t, self.s[mine], self.tips[mine, 2] + CLIMB * window) if len(mine) else ()
-        return Pass(t, tuple(lines), only is None)
-
-    def _lines(self, t: float, s: F64, highest: F64) -> Iterator[F64]:
-        """The pass over tips at s (ascending); where it is above ``highest`` of them it is not at them."""
-        over = self.promise.overrun
-        join = max(self.dragged.cutter.radius, 3.0 * self.spacing)
-        for i, j in _runs(s, join + 2.0 * over):
-            way = t * self.side + np.array([[s[i] - over], [s[j - 1] + over]]) * self.feed
-            for piece in pieces(self.dragged.limit, way, self.step, self.promise.chord):
-                along = piece[:, :2] @ self.feed
-                k = np.arange(i, j)[(s[i:j] >= along[0] - self.spacing) & (s[i:j] <= along[-1] + self.spacing)]
-                k = k[np.interp(s[k], along, piece[:, 2]) <= highest[k]]
-                for a, b in _runs(s[k], join + 2.0 * over):
-                    lo, hi = max(s[k[a]] - over, along[0]), min(s[k[b - 1]] + over, along[-1])
-                    if hi > lo:
-                        yield _clipped(piece, along, float(lo), float(hi))
-
-
-def _runs(s: F64, gap: float) -> list[tuple[int, int]]:
-    """Half-open ranges of ascending places (n,) with no gap wider than this between neighbours."""
-    if not len(s):
-        return []
-    cuts = np.flatnonzero(np.diff(s) > gap) + 1
-    return list(zip([0, *cuts.tolist()], [*cuts.tolist(), len(s)], strict=True))
-
-
-def _clipped(path: F64, along: F64, lo: float, hi: float) -> F64:
-    """The part of a path (n, 3) whose places ``along`` (n,), ascending, lie between two."""
-    inside = path[(along > lo) & (along < hi)]
-    ends = np.array([[np.interp(s, along, path[:, c]) for c in range(3)] for s in (lo, hi)])
-    return np.vstack([ends[:1], inside, ends[1:]])
-
-
-def strip_width(dragged: Dragged, target: Target) -> float:
-    """Width of the strips in which what is left is looked at, mm."""
-    return max(1.5 * target.spacing, 0.1 * dragged.cutter.radius)
 
 
 @dataclass(frozen=True, eq=False)

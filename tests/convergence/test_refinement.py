@@ -14,8 +14,8 @@ from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense
 from toolpath.cutter import Cutter
+from toolpath.family import Dragged, Promise, Swath, Target
 from toolpath.levels import contours, thinned
-from toolpath.sidestep import Dragged, Promise, Swath, Target
 
 RADIUS = 12.0
 SHAPES = {

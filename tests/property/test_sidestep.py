@@ -14,7 +14,8 @@ from toolpath.cutter import Cutter
 from toolpath.direction import CANDIDATES, best_direction
 from toolpath.drop_cutter import drop_cutter
 from toolpath.envelope import Envelope
-from toolpath.sidestep import Dragged, Promise, Swath, Target, lay_out
+from toolpath.family import Dragged, Promise, Swath, Target
+from toolpath.sidestep import lay_out
 from toolpath.strategies.spiral import Rings, spiralled
 
 R = 1.5

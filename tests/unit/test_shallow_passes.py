@@ -11,7 +11,7 @@ from tests.hand_parts import SURFACES, ball, dome, field_of, terraces, tool
 from tests.plan_checks import dense
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
-from toolpath.sidestep import Promise, Target
+from toolpath.family import Promise, Target
 from toolpath.strategies import zigzag
 from toolpath.strategies.zigzag import Pattern
 from zones.reach import touchable

@@ -14,9 +14,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
+from toolpath.family import Dragged, Family, Pass, Promise, Target, strip_width
 from toolpath.follow import pieces
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
-from toolpath.sidestep import Dragged, Family, Pass, Promise, Target, strip_width
 from zones.reach import Lattice
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none

@@ -13,8 +13,9 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.direction import best_direction
+from toolpath.family import Dragged, Pass, Promise, Swath, Target
 from toolpath.levels import Line, dense, pieces_where
-from toolpath.sidestep import Dragged, Pass, Promise, Swath, Target, lay_out
+from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach import TipField
