@@ -3,6 +3,9 @@
 The passes of a zone are laid out by formula and then measured at the zone's samples; where more is left than
 the budget allows, passes are put in between, only there, each time half as far apart. So the narrowest spot
 never sets the step for a whole zone.
+
+A pass is left out where shank or holder would meet stock that other zones still have to take off. Once these are
+finished the zone gets another workingstep for what it lacks.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.levels import Line, dilated
 from toolpath.linking import FLUTE_SHARE, RAMP_SHARE, Linker, Motions, nearest_order
@@ -96,9 +100,9 @@ class Checks:
 class ZonePlan:
     """What was planned for a zone.
 
-    step     : id of its finishing workingstep, None where nothing could be planned
+    step     : id of its first finishing workingstep, None where nothing could be planned
     side_step: mm between passes as laid out
-    passes   : cutting passes between links
+    passes   : cutting passes between links, of all its workingsteps
     left     : (k,) indices into the zone's checks that the planner's own measure finds above the budget
     rejected : other patterns with their figures
     """
@@ -138,28 +142,32 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: Mappin
     Plan
     """
     steps: list[Workingstep] = []
-    plans: list[ZonePlan] = []
+    begun: list[_Finish] = []
     order = list(dict.fromkeys(z.tool.id for z in zones))
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     done = 0
+
+    def following() -> str:
+        return f"S{len(steps) + first_step:02d}"
+
     for tid in order:
         mine = [z for z in zones if z.tool.id == tid]
         field, cut = fields[tid], cut_data[tid]
         if settings.roughing:
-            step = _layers(mine, field, cut, stock, settings, f"S{len(steps) + first_step:02d}")
-            if step is not None:
-                steps.append(step)
+            step = _layers(mine, field, cut, stock, settings, following())
+            steps.extend([] if step is None else [step])
+        own: list[_Finish] = []
         for zone in mine:
             if settings.finishing:
-                name = f"S{len(steps) + first_step:02d}"
-                step, plan = _finish(zone, check_of[zone.id], field, cut, stock, settings, name)
-                if step is not None:
-                    steps.append(step)
-                plans.append(plan)
+                own.append(_Finish(zone, check_of[zone.id], field, cut, stock, settings))
+                steps.extend(own[-1].walk(following()))
             done += 1
             if progress is not None:
                 progress(done / max(len(zones), 1))
-    return Plan(tuple(steps), tuple(plans))
+        for f in own:
+            steps.extend(f.walk_again(following()))
+        begun.extend(own)
+    return Plan(tuple(steps), tuple(f.plan() for f in begun))
 
 
 def _motions(cut: CutData, settings: PlanSettings) -> Motions:
@@ -232,43 +240,93 @@ def _turned(line: Line, settings: PlanSettings) -> Line:
     return line if settings.climb or settings.either_way else line.reversed()
 
 
-def _finish(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock: StockMap,
-            settings: PlanSettings, step_id: str) -> tuple[Workingstep | None, ZonePlan]:
-    """The finishing workingstep of one zone."""
-    points, normals = checks.points, checks.normals
-    residual = ResidualMap(points + settings.stock_allowance * normals, normals,
-                           margin=1.5 * settings.scallop_height)
-    linker = Linker(field, stock, _motions(cut, settings))
-    strategy = _strategy(zone, checks, field, cut, settings)
-    name, spacing = strategy.name, strategy.side_step
-    thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
-    budget = PASS_SHARE * settings.scallop_height
-    skin, slope = SKIN * field.tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
-    failing = np.arange(len(points))
-    for k in range(REFINEMENTS + 2 if len(points) else 0):
-        groups = strategy.rounds(k, failing) if k <= REFINEMENTS else [spot.touches(field, checks.tips[failing])]
-        for lines in groups:
-            if name not in DRAGGED or k > REFINEMENTS:
-                lines = nearest_order(lines, linker.at, settings.either_way)
-            for line in lines:
-                if name not in DRAGGED:
-                    line = _turned(line, settings)
-                before = len(linker.trajectories)
-                for layer in zigzag.skimmed(line, stock, field.tool, skin, slope):
-                    linker.add(layer, thin)
-                for t in linker.trajectories[before:]:
-                    if t.motion is Motion.CUT:
-                        residual.cut(t.points, field.tool)
-        failing = np.flatnonzero(residual.residual > budget)
-        if not len(failing):
-            break
-    failing = np.flatnonzero(residual.residual > settings.scallop_height)
-    if not linker.passes:
-        return None, ZonePlan(zone, None, name, spacing, 0, failing, strategy.rejected)
-    faces = " ".join(f"F{f}" for f in zone.faces[:12])
-    step = _step(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing", name,
-                 field.tool, cut, spacing, linker, settings)
-    return step, ZonePlan(zone, step_id, name, spacing, linker.passes, failing, strategy.rejected)
+class _Finish:
+    """The finish of one zone: walked once, and once more where stock of other zones was in the way.
+
+    zone, checks, field, cut, stock, settings : as ``plan_job`` has them
+    """
+
+    def __init__(self, zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock: StockMap,
+                 settings: PlanSettings) -> None:
+        self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
+        self.given = len(checks.points)
+        if zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
+            checks = _bordered(checks, field, settings.lift)
+        self.checks = checks
+        self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
+                                    margin=1.5 * settings.scallop_height)
+        self.strategy = _strategy(zone, checks, field, cut, settings)
+        self.step: str | None = None
+        self.passes = 0
+        self.skipped = False
+
+    def walk(self, step_id: str, first: int = 0) -> list[Workingstep]:
+        """One workingstep of the rounds from ``first`` on; none where no pass is walked."""
+        linker = Linker(self.field, self.stock, _motions(self.cut, self.settings))
+        failing = self._above(PASS_SHARE * self.settings.scallop_height)
+        for k in range(first, REFINEMENTS + 2):
+            if not len(failing):
+                break
+            for lines in self._groups(k, failing):
+                self._add(linker, lines, k)
+            failing = self._above(PASS_SHARE * self.settings.scallop_height)
+        self.skipped = bool(linker.skipped)
+        if not linker.passes:
+            return []
+        zone, name = self.zone, self.strategy.name
+        self.step, self.passes = self.step or step_id, self.passes + linker.passes
+        faces = " ".join(f"F{f}" for f in zone.faces[:12])
+        return [_step(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing",
+                      name, self.field.tool, self.cut, self.strategy.side_step, linker, self.settings)]
+
+    def walk_again(self, step_id: str) -> list[Workingstep]:
+        """What the zone still lacks, where passes of it were left out and other zones were finished since."""
+        return self.walk(step_id, 1 if self.step else 0) if self.skipped else []
+
+    def plan(self) -> ZonePlan:
+        """What became of the zone."""
+        left = self._above(self.settings.scallop_height)
+        left = left[left < self.given]
+        return ZonePlan(self.zone, self.step, self.strategy.name, self.strategy.side_step, self.passes, left,
+                        self.strategy.rejected)
+
+    def _above(self, most: float) -> NDArray[np.int64]:
+        """Samples that have more than this left, mm."""
+        return np.flatnonzero(self.residual.residual > most)
+
+    def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        if k > REFINEMENTS:
+            return [spot.touches(self.field, self.checks.tips[failing])]
+        return self.strategy.rounds(k, failing)
+
+    def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
+        """Walk lines of round k and measure them."""
+        tool, settings, name = self.field.tool, self.settings, self.strategy.name
+        thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
+        skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
+        if name not in DRAGGED or k > REFINEMENTS:
+            lines = nearest_order(lines, linker.at, settings.either_way)
+        for line in lines:
+            if name not in DRAGGED:
+                line = _turned(line, settings)
+            before = len(linker.trajectories)
+            for layer in zigzag.skimmed(line, self.stock, tool, skin, slope):
+                linker.add(layer, thin)
+            for t in linker.trajectories[before:]:
+                if t.motion is Motion.CUT:
+                    self.residual.cut(t.points, tool)
+
+
+def _bordered(checks: Checks, field: TipField, lift: float) -> Checks:
+    """Checks with places up to the border of what the tool touches, after those given."""
+    points, normals, tips = beyond(field, checks.points, checks.normals, checks.spacing, lift)
+    return Checks(np.vstack([checks.points, points]), np.vstack([checks.normals, normals]),
+                  np.vstack([checks.tips, tips]), checks.spacing)
+
+
+def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
+    """Whether a zone is finished by a flat end that stands on it."""
+    return zone.form is Form.LEVEL and tool.radius > tool.corner_radius
 
 
 Rounds = Callable[[int, NDArray[np.int64]], list[list[Line]]]
@@ -303,13 +361,12 @@ def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
             return zlevel.waterlines(field, tips, levels, 1.001 * window, chord)
 
         return _Strategy("zlevel", step, waterlines)
-    flat = tool.radius - tool.corner_radius
-    if zone.form is Form.LEVEL and flat > 0:
+    if _has_floor(zone, tool):
 
         def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
             return floor.planes(field, checks.tips[failing], chord, k) if k <= floor.MOST_FINER else []
 
-        return _Strategy("floor", 1.6 * flat, planes)
+        return _Strategy("floor", 1.6 * (tool.radius - tool.corner_radius), planes)
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
     target = Target(checks.points, checks.normals, checks.tips, checks.spacing)
