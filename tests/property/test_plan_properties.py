@@ -128,6 +128,39 @@ def test_what_stock_of_another_zone_was_in_the_way_of_is_finished_after_that_zon
     assert left[0].max() > c.settings.scallop_height >= left[1].max()
 
 
+def hill(fixtures=()):
+    """A hill whose flanks lean by up to 62 degrees on a block with free edges."""
+    return plan_part(slope_field(lambda x, y: 6.0 * np.exp(-(x * x + y * y) / 8.0), n=80), [ball(3.0)], faces={2},
+                     fixtures=fixtures)
+
+
+def cut_by(c: Case, *strategies: str) -> list:
+    return [(s.tool, t.points) for s in c.plan.steps if s.strategy in strategies for t in s.trajectories
+            if t.motion is Motion.CUT]
+
+
+def test_steep_and_shallow_passes_overlap_where_they_meet():
+    c = hill()
+    fresh = sample_surface(c.part.mesh, 60.0, seed=99)
+    fresh = fresh.subset(fresh.face == 2)
+    fresh = fresh.subset(touchable(c.fields["T1"], fresh.points, fresh.normals, 0.002)[1])
+    h = c.settings.scallop_height
+    assert brute_residual(fresh.points, c.moves(Motion.CUT)).max() <= h
+    split = np.abs(np.degrees(np.arccos(fresh.normals[:, 2])) - 45.0) < 3.0  # waterlines from 45 degrees on
+    assert split.sum() > 400
+    for strategies in (("zigzag", "spiral"), ("zlevel",)):
+        alone = brute_residual(fresh.points[split], cut_by(c, *strategies))
+        assert (alone <= h).mean() > 0.99, strategies
+
+
+def test_passes_run_over_the_edge_unless_something_stands_there():
+    free, held = (np.vstack([p for _, p in cut_by(hill(f), "zigzag", "spiral")])
+                  for f in ((), (((6.0, -2.0, -3.0), (9.0, 2.0, 3.0)),)))
+    assert free[:, 0].max() > 6.25 and free[:, 0].min() < -6.25  # the feed is along x, the edges at 6 mm
+    beside = np.abs(held[:, 1]) < 2.0
+    assert held[beside, 0].max() == pytest.approx(4.5, abs=0.001) and held[~beside, 0].max() > 6.25
+
+
 def test_an_allowance_stays_on_the_part():
     c = case("walls with allowance")
     points = np.vstack([c.samples.points[z.samples] for z in c.zones])[::3]
