@@ -26,12 +26,14 @@ from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.toolbody import ToolBody  # noqa: E402
+from toolpath.border import beyond  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.direction import best_direction  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
 from toolpath.sidestep import lay_out  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
+from zones.reach import Clearances, TipField  # noqa: E402
 
 # Table A.1, uv 0.025: radius, scallop, then passes, tool positions and seconds on each surface
 PAPER = {
@@ -41,7 +43,9 @@ PAPER = {
 }
 SPACING = 0.05  # mm between the places that are judged
 FINER = 5.0  # facets of the tree against those that are measured
-MARGIN = 0.975  # of the scallop is laid out: samples are 0.14 mm apart, and the judge looks between them
+MARGIN = 0.98  # of the scallop is laid out: the judge looks between the samples
+APART = 0.1  # mm between those on the other surfaces, as in a job
+LIFT = 0.001  # mm within which a touch counts
 COMB = 0.01  # mm between the places a brute-force search may put a pass
 STEEPEST = 60.0  # degrees
 
@@ -71,13 +75,12 @@ def samples_of(surface: NurbsSurface, spacing: float) -> tuple[F64, F64]:
     return surface.points(uv), surface.normals(uv)
 
 
-def case(surface: NurbsSurface, radius: float, scallop: float, chord: float) -> Case:
-    """A surface made ready for a ball; facets within half of the chord."""
+def case(surface: NurbsSurface, radius: float, scallop: float, chord: float, spacing: float) -> Case:
+    """A surface made ready for a ball, samples ``spacing`` mm apart; facets within half of the chord."""
     # what facets are off falls with the square of their size: measured on larger ones, which takes seconds, not minutes
     large = steps_for_chord(surface, 0.5 * chord * FINER**2)
     deviation = facet_deviation(surface, surface.discretised(*large)).largest / FINER**2
     tree = TriangleTree(surface.discretised(large[0] / FINER, large[1] / FINER))
-    spacing = min(0.25, 0.35 * math.sqrt(8.0 * scallop * radius))
     points, normals = samples_of(surface, spacing)
     good = np.isfinite(normals).all(axis=1)
     points, normals = points[good], normals[good]
@@ -86,13 +89,17 @@ def case(surface: NurbsSurface, radius: float, scallop: float, chord: float) -> 
     return Case(surface, tree, target, Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree), deviation)
 
 
+def ball(radius: float) -> ToolBody:
+    """A ball with a straight shank and no holder."""
+    return ToolBody("T1", 1, 2.0 * radius, radius, 40.0, 2.0 * radius, 60.0, 2.0 * radius, 80.0)
+
+
 def left_by(passes: list[Pass], radius: float, points: F64, normals: F64) -> F64:
     """What a ball leaves on normals (n, 3) after passes: (n,) mm, by the verifier."""
-    tool = ToolBody("T1", 1, 2.0 * radius, radius, 40.0, 2.0 * radius, 60.0, 2.0 * radius, 80.0)
     lines = [line for p in passes for line in p.lines]
     start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
     moves = Moves(start, end, np.ones(len(start), np.bool_), np.zeros(len(start), np.int32))
-    return residual_on_normals(points, normals, np.full(len(points), 10.0), moves, [tool])[0]
+    return residual_on_normals(points, normals, np.full(len(points), 10.0), moves, [ball(radius)])[0]
 
 
 def thesis() -> None:
@@ -103,7 +110,7 @@ def thesis() -> None:
     rows = [(r, h) for r, h in PAPER] + [(1.5875, 0.005)]
     for kind in ("concave", "convex", "freeform"):
         for radius, h in rows:
-            c = case(thesis_surface(kind), radius, h, 0.0005)
+            c = case(thesis_surface(kind), radius, h, 0.0005, min(0.25, 0.35 * math.sqrt(8.0 * h * radius)))
             begin = time.perf_counter()
             passes = lay_out(Swath(c.dragged, c.target, Promise(h, 0.0005, 0.3 * radius, 10.0), 0.0), subdivide=False)
             seconds = time.perf_counter() - begin
@@ -152,9 +159,14 @@ def upright(surface: NurbsSurface) -> NurbsSurface | None:
     return turned if np.nanmin(lean) > math.cos(math.radians(STEEPEST)) and not good.size - good.sum() else None
 
 
-def reachable(c: Case, radius: float) -> np.ndarray:
-    """(n,) bool: samples the ball touches without entering the surface elsewhere, within 0.001 mm."""
-    return c.dragged.limit(np.ascontiguousarray(c.target.tips[:, :2])) <= c.target.tips[:, 2] + 0.001
+def reachable(c: Case) -> np.ndarray:
+    """(n,) bool: samples the ball touches without entering the surface elsewhere, within LIFT."""
+    return c.dragged.limit(np.ascontiguousarray(c.target.tips[:, :2])) <= c.target.tips[:, 2] + LIFT
+
+
+def field_of(c: Case, radius: float) -> TipField:
+    """Where the ball may go over the surface."""
+    return TipField(c.tree, ball(radius), Clearances(), c.tree.mesh.bounds, 2.0 * radius, 0.1)
 
 
 def fewest(c: Case, swath: Swath, radius: float, h: float, points: F64, normals: F64) -> int:
@@ -203,9 +215,9 @@ def others(count: int, folder: Path | None) -> None:
                             s[0].startswith(path.stem[:12]) for s in surfaces) < 3:
                         surfaces.append((f"{path.stem[:12]} F{number}", turned))
     for k, (name, surface) in enumerate(surfaces):
-        c = case(surface, radius, h, chord)
-        keep = np.flatnonzero(reachable(c, radius))
-        target = c.target.subset(keep)
+        c = case(surface, radius, h, chord, APART)
+        target = c.target.subset(np.flatnonzero(reachable(c)))
+        target = target.joined(beyond(field_of(c, radius), target, LIFT))
         promise = Promise(MARGIN * h, chord, 0.3 * radius, 10.0)
         begin = time.perf_counter()
         swath = Swath(c.dragged, target, promise, best_direction(c.dragged, target, promise))
@@ -213,7 +225,7 @@ def others(count: int, folder: Path | None) -> None:
         seconds = time.perf_counter() - begin
         points, normals = samples_of(surface, SPACING)
         tips = points + radius * normals - [0.0, 0.0, radius]
-        free = c.dragged.limit(np.ascontiguousarray(tips[:, :2])) <= tips[:, 2] + 0.001
+        free = c.dragged.limit(np.ascontiguousarray(tips[:, :2])) <= tips[:, 2] + LIFT
         points, normals = points[free], normals[free]
         left = left_by(passes, radius, points, normals)
         least = str(fewest(c, swath, radius, h, points[::7], normals[::7])) if k < 5 else ""

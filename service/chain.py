@@ -30,7 +30,8 @@ from service.preview import draw_preview
 from service.scoring import Score, score
 from service.sides import Side, file_name, in_first_frame, in_setup_frame, joined_proofs
 from service.version import VERSION
-from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
+from toolpath.family import Target
+from toolpath.plan import CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
 from toolpath.strategies.zigzag import Pattern
 from verify.model import ProofSetup, ScoredSamples
@@ -108,7 +109,7 @@ class _Share:
         self.progress(stage, self.low + self.width * share)
 
 
-def _side(ready: Prepared, view: View, scored: Score, checks: list[Checks], steps: int, share: _Share) -> Side:
+def _side(ready: Prepared, view: View, scored: Score, checks: list[Target], steps: int, share: _Share) -> Side:
     """Plan, write and prove the zones of one access. Each starts from the whole blank."""
     stock = planning_stock(ready, view)
     settings = plan_settings(ready, view, stock)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from geometry.keyed import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.prepare import Prepared, machinable_triangles
-from toolpath.plan import Checks, Plan
+from toolpath.family import Target
+from toolpath.plan import Plan
 from zones.machinable import forms_of
 from zones.reach import touchable
 from zones.regions import Labels
@@ -44,7 +45,7 @@ class Score:
     zone: NDArray[np.int32]
     tips: NDArray[np.float64]
 
-    def checks(self, ready: Prepared) -> list[Checks]:
+    def checks(self, ready: Prepared) -> list[Target]:
         """Per zone, what its passes are measured at: its samples here, and the borders of its faces."""
         out = []
         for k, z in enumerate(ready.zones, start=1):
@@ -52,7 +53,7 @@ class Score:
             border = ready.samples.area[z.samples] == 0
             edge = z.samples[border]
             here = turned_samples(self.samples.subset(mine), view.rotation @ ready.views[0].rotation.T)
-            out.append(Checks(np.vstack([here.points, view.samples.points[edge]]),
+            out.append(Target(np.vstack([here.points, view.samples.points[edge]]),
                               np.vstack([here.normals, view.samples.normals[edge]]),
                               np.vstack([self.tips[mine], z.tips[border]]), PROOF_DENSITY ** -0.5))
         return out

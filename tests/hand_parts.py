@@ -15,8 +15,9 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.toolbody import HolderSegment, ToolBody
+from toolpath.family import Target
 from toolpath.motion import Motion
-from toolpath.plan import Checks, CutData, Plan, PlanSettings, plan_job
+from toolpath.plan import CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
@@ -265,7 +266,7 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0
     settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either)
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
-    checks = [Checks(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
+    checks = [Target(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
     plan = plan_job(zones, checks, fields, cut, stock, settings)
     return Case(part, tree, samples, view, fields, zones, settings, before, plan)
 

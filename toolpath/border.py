@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from geometry.drop import drop_tips
 from geometry.mesh import F64
+from toolpath.family import Target
 from zones.reach import TipField, touchable
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them
@@ -21,31 +22,32 @@ SHARES = (1.5, 1.0, 0.5, 0.25)  # spacings, how far out a place is looked for
 OWN = 0.1  # mm per mm a place may be off the plane through its sample and still be of the same surface
 
 
-def beyond(field: TipField, points: F64, normals: F64, spacing: float, lift: float) -> tuple[F64, F64, F64]:
+def beyond(field: TipField, target: Target, lift: float) -> Target:
     """Places farther out than the outermost samples, as far as the tool as a whole still touches the same surface.
 
-    field           : TipField of the tool
-    points, normals : (n, 3) float64, mm and unit, n_z > 0; samples of an area
-    spacing         : mm, about, between neighbours
-    lift            : mm, distance along the normal within which a touch counts
+    field  : TipField of the tool
+    target : Target, n_z > 0
+    lift   : mm, distance along the normal within which a touch counts
 
     Returns
     -------
-    points, normals, tips : (m, 3) float64 each, mm and unit; no place where the area ends at an edge or a wall
+    Target
+        No place where the area ends at an edge or a wall.
     """
-    rim, way = _outwards(points, NEAR * spacing)
-    out = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
+    rim, way = _outwards(target.points, NEAR * target.spacing)
+    out = target.subset(np.zeros(0, np.int64))
     for share in SHARES:
         if not len(rim):
             break
-        xy = points[rim, :2] + share * spacing * way
+        far = share * target.spacing
+        points, normals = target.points[rim], target.normals[rim]
+        xy = points[:, :2] + far * way
         height = drop_tips(field.tree, xy, 0.0, 0.0)
-        n = normals[rim]
-        level = points[rim, 2] - share * spacing * (n[:, :2] * way).sum(axis=1) / n[:, 2]
-        own = np.flatnonzero(np.abs(height - level) <= OWN * share * spacing)
+        level = points[:, 2] - far * (normals[:, :2] * way).sum(axis=1) / normals[:, 2]
+        own = np.flatnonzero(np.abs(height - level) <= OWN * far)
         places = np.column_stack([xy, height])[own]
-        _, whole, tips = touchable(field, places, n[own], lift)
-        out = (np.vstack([out[0], places[whole]]), np.vstack([out[1], n[own][whole]]), np.vstack([out[2], tips[whole]]))
+        _, whole, tips = touchable(field, places, normals[own], lift)
+        out = out.joined(Target(places[whole], normals[own][whole], tips[whole], target.spacing))
         left = np.ones(len(rim), np.bool_)
         left[own[whole]] = False
         rim, way = rim[left], way[left]

@@ -51,9 +51,9 @@ class Dragged:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Samples to be finished.
+    """Samples to be finished, and what is left is measured at.
 
-    points, normals : (n, 3) float64, mm and unit, n_z > 0, out of the material
+    points, normals : (n, 3) float64, mm and unit, out of the material; n_z > 0 where passes are dragged
     tips            : (n, 3) float64, mm, an admissible tip that touches each
     spacing         : mm, about, between neighbours
     """
@@ -66,6 +66,11 @@ class Target:
     def subset(self, which: I64) -> Target:
         """The samples ``which`` alone."""
         return Target(self.points[which], self.normals[which], self.tips[which], self.spacing)
+
+    def joined(self, more: Target) -> Target:
+        """These samples and then others, apart as these."""
+        return Target(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
+                      np.vstack([self.tips, more.tips]), self.spacing)
 
 
 @dataclass(frozen=True)

@@ -82,21 +82,6 @@ class PlanSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Checks:
-    """Where a zone is measured: the samples it will be judged on.
-
-    points, normals : (k, 3) float64, mm and unit
-    tips            : (k, 3) float64, mm, an admissible tip that touches each
-    spacing         : mm, about, between neighbours
-    """
-
-    points: F64
-    normals: F64
-    tips: F64
-    spacing: float
-
-
-@dataclass(frozen=True, eq=False)
 class ZonePlan:
     """What was planned for a zone.
 
@@ -124,13 +109,13 @@ class Plan:
     zones: tuple[ZonePlan, ...]
 
 
-def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Checks], fields: Mapping[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
-    checks   : what each zone is measured at, in the order of the zones
+    checks   : what each zone is measured at and will be judged on, in the order of the zones
     fields   : TipField by tool id
     cut_data : CutData by tool id
     stock    : StockMap, lowered as the plan grows
@@ -246,12 +231,12 @@ class _Finish:
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them
     """
 
-    def __init__(self, zone: ZoneArea, checks: Checks, field: TipField, cut: CutData, stock: StockMap,
+    def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
                  settings: PlanSettings) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
-            checks = _bordered(checks, field, settings.lift)
+            checks = checks.joined(beyond(field, checks, settings.lift))
         self.checks = checks
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
                                     margin=1.5 * settings.scallop_height)
@@ -317,13 +302,6 @@ class _Finish:
                     self.residual.cut(t.points, tool)
 
 
-def _bordered(checks: Checks, field: TipField, lift: float) -> Checks:
-    """Checks with places up to the border of what the tool touches, after those given."""
-    points, normals, tips = beyond(field, checks.points, checks.normals, checks.spacing, lift)
-    return Checks(np.vstack([checks.points, points]), np.vstack([checks.normals, normals]),
-                  np.vstack([checks.tips, tips]), checks.spacing)
-
-
 def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
     """Whether a zone is finished by a flat end that stands on it."""
     return zone.form is Form.LEVEL and tool.radius > tool.corner_radius
@@ -343,7 +321,7 @@ class _Strategy:
     rejected: tuple[dict[str, object], ...] = ()
 
 
-def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
+def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
               settings: PlanSettings) -> _Strategy:
     """How a zone is finished."""
     tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
@@ -369,8 +347,7 @@ def _strategy(zone: ZoneArea, checks: Checks, field: TipField, cut: CutData,
         return _Strategy("floor", 1.6 * (tool.radius - tool.corner_radius), planes)
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
-    target = Target(checks.points, checks.normals, checks.tips, checks.spacing)
-    layout = zigzag.laid(field, target, promise, settings.pattern, settings.climb or settings.either_way)
+    layout = zigzag.laid(field, checks, promise, settings.pattern, settings.climb or settings.either_way)
 
     def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         return [list(layout.lines) if k == 0 else layout.between(k, failing)]

@@ -11,8 +11,9 @@ from scipy.spatial import cKDTree
 
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
+from toolpath.family import Target
 from toolpath.motion import Motion
-from toolpath.plan import Checks, CutData, PlanSettings, plan_job
+from toolpath.plan import CutData, PlanSettings, plan_job
 from toolpath.stock import StockMap
 from zones.machinable import Form
 
@@ -44,7 +45,7 @@ def replanned(c: Case, stock: StockMap | None = None, checks=None, cut=None, pro
     work = StockMap(before.lattice, before.top.copy(), before.cover.copy(), before.part)
     settings: PlanSettings = replace(c.settings, **changes)
     cut = cut or {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
-    checks = checks or [Checks(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
+    checks = checks or [Target(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
     plan = plan_job(c.zones, checks, c.fields, cut, work, settings, progress)
     return replace(c, settings=settings, stock_before=before, plan=plan)
 
@@ -192,7 +193,7 @@ def test_what_no_pass_gets_to_is_told_and_nothing_else():
     for z in c.zones:
         points, normals = c.samples.points[z.samples].copy(), c.samples.normals[z.samples]
         points[buried] -= 0.2 * normals[buried]  # asked for, but inside the part
-        checks.append(Checks(points, normals, z.tips, 0.2))
+        checks.append(Target(points, normals, z.tips, 0.2))
     again = replanned(c, checks=checks)
     moves = again.moves(Motion.CUT)
     for p, check in zip(again.plan.zones, checks, strict=True):
