@@ -24,6 +24,7 @@ from toolpath.roots import roots
 
 OUTWARDS = 12  # steps along a normal until the envelope is passed
 
+
 class Envelope:
     """The lower envelope of a cutter along polylines.
 
@@ -47,7 +48,7 @@ class Envelope:
         return -drop_cutter(self.tree, self.cutter, xy)
 
     def along(self, points: F64, normals: F64) -> F64:
-        """Distance from each point along its normal to the envelope; the smallest where there are several.
+        """Distance from each point along its normal to the envelope; where it is crossed more than once, to one crossing.
 
         points, normals : (n, 3) float64, mm and unit, n_z > 0
 
