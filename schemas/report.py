@@ -30,8 +30,12 @@ class PlannedZone(ZoneFacts):
     """A zone with the figures of its passes and of the proof."""
 
     passes: Annotated[int | None, Field(description="Cutting passes of the finishing strategy between links.")] = None
-    cutting_length_mm: float | None = None
-    machining_time_s: float | None = None
+    cutting_length_mm: Annotated[float | None, Field(description="Of all its workingsteps.")] = None
+    machining_time_s: Annotated[float | None, Field(description="Of all its workingsteps.")] = None
+    step: Annotated[str | None, Field(description="The first of `steps`.")] = None
+    steps: Annotated[list[str], Field(description="Its finishing workingsteps in machining order: none where nothing "
+                                                  "could be planned, a second one where stock of another zone was in "
+                                                  "the way of the first.")] = []
     scallop_mm: ScallopFacts | None = None
     gouge_mm: float | None = None
     coverage: Share | None = None

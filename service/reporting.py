@@ -222,13 +222,13 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
     result = proof.zones.get(zone.id)
     mine = [s for s in steps.values() if s.zone == zone.id]
     out["scallop_mm"] = {"requested": ready.setup.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
-    out["passes"], out["cutting_length_mm"], out["machining_time_s"] = 0, 0.0, 0.0
+    out["passes"], out["cutting_length_mm"], out["machining_time_s"], out["steps"] = 0, 0.0, 0.0, []
     if plan is not None:
         out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes,
                    rejected=[*out["rejected"], *plan.rejected])
     if mine:
         out.update(cutting_length_mm=r(sum(map(cutting_length, mine)), 1), step=mine[0].id,
-                   machining_time_s=r(sum(map(step_time, mine)), 1))
+                   machining_time_s=r(sum(map(step_time, mine)), 1), steps=[s.id for s in mine])
     if result is not None:
         out["scallop_mm"] |= {"p50": r(result.scallop_p50, 5), "p99": r(result.scallop_p99, 5),
                               "max": r(result.scallop_max, 5)}

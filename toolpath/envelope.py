@@ -48,7 +48,7 @@ class Envelope:
         return -drop_cutter(self.tree, self.cutter, xy)
 
     def along(self, points: F64, normals: F64) -> F64:
-        """Distance from each point along its normal to the envelope; where it is crossed more than once, to one crossing.
+        """Distance from each point along its normal to the envelope; to one crossing where there are several.
 
         points, normals : (n, 3) float64, mm and unit, n_z > 0
 

@@ -4,8 +4,9 @@ The passes of a zone are laid out by formula and then measured at the zone's sam
 the budget allows, passes are put in between, only there, each time half as far apart. So the narrowest spot
 never sets the step for a whole zone.
 
-A pass is left out where shank or holder would meet stock that other zones still have to take off. Once these are
-finished the zone gets another workingstep for what it lacks.
+A pass is left out where shank or holder would meet stock that other zones still have to take off. Once that stock is
+gone the zone gets another workingstep for what it lacks: after the other zones of its tool, and, where more than the
+scallop is left, after the last tool.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+AGAIN_SHARE = 0.95  # of the progress, before zones are gone over again
+BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
 LATTICE_CARE = 1.5
 
@@ -148,10 +151,14 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
                 steps.extend(own[-1].walk(following()))
             done += 1
             if progress is not None:
-                progress(done / max(len(zones), 1))
+                progress(AGAIN_SHARE * done / len(zones))
         for f in own:
-            steps.extend(f.walk_again(following()))
+            steps.extend(f.walk_again(following(), PASS_SHARE * settings.scallop_height))
         begun.extend(own)
+    for f in begun:  # stock that took another tool to get away: worth changing back for what would stay otherwise
+        steps.extend(f.walk_again(following(), settings.scallop_height))
+    if progress is not None:
+        progress(1.0)
     return Plan(tuple(steps), tuple(f.plan() for f in begun))
 
 
@@ -226,7 +233,7 @@ def _turned(line: Line, settings: PlanSettings) -> Line:
 
 
 class _Finish:
-    """The finish of one zone: walked once, and once more where stock of other zones was in the way.
+    """The finish of one zone: walked once, and again where stock was in the way that is gone since.
 
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them
     """
@@ -235,27 +242,41 @@ class _Finish:
                  settings: PlanSettings) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
-        if zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
-            checks = checks.joined(beyond(field, checks, settings.lift))
+        if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
+            r = field.tool.corner_radius or field.tool.radius
+            checks = checks.joined(beyond(field, checks, settings.lift, BORDER_SHARE * math.sqrt(
+                8.0 * settings.scallop_height * r), zone.faces))
         self.checks = checks
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
                                     margin=1.5 * settings.scallop_height)
         self.strategy = _strategy(zone, checks, field, cut, settings)
         self.step: str | None = None
         self.passes = 0
-        self.skipped = False
+        self.met = np.zeros(len(checks.points), np.bool_)
 
-    def walk(self, step_id: str, first: int = 0) -> list[Workingstep]:
-        """One workingstep of the rounds from ``first`` on; none where no pass is walked."""
+    def walk(self, step_id: str) -> list[Workingstep]:
+        """The workingstep of the zone; none where no pass is walked."""
+        return self._rounds(step_id, np.ones(len(self.checks.points), np.bool_))
+
+    def walk_again(self, step_id: str, least: float) -> list[Workingstep]:
+        """A workingstep for samples with more than ``least`` mm left at which stock was in the way that is gone now."""
+        k = np.flatnonzero(self.met & (self.residual.residual > least))
+        freed = np.zeros(len(self.met), np.bool_)
+        freed[k] = ~self.stock.meets_bodies(self.checks.tips[k], self.field.discs)
+        return self._rounds(step_id, freed)
+
+    def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
+        """All rounds for the samples ``wanted``, as one workingstep."""
         linker = Linker(self.field, self.stock, _motions(self.cut, self.settings))
-        failing = self._above(PASS_SHARE * self.settings.scallop_height)
-        for k in range(first, REFINEMENTS + 2):
+        budget = PASS_SHARE * self.settings.scallop_height
+        failing = np.flatnonzero(wanted & (self.residual.residual > budget))
+        for k in range(REFINEMENTS + 2):
             if not len(failing):
                 break
             for lines in self._groups(k, failing):
                 self._add(linker, lines, k)
-            failing = self._above(PASS_SHARE * self.settings.scallop_height)
-        self.skipped = bool(linker.skipped)
+            failing = np.flatnonzero(wanted & (self.residual.residual > budget))
+        self.met[failing] = self.stock.meets_bodies(self.checks.tips[failing], self.field.discs)
         if not linker.passes:
             return []
         zone, name = self.zone, self.strategy.name
@@ -264,20 +285,11 @@ class _Finish:
         return [_step(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing",
                       name, self.field.tool, self.cut, self.strategy.side_step, linker, self.settings)]
 
-    def walk_again(self, step_id: str) -> list[Workingstep]:
-        """What the zone still lacks, where passes of it were left out and other zones were finished since."""
-        return self.walk(step_id, 1 if self.step else 0) if self.skipped else []
-
     def plan(self) -> ZonePlan:
         """What became of the zone."""
-        left = self._above(self.settings.scallop_height)
-        left = left[left < self.given]
+        left = np.flatnonzero(self.residual.residual[:self.given] > self.settings.scallop_height)
         return ZonePlan(self.zone, self.step, self.strategy.name, self.strategy.side_step, self.passes, left,
                         self.strategy.rejected)
-
-    def _above(self, most: float) -> NDArray[np.int64]:
-        """Samples that have more than this left, mm."""
-        return np.flatnonzero(self.residual.residual > most)
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
@@ -350,7 +362,9 @@ def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
     layout = zigzag.laid(field, checks, promise, settings.pattern, settings.climb or settings.either_way)
 
     def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-        return [list(layout.lines) if k == 0 else layout.between(k, failing)]
+        if k:
+            return [layout.between(k, failing)]
+        return [list(layout.lines) if len(failing) == len(checks.points) else layout.near(failing)]
 
     return _Strategy(str(layout.pattern), layout.side_step, dragged, tuple(
         {"strategy": str(other), "reason": "more way, links counted", "value": round(way, 1),

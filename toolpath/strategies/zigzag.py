@@ -8,6 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
@@ -64,6 +65,17 @@ class Layout:
         usual = float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
         return max(usual, LEAST_STEP)
 
+    def near(self, failing: NDArray[np.int64]) -> list[Line]:
+        """The lines as far as they serve some samples of the area (indices): a side step round their tips."""
+        tips = cKDTree(self.swath.target.tips[failing, :2])
+        out: list[Line] = []
+        for line in self.lines:
+            way = Line(dense(line.points, self.swath.target.spacing), line.closed)
+            served = tips.query(way.points[:, :2])[0] <= self.side_step
+            promise = self.swath.promise
+            out.extend(pieces_where(way, served, promise.overrun, promise.link))
+        return out
+
     def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
         """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.
 
@@ -102,7 +114,7 @@ def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = P
         straight = one_way(passes, climb) if pattern is Pattern.ONE_WAY else to_and_fro(passes)
         kind = Pattern.ONE_WAY if pattern is Pattern.ONE_WAY else Pattern.ZIGZAG
         made.append(_layout(kind, swath, [p.at for p in passes if p.whole], straight, climb))
-    if pattern is Pattern.SPIRAL or (pattern is Pattern.AUTO and _of_a_piece(made[0])):
+    if len(swath.t) and (pattern is Pattern.SPIRAL or (pattern is Pattern.AUTO and _of_a_piece(made[0]))):
         rings = Rings(dragged, target, promise)
         places = [p.at for p in lay_out(rings, subdivide=False)]
         turns = [Line(p, False) for p in spiralled(rings, places, climb)]
