@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,6 +127,7 @@ class Family(ABC):
         self.t, self.strips, self.across = t[order], strips[order], across[order]
         self.points, self.normals, self.tips = target.points[order], target.normals[order], target.tips[order]
         self.spacing = target.spacing
+        self._seen: WeakKeyDictionary[Envelope, F64] = WeakKeyDictionary()
 
     @abstractmethod
     def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
@@ -163,7 +165,7 @@ class Family(ABC):
         points, normals, strips = self.points[here], self.normals[here], self.strips[here]
         if not len(points):
             return np.zeros(0), np.zeros(0, np.int64)
-        up = np.minimum.reduce([e.heights(points[:, :2]) for e in passes]) - points[:, 2]
+        up = np.minimum.reduce([self._over(e, here) for e in passes]) - points[:, 2]
         over = up * normals[:, 2]
         order = np.lexsort((over, strips))
         last = order[np.concatenate([np.diff(strips[order]) != 0, [True]])]
@@ -172,6 +174,14 @@ class Family(ABC):
         if len(passes) == 2:
             worst = np.maximum(worst, self._crest(points, normals, self.across[here][last], *passes))
         return worst - self.dragged.allowance, strips[last]
+
+    def _over(self, envelope: Envelope, here: slice | I64) -> F64:
+        """Envelope over the samples ``here``, mm; kept, for every trial of a step asks the pass before it again."""
+        seen = self._seen.setdefault(envelope, np.full(len(self.points), np.nan))
+        which = np.arange(len(self.points))[here]
+        new = which[np.isnan(seen[which])]
+        seen[new] = envelope.heights(self.points[new, :2])
+        return np.asarray(seen[which])
 
     def _crest(self, points: F64, normals: F64, across: F64, a: Envelope, b: Envelope) -> F64:
         """Height of the crest between two passes over the surface beside each point (n,), mm; -inf where none is near.
