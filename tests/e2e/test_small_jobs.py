@@ -76,6 +76,29 @@ def test_roughing_alone_is_proved_and_the_rest_is_named(part, tmp_path):
     assert left == pytest.approx(missing * report["machinable_area_mm2"], rel=0.02) and left > 100
 
 
+def test_a_zone_that_is_gone_over_again_is_proved_and_written_as_two_workingsteps(tmp_path):
+    # shank and holder come down beside a low wall while stock of the high one's zones still stands there
+    def box(x, y, z, at):
+        return cq.Workplane().box(x, y, z, centered=False).translate(at)
+
+    part = write_step(box(14, 8.5, 2, (0, 0, 0)).union(box(1.5, 5.5, 4, (3, 1.5, 2)))
+                      .union(box(1.5, 5.5, 2.5, (9.5, 1.5, 2))), tmp_path / "walls.step")
+    tool = {"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 3, "neck_diameter_mm": 2.85,
+            "neck_length_mm": 3, "shank_diameter_mm": 4, "stickout_mm": 5,
+            "holder": [{"diameter_mm": 12, "diameter_top_mm": 20, "length_mm": 8}]}
+    setup = {"tools": [tool], "quality": {"scallop_height_mm": 0.03}, "stock": {"margin_mm": 1, "uncertainty_mm": 0}}
+    got = run("plan", part, tmp_path, setup, "--out", str(tmp_path / "out"))
+    report = json.loads(got.stdout)
+    steps = {s["id"]: s for s in report["steps"]}
+    (twice,) = [z for z in report["zones"] if len(z["steps"]) > 1]
+    assert got.exit_code == 0 and report["state"] == "proved" and list(steps) == sorted(steps)
+    assert twice["step"] == twice["steps"][0] and all(steps[i]["zone"] == twice["id"] for i in twice["steps"])
+    total = sum(steps[i]["machining_time_s"] for i in twice["steps"])
+    assert twice["machining_time_s"] == pytest.approx(total, abs=0.11)
+    written = (tmp_path / "out" / "job.arm.stpnc").read_text()
+    assert all(f"'{i} {twice['id']} " in written for i in twice["steps"])
+
+
 @pytest.mark.parametrize("fault", ["unproved", "bad part", "bad setup"])
 def test_no_program_of_an_earlier_job_stays_beside_a_later_answer(part, tmp_path, fault):
     out = tmp_path / "out"
