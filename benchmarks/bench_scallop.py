@@ -43,8 +43,7 @@ PAPER = {
 }
 SPACING = 0.05  # mm between the places that are judged
 FINER = 5.0  # facets of the tree against those that are measured
-MARGIN = 0.98  # of the scallop is laid out: the judge looks between the samples
-APART = 0.1  # mm between those on the other surfaces, as in a job
+APART = 0.1  # mm between samples on the other surfaces, as in a job
 LIFT = 0.001  # mm within which a touch counts
 COMB = 0.01  # mm between the places a brute-force search may put a pass
 STEEPEST = 60.0  # degrees
@@ -224,7 +223,7 @@ def others(count: int, folder: Path | None) -> None:
             print(f"{name:22} the ball touches {len(target.points)} of {len(c.target.points)} samples: left out")
             continue
         target = target.joined(beyond(field_of(c, radius), target, LIFT))
-        promise = Promise(MARGIN * h, chord, 0.3 * radius, 10.0)
+        promise = Promise(h - c.deviation, chord, 0.3 * radius, 10.0)  # as above
         begin = time.perf_counter()
         swath = Swath(c.dragged, target, promise, best_direction(c.dragged, target, promise))
         passes = lay_out(swath, subdivide=False)
