@@ -57,7 +57,7 @@ class CellGrid:
     first: NDArray[np.int64]
 
     @classmethod
-    def build(cls, points: F64, size: float = 0.6) -> CellGrid:
+    def build(cls, points: F64, size: float = 0.35) -> CellGrid:
         """Sort (n, 3) points in mm into cells of about ``size`` mm, coarser where that needs over 4 M cells."""
         lower, upper = points.min(axis=0), points.max(axis=0)
         extent = np.maximum(upper - lower, 1e-6)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from verify.kernels.sweep import capsule_start, cutter_interval
@@ -73,10 +74,21 @@ def _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, 
     """Lower the residual of sample i by move m."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
     left = residual[i]
-    if _flank_bound(x, y, normals[i, 0], normals[i, 1], ax, ay, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
-        return
-    if _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
-        return
+    if corner >= radius - 1e-12 and z < min(az, az + dz) + corner:
+        # under every equator a ball is as far as its sphere: squares decide most pairs
+        wx, wy, wz = x - ax, y - ay, z - az - corner
+        space2 = plan2 + dz * dz
+        if space2 > 0.0:
+            s = min(max((wx * dx + wy * dy + wz * dz) / space2, 0.0), 1.0)
+            wx, wy, wz = wx - s * dx, wy - s * dy, wz - s * dz
+        far = radius + max(left, 0.0) + TOUCH
+        if wx * wx + wy * wy + wz * wz > far * far:
+            return
+    else:
+        if _flank_bound(x, y, normals[i, 0], normals[i, 1], ax, ay, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
+            return
+        if _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
+            return
     nz = normals[i, 2]
     if corner >= radius - 1e-12 and nz >= 0.0 and z + nz * left < min(az, az + dz) + min(corner, length - corner):
         # the ray meets the ball below its equator first: one root decides nearly all pairs
@@ -108,10 +120,17 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
     """
     half = 0.5 * math.sqrt(2.0) * size
     pad = 0.0
+    # lowest cell of each column that holds samples and the one after the highest: a surface fills few of them
+    span = np.zeros((cx1 - cx0, cy1 - cy0, 2), np.int64)
     for cx in range(cx0, cx1):
         for cy in range(cy0, cy1):
-            for c in range((cx * shape[1] + cy) * shape[2], (cx * shape[1] + cy + 1) * shape[2]):
-                pad = max(pad, left[c])
+            row = (cx * shape[1] + cy) * shape[2]
+            low, high = shape[2], 0
+            for k in range(shape[2]):
+                if first[row + k] < first[row + k + 1]:
+                    low, high = min(low, k), k + 1
+                    pad = max(pad, left[row + k])
+            span[cx - cx0, cy - cy0, 0], span[cx - cx0, cy - cy0, 1] = low, high
     for m in range(len(starts)):
         if not feeds[m]:
             continue
@@ -131,13 +150,14 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
         for cx in range(x0, x1 + 1):
             for cy in range(y0, y1 + 1):
                 row = (cx * shape[1] + cy) * shape[2]
-                if first[row + z0] == first[row + z1 + 1]:
+                low, high = max(z0, span[cx - cx0, cy - cy0, 0]), min(z1 + 1, span[cx - cx0, cy - cy0, 1])
+                if low >= high:
                     continue
                 px, py = origin[0] + (cx + 0.5) * size, origin[1] + (cy + 0.5) * size
                 side = plan_distance(px, py, ax, ay, dx, dy, plan2) - half - radius
                 if side > pad:
                     continue
-                for c in range(row + z0, row + z1 + 1):
+                for c in range(row + low, row + high):
                     if first[c] == first[c + 1] or side > left[c] + TOUCH:
                         continue
                     pz = origin[2] + (c - row + 0.5) * size
