@@ -8,6 +8,8 @@ Blocks are independent, and within one every line sees the moves in order.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -54,12 +56,24 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
+    flat, plan2 = radius - corner, d[0] * d[0] + d[1] * d[1]
+    along = 1.0 / plan2 if plan2 > 0.0 else 0.0
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
-            if height[i, j] <= floor and fixed[i, j] <= floor:
+            over = max(height[i, j], fixed[i, j]) - floor
+            if over <= 0.0:
                 continue
             y = origin[1] + (j + 0.5) * step
+            # a cutter is no lower over a line than its lowest tip would be from as near as it comes in plan
+            wx, wy = x - a[0], y - a[1]
+            s = min(max((wx * d[0] + wy * d[1]) * along, 0.0), 1.0)
+            wx, wy = wx - s * d[0], wy - s * d[1]
+            reach = radius
+            if over < corner:
+                reach = flat + math.sqrt(over * (2.0 * corner - over))
+            if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
+                continue
             low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
             if fixed[i, j] > low + 1e-3:
                 _worse(best, CUTTER + FIXTURE, fixed[i, j] - low, 0.0, x, y, low)
