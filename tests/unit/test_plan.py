@@ -15,6 +15,7 @@ from toolpath.family import Target
 from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, CutData, PlanSettings, plan_job
 from toolpath.stock import StockMap
+from toolpath.strategies.zigzag import Pattern
 from zones.machinable import Form
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it
@@ -182,6 +183,15 @@ def test_nothing_to_machine_makes_an_empty_plan():
     c = case("corner")
     plan = plan_job([], [], c.fields, CUT, c.stock_before, c.settings)
     assert plan.steps == () and plan.zones == ()
+
+
+@pytest.mark.parametrize("pattern", Pattern)
+def test_zones_no_sample_of_which_is_judged_get_no_passes(pattern):
+    c = case("dome")
+    none = [Target(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.2) for _ in c.zones]
+    again = replanned(c, checks=none, pattern=pattern, roughing=False)
+    assert again.plan.steps == ()
+    assert all(p.step is None and p.passes == 0 and not len(p.left) for p in again.plan.zones)
 
 
 # -- what is left -------------------------------------------------------------------------------------------------
