@@ -16,10 +16,8 @@ from scipy.spatial import cKDTree
 
 from geometry.drop import drop_contacts
 from geometry.mesh import F64
-from toolpath.family import Target
+from toolpath.family import I64, Target
 from zones.reach import TipField, touchable
-
-I64 = NDArray[np.int64]
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them
 OPEN = np.radians(135.0)  # a sample with no neighbour over this angle is at the border
@@ -51,6 +49,8 @@ def beyond(field: TipField, target: Target, lift: float, apart: float = 0.0,
     s = target.spacing
     step = min(max(apart, FINEST * s), COARSEST * s)
     rim = target.points[_rim(target.points, NEAR * s), :2]
+    if not len(rim):
+        return none
     node = _nodes(rim, step, FAR * s + 2.0 * step)  # two more, so that every node up to FAR has its neighbours
     distance, nearest = cKDTree(target.points[:, :2]).query(node * step)
     free = np.flatnonzero((distance > SERVED * s) & (distance <= FAR * s))
@@ -102,7 +102,7 @@ def _nodes(xy: F64, step: float, far: float) -> I64:
 
 def _surrounded(node: I64, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(n,) bool: of nodes (n, 2), in order, those whose eight neighbours are all ``inside``."""
-    low, wide = node.min(axis=0, initial=0) - 1, int(np.ptp(node[:, 1])) + 3 if len(node) else 1
+    low, wide = node.min(axis=0) - 1, int(np.ptp(node[:, 1])) + 3
     key = (node[:, 0] - low[0]) * wide + node[:, 1] - low[1]
     known = key[inside]
     out = np.ones(len(node), np.bool_)

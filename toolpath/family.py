@@ -177,7 +177,9 @@ class Family(ABC):
 
     def _over(self, envelope: Envelope, here: slice | I64) -> F64:
         """Envelope over the samples ``here``, mm; kept, for every trial of a step asks the pass before it again."""
-        seen = self._seen.setdefault(envelope, np.full(len(self.points), np.nan))
+        seen = self._seen.get(envelope)
+        if seen is None:
+            seen = self._seen[envelope] = np.full(len(self.points), np.nan)
         which = np.arange(len(self.points))[here]
         new = which[np.isnan(seen[which])]
         seen[new] = envelope.heights(self.points[new, :2])
