@@ -3,7 +3,8 @@
 The residual of a sample is the least distance along its normal at which any move's swept cutting part
 begins, counted only if that part comes from outside (its interval on the ray ends at or beyond the
 surface: a tool behind a thin wall does not count). Negative is a gouge. Closed forms for ball and flat
-ends, Newton to 1e-9 mm for a torus corner; nothing is rasterised, so the error does not depend on a grid.
+ends, Newton to 1e-9 mm for a torus corner; nothing is rasterised, so the error does not depend on a grid. A tool that
+leans is the same in its own frame; one that turns is so on short pieces of the move (``verify.kernels.pose``).
 """
 
 from __future__ import annotations
@@ -19,10 +20,15 @@ from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
 from geometry.toolbody import ToolBody
 from verify.kernels.rays import cut_tile
+from verify.kernels.turned import cut_chunk
+from verify.pointtree import PointTree
+from verify.toolaxes import ToolAxes
 
 Progress = Callable[[float], None]
 MAX_CELLS = 4_000_000
 TILES = 12
+BOW = 5e-4
+"""mm, how far a turning tool may be from where the pieces of its moves take it to be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +38,14 @@ class Moves:
     start, end : (m, 3) float64, mm
     feed       : (m,) bool, False for a rapid
     tool       : (m,) int32, row in the sequence of tools the moves belong to
+    axes       : of the tool, None where all are +Z
     """
 
     start: F64
     end: F64
     feed: NDArray[np.bool_]
     tool: I32
+    axes: ToolAxes | None = None
 
     def __len__(self) -> int:
         return len(self.start)
@@ -115,13 +123,14 @@ def run_tiles(jobs: Sequence[Callable[[], object]], threads: int, progress: Prog
 
 
 def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, tools: Sequence[ToolBody],
-                        *, threads: int = 2, progress: Progress | None = None) -> tuple[F64, I32]:
+                        *, threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> tuple[F64, I32]:
     """Remaining material along each normal after all feed moves.
 
     points, normals : (n, 3) float64, mm and unit, setup frame, normals out of the material
     initial         : (n,) float64, mm of stock on each normal before the first move
     moves           : Moves; tools : the tools their ``tool`` column refers to
     threads         : the result has the same bytes for any number
+    bow             : mm, error allowed where the tool turns
 
     Returns
     -------
@@ -135,12 +144,15 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
 
     Notes
     -----
-    Error below 1e-8 mm for coordinates under 1 m: roots of quadratics, and Newton stopped at 1e-9 mm.
+    Error below 1e-8 mm for coordinates under 1 m: roots of quadratics, and Newton stopped at 1e-9 mm. Where the tool
+    turns, the surface it sweeps is off by ``bow`` at most.
     """
     n = len(points)
     residual, mover = np.array(initial, dtype=np.float64), np.full(n, -1, np.int32)
     if n == 0 or len(moves) == 0:
         return residual, mover
+    if moves.axes is not None:
+        return _turned(points, normals, residual, moves, moves.axes, tools, threads, progress, bow)
     grid = CellGrid.build(points)
     pts, nrm = np.ascontiguousarray(points[grid.order]), np.ascontiguousarray(normals[grid.order])
     work, who = residual[grid.order], np.full(n, -1, np.int32)
@@ -157,4 +169,24 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
 
     run_tiles([job(t) for t in grid.tiles()], threads, progress)
     residual[grid.order], mover[grid.order] = work, who
+    return residual, mover
+
+
+def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBody],
+            threads: int, progress: Progress | None, bow: float) -> tuple[F64, I32]:
+    """``residual_on_normals`` for tools that lean or turn."""
+    tree = PointTree.build(points)
+    pts, nrm = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(normals[tree.order])
+    work, who = residual[tree.order], np.full(len(points), -1, np.int32)
+    cutters = cutter_table(tools)
+    reach = np.hypot(cutters[:, 0], cutters[:, 2])
+    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+
+    def job(chunk: int) -> Callable[[], object]:
+        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, who, start, end, axes.axis, axes.about,
+                                 axes.angle, moves.feed, moves.tool, cutters, reach, bow)
+
+    run_tiles([job(c) for c in range(tree.chunks)], threads, progress)
+    mover = np.empty(len(points), np.int32)
+    residual[tree.order], mover[tree.order] = work, who
     return residual, mover

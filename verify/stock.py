@@ -236,7 +236,7 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
         return work
 
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
-    events, lost = _gather(run_tiles([job(*b) for b in blocks], threads, progress))
+    events, lost = gather(run_tiles([job(*b) for b in blocks], threads, progress))
     return StockPass(events, lost, cut.astype(bool))
 
 
@@ -260,10 +260,10 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
             return events[:min(n, EVENTS)].copy(), n
         return work
 
-    return _gather(run_tiles([job(t) for t in grid.tiles()], threads, progress))
+    return gather(run_tiles([job(t) for t in grid.tiles()], threads, progress))
 
 
-def _gather(results: list[object]) -> tuple[F64, int]:
+def gather(results: list[object]) -> tuple[F64, int]:
     parts = [r for r in results if isinstance(r, tuple)]
     if not parts:
         return np.zeros((0, 7)), 0

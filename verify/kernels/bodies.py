@@ -33,7 +33,7 @@ def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bo
             row = (cx * shape[1] + cy) * shape[2]
             if first[row + low] == first[row + high + 1]:
                 continue
-            if plan_distance(origin[0] + (cx + 0.5) * size, origin[1] + (cy + 0.5) * size, a[0], a[1], d[0], d[1],
+            if plan_distance(origin[0] + (cx + 0.5) * size - a[0], origin[1] + (cy + 0.5) * size - a[1], d[0], d[1],
                              plan2) > wide + half:
                 continue
             for i in range(first[row + low], first[row + high + 1]):

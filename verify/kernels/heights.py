@@ -122,6 +122,39 @@ def overlap(x, y, z, ax, ay, az, dx, dy, dz, z0, z1, r0, r1, column):
 
 
 @njit(cache=True, nogil=True)
+def _inside(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+    """How deep at s a point, or the top of a column, is in a frustum: from its side or from its lower end."""
+    return min(_cone_gap(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column), wz - s * dz - z0)
+
+
+@njit(cache=True, nogil=True)
+def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+    """How deep a frustum takes in a point (or the column below it), mm: the shorter way out, aside or down.
+
+    (wx, wy, wz) is the point seen from the tip at the start of the move. Both ways are concave in s where the heights
+    meet, so the search ends at the deepest. Returns 0 where they do not meet.
+    """
+    s1, s2 = 0.0, 1.0
+    high = INF if column else z1
+    if abs(dz) < 1e-15:
+        if wz <= z0 or wz >= high:
+            return 0.0
+    else:
+        u, v = (wz - z0) / dz, (wz - high) / dz
+        s1, s2 = max(s1, min(u, v)), min(s2, max(u, v))
+        if s1 > s2:
+            return 0.0
+    for _ in range(60):
+        u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
+        if _inside(u, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column) \
+                > _inside(v, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+            s2 = v
+        else:
+            s1 = u
+    return max(_inside(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column), 0.0)
+
+
+@njit(cache=True, nogil=True)
 def _cells(lo, hi, origin, step, first, stop):
     """Lines whose coordinate lies in [lo, hi], cut to first..stop-1."""
     return (max(first, math.ceil((lo - origin) / step - 0.5)), min(stop - 1, math.floor((hi - origin) / step - 0.5)))

@@ -18,9 +18,8 @@ TOUCH = 1e-6
 
 
 @njit(cache=True, nogil=True)
-def plan_distance(x, y, ax, ay, dx, dy, length2):
-    """Distance in plan from (x, y) to the segment a, a + d."""
-    wx, wy = x - ax, y - ay
+def plan_distance(wx, wy, dx, dy, length2):
+    """Distance in plan from (wx, wy) to the segment from the origin to d."""
     s = 0.0
     if length2 > 0.0:
         s = min(max((wx * dx + wy * dy) / length2, 0.0), 1.0)
@@ -30,33 +29,31 @@ def plan_distance(x, y, ax, ay, dx, dy, length2):
 
 
 @njit(cache=True, nogil=True)
-def _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
-    """A lower bound of the distance from a point to the swept cutting part (may be negative inside)."""
-    plan = plan_distance(x, y, ax, ay, dx, dy, plan2)
+def gap(x, y, z, dx, dy, dz, plan2, radius, corner, length):
+    """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside)."""
+    plan = plan_distance(x, y, dx, dy, plan2)
     side = plan - radius
-    low = min(az, az + dz)
+    low = min(0.0, dz)
     if z >= low + corner:
-        return max(side, z - max(az, az + dz) - length)
+        return max(side, z - max(0.0, dz) - length)
     over = plan - (radius - corner)
     if dz == 0.0 or corner <= 0.0:
         over, drop = max(over, 0.0), low + corner - z
         return max(side, math.sqrt(over * over + drop * drop) - corner)
     if corner < radius - 1e-12:
         return max(side, low - z)
-    cz = az + corner
-    space2 = plan2 + dz * dz
-    s = min(max(((x - ax) * dx + (y - ay) * dy + (z - cz) * dz) / space2, 0.0), 1.0)
-    wx, wy, wz = x - ax - s * dx, y - ay - s * dy, z - cz - s * dz
+    z -= corner
+    s = min(max((x * dx + y * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
+    wx, wy, wz = x - s * dx, y - s * dy, z - s * dz
     return max(side, math.sqrt(wx * wx + wy * wy + wz * wz) - corner)
 
 
 @njit(cache=True, nogil=True)
-def _flank_bound(x, y, nx, ny, ax, ay, dx, dy, plan2, radius):
+def _flank_bound(wx, wy, nx, ny, dx, dy, plan2, radius):
     """A lower bound of t at which the ray can enter the upright sweep of the full radius (0 inside).
 
     Distance to a convex set is convex along the ray, so its tangent at t = 0 bounds the way to it.
     """
-    wx, wy = x - ax, y - ay
     s = 0.0
     if plan2 > 0.0:
         s = min(max((wx * dx + wy * dy) / plan2, 0.0), 1.0)
@@ -70,40 +67,35 @@ def _flank_bound(x, y, nx, ny, ax, ay, dx, dy, plan2, radius):
 
 
 @njit(cache=True, nogil=True)
-def _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, plan2, radius, corner, length):
-    """Lower the residual of sample i by move m."""
-    x, y, z = points[i, 0], points[i, 1], points[i, 2]
-    left = residual[i]
-    if corner >= radius - 1e-12 and z < min(az, az + dz) + corner:
+def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, left):
+    """What a move leaves on a ray from q along n that had ``left`` on it; ``left`` itself where it takes nothing.
+
+    q, n, D as in ``sweep``; plan2 = dx² + dy².
+    """
+    if corner >= radius - 1e-12 and qz < min(0.0, dz) + corner:
         # under every equator a ball is as far as its sphere: squares decide most pairs
-        wx, wy, wz = x - ax, y - ay, z - az - corner
+        wx, wy, wz = qx, qy, qz - corner
         space2 = plan2 + dz * dz
         if space2 > 0.0:
             s = min(max((wx * dx + wy * dy + wz * dz) / space2, 0.0), 1.0)
             wx, wy, wz = wx - s * dx, wy - s * dy, wz - s * dz
         far = radius + max(left, 0.0) + TOUCH
         if wx * wx + wy * wy + wz * wz > far * far:
-            return
+            return left
     else:
-        if _flank_bound(x, y, normals[i, 0], normals[i, 1], ax, ay, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
-            return
-        if _gap(x, y, z, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
-            return
-    nz = normals[i, 2]
-    if corner >= radius - 1e-12 and nz >= 0.0 and z + nz * left < min(az, az + dz) + min(corner, length - corner):
+        if _flank_bound(qx, qy, nx, ny, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
+            return left
+        if gap(qx, qy, qz, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
+            return left
+    if corner >= radius - 1e-12 and nz >= 0.0 and qz + nz * left < min(0.0, dz) + min(corner, length - corner):
         # the ray meets the ball below its equator first: one root decides nearly all pairs
-        t = capsule_start(x - ax, y - ay, z - az, normals[i, 0], normals[i, 1], nz, dx, dy, dz, radius, corner)
+        t = capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner)
         if t >= left:
-            return
+            return left
         if t >= 0.0:
-            residual[i] = t
-            mover[i] = m
-            return
-    lo, hi = cutter_interval(x - ax, y - ay, z - az, normals[i, 0], normals[i, 1], normals[i, 2], dx, dy, dz,
-                             radius, corner, length)
-    if lo <= hi and hi >= -TOUCH and lo < left:
-        residual[i] = lo
-        mover[i] = m
+            return t
+    lo, hi = cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)
+    return lo if lo <= hi and hi >= -TOUCH and lo < left else left
 
 
 @njit(cache=True, nogil=True)
@@ -154,19 +146,22 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
                 if low >= high:
                     continue
                 px, py = origin[0] + (cx + 0.5) * size, origin[1] + (cy + 0.5) * size
-                side = plan_distance(px, py, ax, ay, dx, dy, plan2) - half - radius
+                side = plan_distance(px - ax, py - ay, dx, dy, plan2) - half - radius
                 if side > pad:
                     continue
                 for c in range(row + low, row + high):
                     if first[c] == first[c + 1] or side > left[c] + TOUCH:
                         continue
                     pz = origin[2] + (c - row + 0.5) * size
-                    if _gap(px, py, pz, ax, ay, az, dx, dy, dz, plan2, radius, corner, length) \
+                    if gap(px - ax, py - ay, pz - az, dx, dy, dz, plan2, radius, corner, length) \
                             > left[c] + 0.5 * math.sqrt(3.0) * size + TOUCH:
                         continue
                     most = 0.0
                     for i in range(first[c], first[c + 1]):
-                        _cut_sample(i, m, points, normals, residual, mover, ax, ay, az, dx, dy, dz, plan2,
-                                    radius, corner, length)
+                        t = new_left(points[i, 0] - ax, points[i, 1] - ay, points[i, 2] - az, normals[i, 0],
+                                     normals[i, 1], normals[i, 2], dx, dy, dz, plan2, radius, corner, length,
+                                     residual[i])
+                        if t < residual[i]:
+                            residual[i], mover[i] = t, m
                         most = max(most, residual[i])
                     left[c] = most

@@ -1,0 +1,192 @@
+"""The stock in process where tools lean or turn: signed distances on a grid, cut in place.
+
+Where the axis never leaves Z, vertical lines of one height do (``verify.stock``); a tool that leans cuts under what
+stands above it. The error is that of the grid (``verify.kernels.field``): nothing is taken for stock that is gone, and
+what stands between nodes is seen unless it is thinner than their distance. Residuals on the part do not come from here.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
+from geometry.nearest import nearest
+from geometry.toolbody import ToolBody
+from verify.kernels.field import VOLUME_UNITS, field_tile
+from verify.kernels.grid import cross_columns, net_faces, net_vertices
+from verify.model import ProofSetup, StockKind
+from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
+from verify.stock import EVENTS, Bodies, blank_cylinder, end_radii, gather, stock_bounds
+from verify.toolaxes import ToolAxes
+
+F32 = NDArray[np.float32]
+MOST_NODES = 24_000_000
+TILE = 64
+SLAB = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Node (i, j, k) at origin + (i, j, k) step: distance into the stock, cut off at ``step`` either way.
+
+    origin : (3,) float64, mm; values : (nx, ny, nz) float32, mm, above zero where stock stands
+    """
+
+    origin: F64
+    step: float
+    values: F32
+
+    @property
+    def volume(self) -> float:
+        """Stock, mm³."""
+        cells = sum(float(np.clip(0.5 + v / self.step, 0.0, 1.0).sum(dtype=np.float64)) for v in self.values)
+        return cells * self.step**3
+
+    def surface(self) -> TriangleMesh:
+        """The stock as a closed mesh; facets of a face number 0. Empty where no stock stands."""
+        padded = np.pad(self.values, 1, constant_values=-self.step)
+        number = np.empty(tuple(n - 1 for n in padded.shape), np.int32)
+        vertices = np.empty((net_vertices(padded, number, np.empty((0, 3)), self.step), 3))
+        net_vertices(padded, number, vertices, self.step)
+        faces = np.empty((net_faces(padded, number, np.empty((0, 3), np.int32)), 3), np.int32)
+        net_faces(padded, number, faces)
+        return TriangleMesh(vertices + (self.origin - self.step), faces, np.zeros(len(faces), np.int32))
+
+
+def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 | None = None,
+                threads: int = 2) -> Field:
+    """The stock before the first cut.
+
+    mesh : of the part, mm; step : mm between nodes, wider where that would take over 24 million
+    box  : (2, 3) float64, mm, the piece of space wanted; all of the stock where None
+    """
+    lower, upper = stock_bounds(mesh.bounds, setup) if box is None else np.asarray(box, dtype=np.float64)
+    step = max(step, float(np.cbrt((upper - lower + 4 * step).prod() / MOST_NODES)))
+    counts = np.ceil((upper - lower) / step).astype(int) + 4
+    origin = 0.5 * (lower + upper) - 0.5 * step * (counts - 1)
+    values = np.empty(tuple(counts.tolist()), np.float32)
+    if setup.stock_kind == StockKind.PART_OFFSET:
+        _grown(values, origin, step, mesh, setup.margin + setup.uncertainty, threads)
+    else:
+        _simple(values, origin, step, mesh.bounds, setup)
+    return Field(origin, step, values)
+
+
+def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetup) -> None:
+    """Box or cylinder, slab by slab."""
+    x, y, z = (origin[c] + step * np.arange(n) for c, n in enumerate(values.shape))
+    lower, upper = stock_bounds(bounds, setup)
+    high = np.minimum(z - lower[2], upper[2] - z)[None, None, :]
+    across = np.minimum(y - lower[1], upper[1] - y)[None, :, None]
+    for i in range(0, len(x), SLAB):
+        s = slice(i, i + SLAB)
+        if setup.stock_kind == StockKind.CYLINDER:
+            cx, cy, _, radius, _ = blank_cylinder(bounds, setup)
+            side = (radius - np.hypot(x[s, None] - cx, y[None, :] - cy))[:, :, None]
+        else:
+            side = np.minimum(np.minimum(x[s] - lower[0], upper[0] - x[s])[:, None, None], across)
+        values[s] = np.clip(np.minimum(side, high), -step, step)
+
+
+def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int) -> None:
+    """The part grown by ``reach`` all round: the surface of nodes near it is looked up, the rest is inside or not."""
+    inside = np.zeros(values.shape, np.bool_)
+    cuts = np.linspace(0, len(values), 4 * max(threads, 1) + 1).astype(int)
+
+    def job(a: int, b: int) -> Callable[[], object]:
+        return lambda: cross_columns(inside, a, b, origin, step, mesh.vertices, mesh.faces)
+
+    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads)
+    tree = TriangleTree(mesh)
+    half = 0.5 * math.sqrt(3.0) * 3.0 * step
+
+    def slab(i: int) -> Callable[[], object]:
+        at = origin + [i * step, 0.0, 0.0]
+        return lambda: _grown_slab(values[i:i + 4], inside[i:i + 4], at, step, tree, reach, half)
+
+    run_tiles([slab(i) for i in range(0, len(values), 4)], threads)
+
+
+def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float, tree: TriangleTree, reach: float,
+                half: float) -> None:
+    """Four layers of nodes: bricks of 4 are wholly stock, wholly not, or looked up node by node."""
+    _, ny, nz = values.shape
+    j, k = np.arange(0, ny, 4), np.arange(0, nz, 4)
+    centre = np.stack(np.meshgrid([1.5], j + 1.5, k + 1.5, indexing="ij"), -1).reshape(-1, 3) * step + origin
+    far = reach + step + half
+    away = nearest(tree, centre, far)[0].reshape(len(j), len(k))
+    wide = np.repeat(np.repeat(away, 4, axis=0), 4, axis=1)[:ny, :nz]
+    values[:] = np.where(inside | (wide <= reach - step - half)[None], step, -step)
+    row = np.nonzero(np.broadcast_to((wide <= far) & (wide > reach - step - half), values.shape))
+    gap = nearest(tree, np.stack(row, -1) * step + origin, far + half)[0]
+    values[row] = np.where(inside[row], np.minimum(gap + reach, step), np.maximum(reach - gap, -step))
+
+
+@dataclass(frozen=True, eq=False)
+class FieldPass:
+    """What one pass over the field found.
+
+    events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
+    taken  : (m,) float64, mm³ by move; cut : (m,) bool, moves that took stock
+    dug    : (m,) float64, mm, mean depth that the end-cutting region of a steep move took off
+    """
+
+    events: F64
+    lost: int
+    taken: F64
+    cut: NDArray[np.bool_]
+    dug: F64
+
+
+def run_field(field: Field, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBody], setup: ProofSetup,
+              steep: NDArray[np.bool_], *, threads: int = 2, progress: Progress | None = None,
+              bow: float = BOW) -> FieldPass:
+    """Run all moves through the stock, in place, and collect what touches.
+
+    steep : (m,) bool, feed moves that go down steeper than a ramp
+
+    Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
+    """
+    cutters, bodies, ends = cutter_table(tools), Bodies.of(tools, setup), end_radii(tools)
+    reach = assembly_reach(cutters, bodies)
+    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    spare: queue.SimpleQueue[NDArray[np.int64]] = queue.SimpleQueue()
+    sums = [np.zeros((len(moves), 2), np.int64) for _ in range(max(1, threads))]
+    for table in sums:
+        spare.put(table)
+
+    def job(tile: NDArray[np.int64]) -> Callable[[], object]:
+        def work() -> object:
+            events, taken = np.empty((EVENTS, 7)), spare.get()
+            n = field_tile(field.values, tile, field.origin, field.step, field.step, start, end, axes.axis,
+                           axes.about, axes.angle, moves.feed, steep, moves.tool, cutters, ends, bodies.rows,
+                           bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
+            spare.put(taken)
+            return events[:min(n, EVENTS)].copy(), n
+        return work
+
+    events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
+    taken = np.sum(sums, axis=0)
+    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * ends[moves.tool] ** 2) if len(moves) else np.zeros(0)
+    return FieldPass(events, lost, taken[:, 0] / VOLUME_UNITS, taken[:, 0] > 0, dug)
+
+
+def assembly_reach(cutters: F64, bodies: Bodies) -> F64:
+    """(k,) float64, mm: how far each assembly, clearances included, reaches from its tip."""
+    out = np.hypot(cutters[:, 0], cutters[:, 2])
+    for k in range(len(out)):
+        rows = bodies.rows[bodies.first[k]:bodies.first[k + 1]]
+        out[k] = max(out[k], np.hypot(rows[:, 2:4].max(axis=1), rows[:, 1]).max(initial=0.0))
+    return np.asarray(out)
+
+
+def _tiles(shape: tuple[int, ...]) -> list[NDArray[np.int64]]:
+    cuts = [[(a, min(a + TILE, n)) for a in range(0, n, TILE)] for n in shape]
+    return [np.array([*x, *y, *z], np.int64) for x in cuts[0] for y in cuts[1] for z in cuts[2]]

@@ -1,0 +1,134 @@
+"""Bodies of tools that lean or turn against points of the part and of fixtures.
+
+Notation as in ``pose``; body and event rows as in ``stock``; points in chunks of nested balls as in ``turned``. In a
+rapid everything is grown radially by the rapid clearance, the cutting part too; a straight lift along the tool leaves
+the place it stands in with no clearance asked.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from geometry.kernels.options import KERNEL
+from verify.kernels.heights import overlap, penetration
+from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
+from verify.kernels.profile import carried
+from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse
+
+TOUCHING = 1e-3
+
+
+@njit(**KERNEL)
+def is_lift(angle, axis, a, b):
+    """Whether a move draws the tool straight out along its axis."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    up = dx * axis[0] + dy * axis[1] + dz * axis[2]
+    return angle == 0.0 and up > 0.0 and dx * dx + dy * dy + dz * dz - up * up <= 1e-12 * up * up + 1e-14
+
+
+@njit(**KERNEL)
+def _meets(p, balls, node, z0, z1, wide):
+    """Whether a cylinder of radius ``wide`` from z0 to z1 over the tip may reach into a ball on piece p."""
+    rad = balls[node, 3]
+    if rad < 0.0:
+        return False
+    qx, qy, qz, dx, dy, dz = view(p, balls[node, 0], balls[node, 1], balls[node, 2])
+    wide += rad
+    return overlap(qx, qy, qz, 0.0, 0.0, 0.0, dx, dy, dz, z0 - rad, z1 + rad, wide, wide, False) > 0.0
+
+
+@njit(**KERNEL)
+def meet_body(q, d, body, grow, slack):
+    """Depth of a point in one body grown by ``grow`` as an event counts it, 0 where it is none.
+
+    q, d : the point and the displacement as the tool sees them; body : row of ``stock``
+    """
+    depth = overlap(q[0], q[1], q[2], 0.0, 0.0, 0.0, d[0], d[1], d[2], body[0], body[1], body[2] + grow,
+                    body[3] + grow, False)
+    if depth <= slack:
+        return 0.0
+    clearance = body[4] + grow
+    bare = penetration(q[0], q[1], q[2], d[0], d[1], d[2], body[0], body[1], body[2] - body[4], body[3] - body[4],
+                       False)
+    return clearance + bare if bare > slack else min(depth, clearance)
+
+
+@njit(**KERNEL)
+def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack):
+    """Depth of a point in body b of a tool on piece p as an event counts it; b < 0 is the cutting part."""
+    qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+    if b >= 0:
+        return meet_body((qx, qy, qz), (dx, dy, dz), bodies[b], grow, slack)
+    a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
+    bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
+    if bare > slack:
+        return grow + bare
+    near = -carried(qx, qy, qz, dx, dy, dz, a + grow, r, length) if grow > 0.0 else 0.0
+    return min(near, grow) if near > slack else 0.0
+
+
+@njit(**KERNEL)
+def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b, grow, slack, best):
+    """One body of a tool on piece p against the points of a chunk; of fixtures alone unless ``every``."""
+    z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
+    if b >= 0:
+        z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + grow
+        clearance, code = bodies[b, 4] + grow, int(bodies[b, 5])
+    if not _meets(p, t3, chunk, z0, z1, wide):
+        return
+    for n2 in range(chunk * 8, chunk * 8 + 8):
+        if not _meets(p, t2, n2, z0, z1, wide):
+            continue
+        for n1 in range(n2 * 8, n2 * 8 + 8):
+            if not _meets(p, t1, n1, z0, z1, wide):
+                continue
+            for leaf in range(n1 * 8, n1 * 8 + 8):
+                if not _meets(p, t0, leaf, z0, z1, wide):
+                    continue
+                for i in range(leaf * 8, min(leaf * 8 + 8, len(points))):
+                    if every or fixed[i]:
+                        depth = _meet_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b, grow,
+                                            TOUCHING if fixed[i] else slack)
+                        if depth > 0.0:
+                            _worse(best, code + (FIXTURE if fixed[i] else 0), depth, clearance, points[i, 0],
+                                   points[i, 1], points[i, 2])
+
+
+@njit(**KERNEL)
+def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about, angle, feeds, tool, cutters, bodies,
+                body_first, reach, rapid_grow, slack, bow, events):
+    """Events of all moves with the points of one chunk; returns their number, which may exceed the table.
+
+    t0..t3  : (k, 4) float64 balls of 8, 64, 512, 4096 points; points (n, 3) in the order of the tree
+    fixed   : (n,) bool, points of fixtures: the cutting part must not touch those either
+    reach   : (k,) float64, mm, how far the whole assembly reaches from the tip; bow : mm
+    slack   : mm of overlap with the part that the cutting part, and a body beside its own cut, may have
+    """
+    best, piece = np.zeros((16, 5)), np.empty(PIECE)
+    x, y, z, rad = t3[chunk, 0], t3[chunk, 1], t3[chunk, 2], t3[chunk, 3]
+    held = fixed[chunk * 4096:chunk * 4096 + 4096].any()
+    count = 0
+    for m in range(len(starts)):
+        k, feed = tool[m], feeds[m]
+        far = reach[k] + rad + bow + rapid_grow
+        if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
+            continue
+        lift = not feed and is_lift(angle[m], axis[m], starts[m], ends[m])
+        grow = 0.0 if feed or lift else rapid_grow
+        length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
+        n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
+        for part in range(n):
+            fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
+            if held or not feed:
+                _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, not feed, cutters[k], bodies, -1, grow,
+                          slack, best)
+            for b in range(body_first[k], body_first[k + 1]):
+                extra = 0.0 if feed else -bodies[b, 4] if lift else grow - min(grow, bodies[b, 4])
+                beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
+                _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, True, cutters[k], bodies, b, extra,
+                          slack if beside else TOUCHING, best)
+        count = _note(events, count, m, best)
+    return count

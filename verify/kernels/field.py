@@ -1,0 +1,252 @@
+"""The stock as distances on a grid, cut by tools that may lean or turn, and what else of them meets it.
+
+Notation as in ``pose``; body and event rows as in ``stock``.
+
+Node (i, j, k) at origin + (i, j, k) h holds v: where stock stands, the distance to what is not stock, and where it is
+gone minus the depth in the deepest single cut, both cut off at ``band``. A cut takes the least of v and the signed
+distance to the swept cutting part. Outside what is cut away that is exact, so the ball of radius v round a node is all
+stock: a cut that passes between nodes still lowers those beside it, and nothing is said to stand that is gone. The
+place of the surface between nodes is that of linear interpolation: within h²/8 of the greater curvature of a smooth
+surface, within h of an edge.
+
+A tile is worked by one call, its bricks of 4 nodes skipped by the ball round them. ``top`` (bricks) is the largest v in
+each, kept beside the tile.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from geometry.kernels.options import KERNEL
+from verify.kernels.clash import TOUCHING, is_lift
+from verify.kernels.heights import overlap, penetration
+from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
+from verify.kernels.profile import carried
+from verify.kernels.rays import gap
+from verify.kernels.stock import CUTTER, _note, _worse
+
+LEAST_CUT = 1e-5
+VOLUME_UNITS = 1e9
+
+
+@njit(**KERNEL)
+def share(v, h):
+    """The part of the cell round a node that is stock, by its distance v from the surface."""
+    return min(max(0.5 + v / h, 0.0), 1.0)
+
+
+@njit(**KERNEL)
+def brick_tops(field, i0, i1, j0, j1, k0, k1):
+    """Largest v of each brick of a tile, (bx, by, bz) float64."""
+    out = np.full(((i1 - i0 + 3) // 4, (j1 - j0 + 3) // 4, (k1 - k0 + 3) // 4), -1e30)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
+                b = ((i - i0) // 4, (j - j0) // 4, (k - k0) // 4)
+                out[b] = max(out[b], field[i, j, k])
+    return out
+
+
+@njit(**KERNEL)
+def _bricks(lo, hi, origin, h, first, count):
+    """Bricks first.. of a tile side whose nodes may lie in [lo, hi]."""
+    a = math.floor(((lo - origin) / h - first) / 4.0)
+    b = math.floor(((hi - origin) / h - first) / 4.0)
+    return max(0, a), min(count - 1, b)
+
+
+@njit(**KERNEL)
+def _box(p, z0, z1, wide):
+    """Box round a cylinder of radius ``wide`` from z0 to z1 over the tip, at both ends of piece p."""
+    out = np.empty(6)
+    for c in range(3):
+        lo, hi = 1e300, -1e300
+        for e in range(2):
+            u = p[6 + 9 * e + c]
+            aside = wide * math.sqrt(max(1.0 - u * u, 0.0))
+            for z in (z0, z1):
+                lo = min(lo, p[9 * e + c] + z * u - aside)
+                hi = max(hi, p[9 * e + c] + z * u + aside)
+        out[c], out[3 + c] = lo, hi
+    return out
+
+
+@njit(**KERNEL)
+def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, totals):
+    """Lower the nodes of one brick by piece p; adds to totals (volume, volume by the end); returns the new top."""
+    i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
+    a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
+    top = -1e30
+    for i in range(i0, min(i0 + 4, tile[1])):
+        for j in range(j0, min(j0 + 4, tile[3])):
+            for k in range(k0, min(k0 + 4, tile[5])):
+                v = field[i, j, k]
+                if v > -band:
+                    qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
+                    d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length), -band)
+                    if d < v - LEAST_CUT:
+                        field[i, j, k] = d
+                        gone = (share(v, h) - share(d, h)) * h * h * h
+                        if v > 0.0:
+                            totals[2] = 1.0
+                        totals[0] += gone
+                        if steep and (qx - 0.5 * dx) ** 2 + (qy - 0.5 * dy) ** 2 < end_radius * end_radius:
+                            totals[1] += gone
+                        v = d
+                top = max(top, v)
+    return top
+
+
+@njit(**KERNEL)
+def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, totals):
+    """Lower the nodes of a tile by a cutting part on piece p."""
+    box = _box(p, 0.0, cutter[2], cutter[0] + band)
+    nx, ny, nz = tops.shape
+    a0, a1 = _bricks(box[0] - band, box[3] + band, origin[0], h, tile[0], nx)
+    b0, b1 = _bricks(box[1] - band, box[4] + band, origin[1], h, tile[2], ny)
+    c0, c1 = _bricks(box[2] - band, box[5] + band, origin[2], h, tile[4], nz)
+    half = 1.5 * math.sqrt(3.0) * h
+    for bi in range(a0, a1 + 1):
+        x = origin[0] + (tile[0] + 4 * bi + 1.5) * h
+        for bj in range(b0, b1 + 1):
+            y = origin[1] + (tile[2] + 4 * bj + 1.5) * h
+            for bk in range(c0, c1 + 1):
+                top = tops[bi, bj, bk]
+                if top <= -band:
+                    continue
+                qx, qy, qz, dx, dy, dz = view(p, x, y, origin[2] + (tile[4] + 4 * bk + 1.5) * h)
+                if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter[0], cutter[1], cutter[2]) - half >= top:
+                    continue
+                tops[bi, bj, bk] = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep,
+                                              end_radius, totals)
+
+
+@njit(**KERNEL)
+def _meet_node(v, q, d, body, grow, slack):
+    """Depth of the stock within v of a node in one body grown by ``grow``, as an event counts it."""
+    z0, z1 = body[0] - v, body[1] + v
+    depth = overlap(q[0], q[1], q[2], 0.0, 0.0, 0.0, d[0], d[1], d[2], z0, z1, body[2] + grow + v, body[3] + grow + v,
+                    False)
+    if depth <= slack:
+        return 0.0
+    clearance = body[4] + grow
+    bare = penetration(q[0], q[1], q[2], d[0], d[1], d[2], z0, z1, body[2] - body[4] + v, body[3] - body[4] + v, False)
+    return clearance + bare if bare > slack else min(depth, clearance)
+
+
+@njit(**KERNEL)
+def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow, slack, best):
+    """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p."""
+    z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
+    if not is_cutter:
+        z0, z1, wide, clearance, code = body[0], body[1], max(body[2], body[3]) + grow, body[4] + grow, int(body[5])
+    box = _box(p, z0, z1, wide)
+    nx, ny, nz = tops.shape
+    a0, a1 = _bricks(box[0] - h, box[3] + h, origin[0], h, tile[0], nx)
+    b0, b1 = _bricks(box[1] - h, box[4] + h, origin[1], h, tile[2], ny)
+    c0, c1 = _bricks(box[2] - h, box[5] + h, origin[2], h, tile[4], nz)
+    a0, b0, c0 = max(a0, solid[0]), max(b0, solid[1]), max(c0, solid[2])
+    a1, b1, c1 = min(a1, solid[3]), min(b1, solid[4]), min(c1, solid[5])
+    half = 1.5 * math.sqrt(3.0) * h
+    for bi in range(a0, a1 + 1):
+        for bj in range(b0, b1 + 1):
+            for bk in range(c0, c1 + 1):
+                top = tops[bi, bj, bk]
+                if top <= 0.0:
+                    continue
+                i0, j0, k0 = tile[0] + 4 * bi, tile[2] + 4 * bj, tile[4] + 4 * bk
+                qx, qy, qz, dx, dy, dz = view(p, origin[0] + (i0 + 1.5) * h, origin[1] + (j0 + 1.5) * h,
+                                              origin[2] + (k0 + 1.5) * h)
+                far = half + top
+                if overlap(qx, qy, qz, 0.0, 0.0, 0.0, dx, dy, dz, z0 - far, z1 + far, wide + far, wide + far,
+                           False) <= 0.0:
+                    continue
+                for i in range(i0, min(i0 + 4, tile[1])):
+                    for j in range(j0, min(j0 + 4, tile[3])):
+                        for k in range(k0, min(k0 + 4, tile[5])):
+                            v = field[i, j, k]
+                            if v <= 0.0:
+                                continue
+                            x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
+                            qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+                            if is_cutter:
+                                bare = v - carried(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1], cutter[1], cutter[2])
+                                depth = grow + bare if bare > slack else 0.0
+                                if depth == 0.0 and grow > 0.0:
+                                    near = v - carried(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1] + grow, cutter[1],
+                                                       cutter[2])
+                                    depth = min(near, grow) if near > slack else 0.0
+                            else:
+                                depth = _meet_node(v, (qx, qy, qz), (dx, dy, dz), body, grow, slack)
+                            if depth > 0.0:
+                                _worse(best, code, depth, clearance, x, y, z)
+
+
+@njit(**KERNEL)
+def _solid(tops, out):
+    """Bricks that hold stock, as first and last in each direction, into ``out`` (6,); first > last where none does."""
+    nx, ny, nz = tops.shape
+    out[0], out[1], out[2], out[3], out[4], out[5] = nx, ny, nz, -1, -1, -1
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                if tops[i, j, k] > 0.0:
+                    out[0], out[1], out[2] = min(out[0], i), min(out[1], j), min(out[2], k)
+                    out[3], out[4], out[5] = max(out[3], i), max(out[4], j), max(out[5], k)
+
+
+@njit(**KERNEL)
+def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, steep, tool, cutters, ends_radius,
+               bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
+    """Work all moves in order through the nodes of one tile, in place.
+
+    field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
+    steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
+    reach : (k,) float64, mm, how far each assembly reaches from the tip
+    taken : (m, 2) int64, 1e-9 mm³, added to: what each move takes, and what the end of a steep one does; whole numbers,
+            so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went
+
+    Returns the number of events found, which may exceed the table.
+    """
+    tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
+    solid = np.zeros(6, np.int64)
+    _solid(tops, solid)
+    best, piece, totals = np.zeros((16, 5)), np.empty(PIECE), np.zeros(3)
+    rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
+    sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
+    cx, cy = origin[0] + tile[0] * h + 0.5 * sx, origin[1] + tile[2] * h + 0.5 * sy
+    cz = origin[2] + tile[4] * h + 0.5 * sz
+    rad = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
+    count, cuts = 0, 0
+    for m in range(len(starts)):
+        k, feed = tool[m], feeds[m]
+        far = reach[k] + rad + band + bow + rapid_grow
+        if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far or solid[0] > solid[3]:
+            continue
+        lift = not feed and is_lift(angle[m], axis[m], starts[m], ends[m])
+        grow = 0.0 if feed or lift else rapid_grow
+        length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
+        n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
+        totals[:] = 0.0
+        for part in range(n):
+            fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
+            if feed:
+                _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
+            else:
+                _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
+            for b in range(body_first[k], body_first[k + 1]):
+                extra = 0.0 if feed else -bodies[b, 4] if lift else grow - min(grow, bodies[b, 4])
+                beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
+                _meet(field, tops, solid, tile, h, origin, piece, bodies[b], False, cutters[k], extra,
+                      slack if beside else TOUCHING, best)
+        if totals[0] > 0.0 or totals[2] > 0.0:
+            taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
+            taken[m, 1] += round(totals[1] * VOLUME_UNITS)
+            cuts += 1
+            if cuts % 64 == 0:
+                _solid(tops, solid)
+        count = _note(events, count, m, best)
+    return count

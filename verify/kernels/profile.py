@@ -1,0 +1,68 @@
+"""Signed distance of points to a cutting part, standing or carried along a straight line.
+
+The profile over distance rho from the axis and height h from the tip is a rectangle grown by the corner radius r: flat
+end a = R - r, side R, cut off at the flute length L. Distances are exact but over the flutes, where the larger of the
+two ways is taken (a lower bound). A standing cutting part is convex, so along a line the distance is convex in s.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from geometry.kernels.options import KERNEL
+
+GOLDEN = 0.3819660112501051
+FINE = 1e-5
+
+
+@njit(**KERNEL)
+def standing(rho, h, a, r, length):
+    """Signed distance, mm, of a point at distance rho from the axis and height h; negative inside."""
+    x, y = rho - a, r - h
+    out = math.sqrt(max(x, 0.0) ** 2 + max(y, 0.0) ** 2) if x > 0.0 or y > 0.0 else max(x, y)
+    return max(out - r, h - length)
+
+
+@njit(**KERNEL)
+def _at(s, qx, qy, qz, dx, dy, dz, a, r, length):
+    wx, wy = qx - s * dx, qy - s * dy
+    return standing(math.sqrt(wx * wx + wy * wy), qz - s * dz, a, r, length)
+
+
+@njit(**KERNEL)
+def carried(qx, qy, qz, dx, dy, dz, a, r, length):
+    """Least signed distance over 0 <= s <= 1 of a point q to a cutting part carried by s D; within 1e-5 mm."""
+    plan2 = dx * dx + dy * dy
+    s = 0.0
+    if plan2 > 0.0:
+        s = min(max((qx * dx + qy * dy) / plan2, 0.0), 1.0)
+    if abs(dz) <= 1e-12:
+        return _at(s, qx, qy, qz, dx, dy, dz, a, r, length)
+    h = qz - s * dz
+    if plan2 > 0.0 and r <= h <= length:
+        rho = math.sqrt((qx - s * dx) ** 2 + (qy - s * dy) ** 2)
+        # beside the cylinder, and nearer to its side than to its ends: only rho counts there
+        if rho - a >= r - h and rho - a - r >= h - length:
+            return rho - a - r
+    if a <= 1e-12:
+        z = qz - r
+        s = min(max((qx * dx + qy * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
+        if z - s * dz <= 0.0:
+            wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
+            return math.sqrt(wx * wx + wy * wy + wz * wz) - r
+    lo, hi = 0.0, 1.0
+    wide = math.sqrt(plan2 + dz * dz)
+    u, v = GOLDEN, 1.0 - GOLDEN
+    fu, fv = _at(u, qx, qy, qz, dx, dy, dz, a, r, length), _at(v, qx, qy, qz, dx, dy, dz, a, r, length)
+    while (hi - lo) * wide > FINE:
+        if fu > fv:
+            lo, u, fu = u, v, fv
+            v = hi - GOLDEN * (hi - lo)
+            fv = _at(v, qx, qy, qz, dx, dy, dz, a, r, length)
+        else:
+            hi, v, fv = v, u, fu
+            u = lo + GOLDEN * (hi - lo)
+            fu = _at(u, qx, qy, qz, dx, dy, dz, a, r, length)
+    return min(fu, fv)

@@ -1,0 +1,55 @@
+"""How moves hold the tool: standing along Z, tilted, or turning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64
+
+STILL = 1e-9  # rad, below which an axis does not turn: 1e-7 mm at 100 mm
+
+
+@dataclass(frozen=True, eq=False)
+class ToolAxes:
+    """Tool axes of moves, as the kernels take them (see ``verify.kernels.pose``).
+
+    axis  : (m, 3) float64, unit, tip to spindle, at the start of each move
+    about : (m, 3) float64, unit, square to it: what the axis turns about
+    angle : (m,) float64, rad, by which it turns over the move; 0 where it stands
+    """
+
+    axis: F64
+    about: F64
+    angle: F64
+
+    @classmethod
+    def between(cls, start: F64, end: F64) -> ToolAxes:
+        """Axes that run along great circles from ``start`` to ``end``, both (m, 3) float64 unit vectors.
+
+        Of two opposite axes the way between is not determined: any is taken.
+        """
+        cross = np.cross(start, end)
+        sine = np.linalg.norm(cross, axis=1)
+        angle = np.arctan2(sine, np.einsum("ij,ij->i", start, end))
+        still = angle < STILL
+        about = np.divide(cross, sine[:, None], out=np.zeros_like(cross), where=(sine > 1e-300)[:, None])
+        loose = still | (sine < 1e-12)
+        about[loose] = square_to(start[loose])
+        # the frame needs a right angle to the last digit
+        about -= np.einsum("ij,ij->i", about, start)[:, None] * start
+        about /= np.linalg.norm(about, axis=1)[:, None]
+        return cls(np.ascontiguousarray(start), about, np.where(still, 0.0, angle))
+
+    @classmethod
+    def upright(cls, count: int) -> ToolAxes:
+        """``count`` moves of a tool along +Z."""
+        return cls(np.tile([0.0, 0.0, 1.0], (count, 1)), np.tile([1.0, 0.0, 0.0], (count, 1)), np.zeros(count))
+
+
+def square_to(axis: F64) -> F64:
+    """(m, 3) float64 unit vectors square to (m, 3) unit vectors; X for +Z."""
+    least = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    out = least - np.einsum("ij,ij->i", least, axis)[:, None] * axis
+    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
