@@ -29,11 +29,12 @@ def from_above(program: Program, height: float) -> Program:
     Start, home and tool change are above everything, so that is where the tool comes from, and the way down is
     simulated like any other. Other unknown starts are left to ``way_findings``.
     """
-    start = program.start.copy()
+    start, minutes = program.start.copy(), program.minutes.copy()
     for move, axes in program.unknown.tolist():
         if axes == Z_AXIS and (start[move, :2] == program.end[move, :2]).all():
             start[move, 2] = max(height, program.end[move, 2])
-    return replace(program, start=start)
+            minutes[move] = (start[move, 2] - program.end[move, 2]) / program.feed[move]
+    return replace(program, start=start, minutes=minutes)
 
 
 def way_findings(read: Sequence[Program], top: float, setup: ProofSetup) -> list[Finding]:

@@ -9,6 +9,7 @@ import numpy as np
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.cycles import FEED
+from verify.posing import TurnLog
 from verify.program import Remark, Stop
 
 MAX_ERRORS = 20
@@ -44,14 +45,23 @@ class Log:
         self.unknown: list[tuple[int, int]] = []
         self.stops: list[Stop] = []
         self.blend = 0.0
+        self.turned = TurnLog()
+        self._remedy: str | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of moves written."""
+        return self._moves + len(self.rows)
 
     @property
     def moved(self) -> bool:
         """Whether any move was written."""
         return bool(self.rows) or self._moves > 0
 
-    def error(self, message: str, line: int | None = None) -> None:
-        """Note a line that cannot be read; the present one where ``line`` is None."""
+    def error(self, message: str, line: int | None = None, remedy: str | None = None) -> None:
+        """Note a line that cannot be read; the present one where ``line`` is None. The first error's remedy is told."""
+        if not self.errors:
+            self._remedy = remedy
         self.errors.append((line or self.line, message))
 
     def remark(self, key: str, message: str, detail: object = None, line: int | None = None) -> None:
@@ -75,7 +85,7 @@ class Log:
         if len(self.rows) >= self.full:
             self.flush()
         if axes:
-            self.unknown.append((self._moves + len(self.rows), axes))
+            self.unknown.append((self.count, axes))
         self.rows.append((*start, *end, kind, feed, tool, self.line))  # type: ignore[arg-type]
 
     def turns(self, tool: int, speed: float) -> None:
@@ -93,16 +103,15 @@ class Log:
         """
         if moves > MOST_MOVES_A_BLOCK:
             self._too_long(f"one block makes {moves:.6g} moves", moves, MOST_MOVES_A_BLOCK, self.line)
-        if self._moves + len(self.rows) + moves > MOST_MOVES:
-            self._too_long("the program makes too many moves", self._moves + len(self.rows) + moves, MOST_MOVES,
-                           self.line)
+        if self.count + moves > MOST_MOVES:
+            self._too_long("the program makes too many moves", self.count + moves, MOST_MOVES, self.line)
 
     def flush(self) -> None:
         """Pack the latest moves; refuses the program as ``room`` does where they are too many by now."""
         if not self.rows:
             return
-        if self._moves + len(self.rows) > MOST_MOVES:
-            self._too_long("the program makes too many moves", self._moves + len(self.rows), MOST_MOVES,
+        if self.count > MOST_MOVES:
+            self._too_long("the program makes too many moves", self.count, MOST_MOVES,
                            self.rows[MOST_MOVES - self._moves][9])
         self._moves += len(self.rows)
         chunk = np.array(self.rows, dtype=np.float64)
@@ -129,9 +138,10 @@ class Log:
         more = f" (and {len(self.errors) - 1} more)" if len(self.errors) > 1 else ""
         raise ProgramError(f"{self.name}, line {line}: {message}{more}",
                            subjects=tuple(f"line {n}" for n, _ in self.errors), measured=[m for _, m in self.errors],
-                           remedy="correct the lines named, or leave out what a 3-axis reader does not know")
+                           remedy=self._remedy or "correct the lines named, or leave out what the reader does not know")
 
     def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:
         raise VerificationError(f"{self.name}, line {line}: {what}, and {limit} are allowed", code="program_too_long",
                                 subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
-                                remedy="correct the turns, radius, peck or repeats of the line, or split the program")
+                                remedy="correct the turns, radius, peck, repeats or rotary words of the line, or split "
+                                       "the program")

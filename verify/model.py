@@ -9,6 +9,7 @@ from typing import Any
 
 from geometry.mesh import F64, I32
 from geometry.sampling import SurfaceSamples
+from verify.kinematics import Kinematics
 
 
 class StockKind(StrEnum):
@@ -52,6 +53,9 @@ class ProofSetup:
     max_rpm       : 1/min by T number; a tool left out is not limited
     work_offset   : the only one whose coordinates are those of the setup frame
     line_spacing  : mm between the vertical lines of the stock model
+    kinematics    : rotary axes of the machine, or None on one of three axes
+    rotary_limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, or None
+    rotary_rate   : rad/min, the fastest either turns in a feed move, or None
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -77,6 +81,9 @@ class ProofSetup:
     max_feed: float | None = None
     max_rpm: Mapping[int, float] = field(default_factory=dict)
     line_spacing: float = 0.15
+    kinematics: Kinematics | None = None
+    rotary_limits: F64 | None = None
+    rotary_rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

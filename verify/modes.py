@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
+from verify.kinematics import Kinematics
 from verify.log import Log
-from verify.program import NAN, State, Stop
+from verify.program import NAN, Stop
+from verify.rotary import Rotary
 from verify.words import CYCLES, MOTION_CODES, WORK_OFFSETS, Block
 
 INCH = 25.4
 
 
-class Modes:
+class Modes(Rotary):
     """State, log, and everything a block sets before it moves.
 
     tools       : T numbers of the tool table; any number where None
     work_offset : the one of the setup
     blend_limit : mm, what path blending may leave the path by without a remark
+    machine     : its rotary axes, or None without any
+    gauge       : mm by T number, spindle face to tip
+    spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     """
 
-    def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
-        self.log, self.tools, self.work_offset, self.blend_limit = log, tools, work_offset, blend_limit
-        self.s = State()
+    def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float,
+                 machine: Kinematics | None = None, gauge: Mapping[int, float] | None = None,
+                 spindle_tool: int = 0) -> None:
+        super().__init__(log, machine, gauge or {})
+        self.tools, self.work_offset, self.blend_limit = tools, work_offset, blend_limit
+        self.spindle_tool, self.loaded = spindle_tool, False
+        if spindle_tool:
+            self.s.tool = self.s.selected = self.s.offset = spindle_tool
         self.incremental_line = 0
         self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
         self.stated: set[float] = set()
@@ -39,6 +49,8 @@ class Modes:
         self._spindle(block.ms)
         if s.turning:
             self.log.turns(s.tool, s.speed)
+        if not {428, 429}.isdisjoint(block.ms):
+            self._control(s.tcp_word, 428 in block.ms)
         for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it
             self._mode(g, values)
         if 64 in block.codes:
@@ -56,8 +68,8 @@ class Modes:
         if 6 in ms:
             self.stop("tool change")
             if s.selected != s.tool:
-                s.position[2] = NAN
-            s.tool, s.spindle = s.selected, False
+                self._leave([False, False, True])
+            s.tool, s.spindle, self.loaded = s.selected, False, True
         if 3 in ms or 4 in ms:
             s.spindle = True
         if 4 in ms:
@@ -84,10 +96,8 @@ class Modes:
             s.feed = NAN
         elif g in (98, 99):
             s.retract_to_r = g == 99
-        elif g == 43:
-            self._length_offset(values)
-        elif g == 49:
-            s.offset = None
+        elif g in (43, 43.4, 49):
+            self._length_offset(g, values)
         elif g in WORK_OFFSETS:
             s.work_offset = WORK_OFFSETS[g]
             if s.work_offset != self.work_offset:
@@ -98,13 +108,20 @@ class Modes:
         """Note what the first move takes for granted: a control keeps what the program before it left."""
         groups: dict[str, Collection[float]] = {"G21": (20, 21), "G90": (90, 91), "G17": (17, 18, 19),
                                                 "G94": (93, 94, 95), self.work_offset: WORK_OFFSETS}
-        self.assumed = tuple(word for word, group in groups.items() if self.stated.isdisjoint(group))
+        words = [word for word, group in groups.items() if self.stated.isdisjoint(group)]
+        if self.spindle_tool and not self.loaded:
+            words.append(f"T{self.spindle_tool} M6")
+        if self.spindle_tool and self.stated.isdisjoint({43, 43.4, 49}):
+            words.append(f"G43 H{self.spindle_tool}")
+        words.extend(f"{letter}0" for letter in self.rotary if letter not in self.turned)
+        self.assumed = tuple(words)
 
     def stop(self, what: str) -> None:
         """Note the height at which the program stops, if it is known."""
         s = self.s
-        if not math.isnan(s.position[2]) and s.tool > 0:
-            self.log.stops.append(Stop(self.log.line, what, s.tool, s.position[2]))
+        z = self._tip()[2]
+        if not math.isnan(z) and s.tool > 0:
+            self.log.stops.append(Stop(self.log.line, what, s.tool, z))
 
     def _motion(self, g: float) -> None:
         """A cycle begun anew keeps nothing of the one before."""
@@ -138,8 +155,13 @@ class Modes:
             self.incremental_moved = False
         s.relative = relative
 
-    def _length_offset(self, values: dict[str, float]) -> None:
+    def _length_offset(self, g: float, values: dict[str, float]) -> None:
+        """G43 and G49 end the tool centre point control of G43.4: one modal group."""
         s = self.s
+        self._control(g == 43.4, s.tcp_switch)
+        if g == 49:
+            s.offset = None
+            return
         s.offset = int(values["H"]) if "H" in values else s.tool
         if s.offset != s.tool:
             self.log.remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle",

@@ -4,57 +4,62 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection
 
 import numpy as np
 
-from verify.arcs import PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
+from verify.arcs import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
 from verify.cycles import FEED, RAPID, Hole, hole_moves
-from verify.log import MOST_MOVES_A_BLOCK, Log
+from verify.dividing import TIP
+from verify.log import MOST_MOVES_A_BLOCK
 from verify.modes import Modes
 from verify.program import NAN
+from verify.rotary import between
 from verify.words import CYCLES, Block, whole
 
 
 class Motion(Modes):
     """Moves of the blocks, written to the log; ``dwell`` is what they wait, s."""
 
-    def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
-        super().__init__(log, tools, work_offset, blend_limit)
-        self.dwell = 0.0
+    dwell = 0.0
 
     def _move(self, block: Block) -> None:
         s, values = self.s, block.values
         axes = [values.get(a) for a in "XYZ"]
+        turn = self._turn(values, absolute=53 in block.codes)
         if 4 in block.codes:
-            return self._wait(axes, values)
-        if not {28, 30, 53}.isdisjoint(block.codes):
-            return self._machine_move(53 in block.codes, axes)
+            return self._wait(turn is not None or any(a is not None for a in axes), values)
+        if 53 in block.codes:
+            return self._machine_place(axes, turn)
+        if not {28, 30}.isdisjoint(block.codes):
+            return self._home(axes, turn, values)
         full_circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
-        if all(a is None for a in axes) and not full_circle:
+        if all(a is None for a in axes) and turn is None and not full_circle:
             return None
         if s.motion is None or s.motion == 80:
             return self.log.error("coordinates without a motion word")
         self.incremental_moved = True
         if s.motion in CYCLES:
+            if turn is not None and turn != s.turn:
+                return self.log.error("a drilling cycle whose block turns an axis: turn it in a block before")
             return self._cycle(axes, values)
         target = self._target(axes)
         if s.motion == 0:
-            return self._line_to(target, RAPID, NAN)
+            return self._line_to(target, RAPID, NAN, turn)
         feed = self._feed(values)
         if feed is None:
             return None
         self._check_cutting(target)
         if s.motion == 1:
-            return self._line_to(target, FEED, self._rate(feed, [s.position, target]))
-        return self._arc(target, values, feed)
+            rate, minutes = self._timing(feed, math.dist(s.position, target), turn)
+            return self._line_to(target, FEED, rate, turn, minutes)
+        return self._arc(target, values, feed, turn)
 
-    def _wait(self, axes: list[float | None], values: dict[str, float]) -> None:
+    def _wait(self, coordinates: bool, values: dict[str, float]) -> None:
         if "P" not in values:
             return self.log.error("G4 needs P")
         if values["P"] < 0:
             return self.log.error(f"G4 P{values['P']:g} waits a negative time")
-        if any(a is not None for a in axes):
+        if coordinates:
             return self.log.error("coordinates in a block with G4: some controls move, some wait")
         self.dwell += values["P"]
         return None
@@ -69,33 +74,51 @@ class Motion(Modes):
         return [p if a is None else (p + a * s.scale if s.relative else a * s.scale)
                 for a, p in zip(axes, s.position, strict=True)]
 
-    def _machine_move(self, absolute: bool, axes: list[float | None]) -> None:
-        """G28 and G30 pass a programmed point, then the axes named (all without any) are unknown; so after G53.
+    def _machine_place(self, axes: list[float | None], turn: list[float] | None) -> None:
+        """G53: the linear axes named are unknown afterwards, the rotary ones stand where it says.
 
-        Only home is known to lie above everything: another Z of G53 is remarked, and so is a way in X or Y to a
-        place of the machine's own before Z is home.
+        Only home is known to lie above everything: another Z is remarked.
         """
         s = self.s
+        if s.motion != 0:
+            return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
+        if axes[2]:
+            self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height the proof does not know; only "
+                            "Z0, home, is taken to be above everything", self.log.line)
         named = [a is not None for a in axes]
-        if absolute:
-            if s.motion != 0:
-                return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
-            if axes[2]:
-                self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height the proof does not know; only "
-                                "Z0, home, is taken to be above everything", self.log.line)
-            if s.relative and any(named):
-                self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
-                                "differently", self.log.line)
-        elif any(named):
-            self._line_to(self._target(axes), RAPID, NAN)
-        else:
-            named = [True] * 3
-        if (named[0] or named[1]) and not math.isnan(s.position[2]):
-            self.log.remark("machine_way", f"X or Y goes to a place of the machine's own from Z{s.position[2]:g}, a "
-                            "way the proof cannot see: send Z home first", self.log.line)
-        s.position = [NAN if n else p for n, p in zip(named, s.position, strict=True)]
+        if s.relative and (any(named) or turn is not None):
+            self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
+                            "differently", self.log.line)
+        return self._away(named, turn)
+
+    def _home(self, axes: list[float | None], turn: list[float] | None, values: dict[str, float]) -> None:
+        """G28 and G30 pass a programmed point, then the axes named (all without any) go home; rotary home is 0."""
+        named = [a is not None for a in axes]
+        if not any(named) and turn is None:
+            return self._away([True] * 3, [0.0, 0.0] if self.rotary else None)
+        self._line_to(self._target(axes), RAPID, NAN, turn)
+        if turn is not None:
+            turn = [0.0 if letter in values else t for letter, t in zip(self.rotary, turn, strict=True)]
+        return self._away(named, turn)
+
+    def _away(self, named: list[bool], turn: list[float] | None) -> None:
+        """The linear axes named go to a place of the machine's own, the rotary axes to ``turn`` (2,) deg.
+
+        A way in X or Y there before Z is home is remarked, and so is one on which an axis turns.
+        """
+        s = self.s
+        if not any(named):
+            return None if turn is None else self._line_to(list(s.position), RAPID, NAN, turn)
+        if not math.isnan(s.position[2]):
+            if named[0] or named[1]:
+                self.log.remark("machine_way", f"X or Y goes to a place of the machine's own from Z{s.position[2]:g}, "
+                                "a way the proof cannot see: send Z home first", self.log.line)
+            if turn is not None and turn != s.turn:
+                self.log.remark("machine_turn", "a rotary axis turns on the way to a place of the machine's own from "
+                                f"Z{s.position[2]:g}, which the proof cannot see: send Z home first", self.log.line)
+        self._leave(named)
         s.parked |= named[0] or named[1]
-        return None
+        return None if turn is None else self._stand(turn)
 
     def _feed(self, values: dict[str, float]) -> float | None:
         s = self.s
@@ -111,12 +134,6 @@ class Motion(Modes):
             return feed * s.speed
         return feed
 
-    def _rate(self, feed: float, points: list[list[float]]) -> float:
-        """mm/min of a move along ``points``; inverse time divides the whole length by its minutes."""
-        if self.s.feed_mode != 93:
-            return feed
-        return feed * sum(math.dist(a, b) for a, b in itertools.pairwise(points))
-
     def _check_cutting(self, target: list[float]) -> None:
         s, remark = self.s, self.log.remark
         if s.tool == 0:
@@ -131,7 +148,9 @@ class Motion(Modes):
         if any(math.isnan(v) for v in target):
             remark("unknown", "a feed move from a place the program has not stated")
 
-    def _line_to(self, target: list[float], kind: int, feed: float) -> None:
+    def _line_to(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
+                 minutes: float = NAN) -> None:
+        """Go straight to ``target`` (3,) mm, turning the axes to ``turn`` (2,) deg where it is given."""
         s = self.s
         start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
         was, s.position = s.position, target
@@ -147,9 +166,11 @@ class Motion(Modes):
             if not self.log.moved:
                 self._assume()
             axes = sum(1 << k for k, p in enumerate(was) if math.isnan(p))
-            self.log.move(start, target, kind, feed, s.tool, axes)
+            self._write(start, target, kind, feed, axes, turn, minutes)
+        elif turn is not None:
+            self._stand(turn)
 
-    def _arc(self, target: list[float], values: dict[str, float], feed: float) -> None:
+    def _arc(self, target: list[float], values: dict[str, float], feed: float, turn: list[float] | None) -> None:
         s, error = self.s, self.log.error
         if any(math.isnan(v) for v in s.position):
             return error("an arc from a place the program has not stated")
@@ -169,16 +190,24 @@ class Motion(Modes):
                 return error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
             if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
                 return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
-            points = arc_points(start, end, centre, s.motion == 2, axes, turns, most=MOST_MOVES_A_BLOCK).tolist()
+            points = arc_points(start, end, centre, s.motion == 2, axes, turns, self._arc_chord(turn),
+                                most=MOST_MOVES_A_BLOCK).tolist()
         except ArcTooLong as problem:
             return self.log.room(problem.points)
         except ArcError as problem:
             return error(str(problem))
         self.log.room(len(points))
-        rate = self._rate(feed, [s.position, *points])
-        for p in points:
-            self._line_to(p, FEED, rate)
+        length = sum(math.dist(a, b) for a, b in itertools.pairwise([s.position, *points]))
+        rate, minutes = self._timing(feed, length, turn)
+        was, n = s.turn, len(points)
+        for k, p in enumerate(points, 1):
+            self._line_to(p, FEED, rate, None if turn is None else between(was, turn, k / n), minutes / n)
         return None
+
+    def _arc_chord(self, turn: list[float] | None) -> float:
+        """mm its chords may leave an arc by; half where the tip of each chord is bent once more by a turning axis."""
+        bent = turn is not None and turn != self.s.turn and not self.s.tcp
+        return CHORD - TIP if bent else CHORD
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """G81, G82, G83, G73 in the XY plane, written out as rapids and feeds."""

@@ -32,14 +32,31 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
+class Poses:
+    """How the tool stands on the part, move by move.
+
+    start_axis, end_axis : (m, 3) float64 unit vectors, tip to spindle, setup frame; between them the axis goes along
+        the shorter great circle, within ``dividing.TURN`` rad of what the control does
+    start_turn, end_turn : (m, 2) float64, rad, the rotary axes, the tilting one first
+    """
+
+    start_axis: F64
+    end_axis: F64
+    start_turn: F64
+    end_turn: F64
+
+
+@dataclass(frozen=True, eq=False)
 class Program:
     """A program as straight moves of the tool tip in the setup frame.
 
     name    : of the program
     start, end : (m, 3) float64, mm; an axis whose start is unknown starts where it ends
-    unknown : (k, 2) int64, moves with such axes, and which as a sum of 1 for X, 2 for Y, 4 for Z
+    unknown : (k, 2) int64, moves with such axes, and which as a sum of 1 for X, 2 for Y, 4 for Z, and of 8 where a
+              rotary axis turns or stands off 0: such a move holds where it ends, the way there is not known
     kind    : (m,) int8, RAPID or FEED (arcs are FEED polylines within 1e-3 mm)
-    feed    : (m,) float64, mm/min; nan for rapids
+    feed    : (m,) float64, mm/min along X, Y, Z of the program, 0 where only a rotary axis turns; nan for rapids
+    minutes : (m,) float64, min a feed move takes; nan for rapids
     tool    : (m,) int32, T number in the spindle, 0 for none
     line    : (m,) int32, 1-based line of the source
     dwell   : s of G4 and drilling dwells
@@ -49,6 +66,7 @@ class Program:
     blend   : mm, the most G64 lets the control leave the path by, as far as a P bounds it
     lines   : number of lines read
     remarks : what should not be run
+    poses   : None where the tool stands along Z throughout: no rotary axis ever leaves 0
     """
 
     name: str
@@ -66,6 +84,8 @@ class Program:
     stops: tuple[Stop, ...]
     assumed: tuple[str, ...]
     blend: float
+    minutes: F64
+    poses: Poses | None = None
 
     def __len__(self) -> int:
         return len(self.start)
@@ -75,7 +95,10 @@ class Program:
 class State:
     """Everything modal.
 
-    position  : mm, nan where the program has not stated it or a machine move left it
+    position  : mm, nan where the program has not stated it or a machine move left it; the tip with tool centre point
+                control, else the linear joints
+    turn      : deg, the rotary axes, tilting one first
+    tcp_word, tcp_switch : tool centre point control by G43.4, by M428
     speed     : as S, nan before the first
     parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
     """
@@ -97,9 +120,22 @@ class State:
     retract_to_r: bool = False
     cycle: dict[str, float] = field(default_factory=dict)
     parked: bool = False
+    turn: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    tcp_word: bool = False
+    tcp_switch: bool = False
     ended: bool = False
 
     @property
     def turning(self) -> bool:
         """Whether the spindle runs."""
         return self.spindle and self.speed > 0
+
+    @property
+    def tcp(self) -> bool:
+        """Whether the control keeps the tip where the program says while axes turn."""
+        return self.tcp_word or self.tcp_switch
+
+    @property
+    def tilted(self) -> bool:
+        """Whether a rotary axis stands off 0."""
+        return self.turn[0] != 0 or self.turn[1] != 0

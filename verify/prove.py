@@ -37,7 +37,7 @@ Report = Callable[[float], None]
 
 def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
           scored: ScoredSamples, zone_ids: Sequence[str], progress: Report | None = None, *,
-          threads: int | None = None) -> Proof:
+          threads: int | None = None, spindle_tool: int = 0) -> Proof:
     """Prove finished NC programs against the part.
 
     programs : (name, text) in the order they run, stock carried over
@@ -47,6 +47,7 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     zone_ids : names of the zones 1, 2, ... of ``scored.zone``
     progress : called with 0..1; an exception from it ends the proof
     threads  : 2 where None, at most the cores; the answer has the same bytes for any number
+    spindle_tool : T number in the spindle, its length offset on, before the first line of each program; 0 for none
 
     Returns
     -------
@@ -68,7 +69,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     threads = threads or min(2, os.cpu_count() or 1)
     tell = progress or (lambda _share: None)
     read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
-                         blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance))
+                         blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
+                         gauge_length=setup.gauge_length, spindle_tool=spindle_tool)
             for name, text in programs]
     top = top_of_all(part.mesh.bounds, setup)
     read = [from_above(p, top + setup.clearance_rapid) for p in read]
@@ -212,8 +214,8 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str], spacing: float,
            notes: tuple[str, ...]) -> Proof:
     length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
-    feed = np.concatenate([np.where(p.kind == FEED, p.feed, setup.rapid_feed) for p in read]) if read else length
-    took = np.divide(length, feed, out=np.zeros(len(length)), where=length > 0)
+    fed = np.concatenate([p.minutes for p in read]) if read else length
+    took = np.where(np.isnan(fed), length / setup.rapid_feed, fed)
     seconds = float(took.sum() * 60.0) + sum(p.dwell for p in read)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
     known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, bool)

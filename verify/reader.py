@@ -1,4 +1,4 @@
-"""NC text to moves of the tool tip: a 3-axis LinuxCNC / Fanuc reader of its own.
+"""NC text to moves of the tool tip: a LinuxCNC / Fanuc reader of its own for three to five axes.
 
 A program is read line by line by one modal machine. The common line, one straight move in modal
 coordinates, is taken by one regular expression; everything else goes through the full block (``words``).
@@ -8,18 +8,19 @@ standing, path blending beyond the tolerance, a word no code takes) becomes a ``
 
 Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; the axes
 left unknown are known again once programmed. Until the program says otherwise, the unit is mm and the control keeps to
-the path; what it takes for granted so is told (``Program.assumed``).
+the path; rotary axes stand at 0; what it takes for granted so is told (``Program.assumed``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from geometry.errors import ProgramError
 from verify.cycles import FEED, RAPID
+from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
 from verify.motion import Motion
 from verify.program import NAN, Program, Remark
@@ -43,10 +44,12 @@ class Reader(Motion):
             log.remark("incremental", "the program turns to incremental coordinates (G91) after cuts in absolute ones "
                        "and never turns back", line=self.incremental_line)
         table = log.table()
-        return Program(log.name, np.ascontiguousarray(table[:, 0:3]), np.ascontiguousarray(table[:, 3:6]),
-                       table[:, 6].astype(np.int8), np.ascontiguousarray(table[:, 7]), table[:, 8].astype(np.int32),
+        start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
+        return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
                        table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
-                       np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend)
+                       np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
+                       log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
+                       log.turned.poses(len(table), self.machine))
 
     def _scan(self, lines: list[str]) -> int:
         """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""
@@ -98,18 +101,18 @@ class Reader(Motion):
         """Whether a straight move needs nothing but its numbers now."""
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
-                and s.offset == s.tool and s.work_offset == self.work_offset
+                and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
                 and not any(math.isnan(v) for v in s.position))
 
     def _block(self, text: str) -> None:
         """Run one block. Order as on the control: speed, tool, spindle, modes, feed, motion, end."""
         before = len(self.log.errors)
         try:
-            block = parse_block(text)
+            block = parse_block(text, self.rotary)
             self._set_modes(block)
             self._move(block)
         except BlockError as problem:
-            return self.log.error(str(problem))
+            return self.log.error(str(problem), remedy=problem.remedy)
         if block.deleted:
             self.log.remark("block_delete", "a block with / depends on a switch of the machine; it is taken as run")
         if len(self.log.errors) == before:
@@ -121,7 +124,7 @@ class Reader(Motion):
     def _name_unused(self, block: Block) -> None:
         motion = self.s.motion
         moves = {28, 30, 53}.isdisjoint(block.codes) and not block.values.keys().isdisjoint(
-            "XYZIJK" if motion in (2, 3) else "XYZ")
+            "XYZABCIJK" if motion in (2, 3) else "XYZABC")
         used = used_letters(block, motion, moves)
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:
@@ -129,31 +132,41 @@ class Reader(Motion):
 
 
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
-                 work_offset: str = "G54", blend_limit: float = BLEND_LIMIT) -> Program:
-    """Read a 3-axis program.
+                 work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
+                 gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0) -> Program:
+    """Read a program of three, four or five axes.
 
     text        : the program
     tools       : T numbers of the tool table; any number is accepted when None
     work_offset : the one of the setup, for example 'G54'
     blend_limit : mm, what path blending (G64 P, Q) may leave the path by without a remark
+    kinematics  : the machine's rotary axes; without them no rotary word is known
+    gauge_length : mm by T number, spindle face to tip; a machine whose head tilts needs them in programs without
+                  tool centre point control
+    spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
 
     Returns
     -------
     Program
-        Tip moves in mm; arcs within 1e-3 mm of their circle.
+        Tip moves in mm; arcs and turning blocks in pieces within 1e-3 mm of what the control does.
 
     Raises
     ------
     ProgramError
         With every line that cannot be read: unknown words, two words of one modal group, a feed move without a
         feed, an arc without a centre or whose ends lie on two circles, a tool that is not in the table, a program
-        that breaks off.
+        that breaks off, a move of the joints off rotary zero where no pivots are known. Without a line:
+        ``spindle_tool`` is not in the table.
     VerificationError
         Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000.
     """
     if "\x00" in text:
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
-    return Reader(Log(name), tools, work_offset, blend_limit).read(text)
+    if spindle_tool and tools is not None and spindle_tool not in tools:
+        raise ProgramError(f"{name}: T{spindle_tool}, named as the tool in the spindle, is not in the tool table",
+                           subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
+                           remedy="name a tool of the table as spindle_tool")
+    return Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool).read(text)
 
 
 __all__ = ["FEED", "RAPID", "Program", "Reader", "Remark", "read_program"]

@@ -26,27 +26,38 @@ _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _FOREIGN = re.compile(r"[^\t -~]")
 _M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+_ROTARY = "ABC"
+_TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
 _WHOLE = "THDLM"
 
 # The modal groups of RS274: a control refuses two words of one, or takes the last; G80 has a group of its own on Fanuc.
 _G_GROUPS: tuple[frozenset[float], ...] = (
     frozenset({4, 28, 30, 53}), MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}), frozenset({90, 91}),
-    frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}), frozenset({43, 49}), frozenset({98, 99}),
-    frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}), frozenset({50}),
-    frozenset({69}),
+    frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}), frozenset({43, 43.4, 49}),
+    frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}),
+    frozenset({50}), frozenset({69}),
 )
 _M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
-                                           frozenset({7, 8, 9}))
-_G_CODES = frozenset().union(*_G_GROUPS)
+                                           frozenset({7, 8, 9}), _TCP_M)
+_G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G}
 _HINTS = {
     10: "a changed offset table", 41: "cutter radius compensation", 42: "cutter radius compensation",
-    43.4: "tool centre point control", 43.5: "tool centre point control", 52: "a shifted origin",
-    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 92: "a shifted origin",
+    43.4: "tool centre point control", 43.5: "tool centre point control by vectors", 52: "a shifted origin",
+    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 92: "a shifted origin",
 }
+_M_HINTS = {428: "tool centre point control", 429: "tool centre point control", 430: "kinematics of the shop's own"}
+NO_MACHINE = "give the machine of the setup its rotary axes: kind 5-axis and machine.kinematics"
 
 
 class BlockError(ValueError):
-    """A block that cannot be read, or could be read in two ways; the reader adds the line."""
+    """A block that cannot be read, or could be read in two ways; the reader adds the line.
+
+    remedy : what to do about it, or None where the message says it all
+    """
+
+    def __init__(self, message: str, remedy: str | None = None) -> None:
+        super().__init__(message)
+        self.remedy = remedy
 
 
 @dataclass
@@ -65,8 +76,11 @@ class Block:
     deleted: bool = False
 
 
-def parse_block(text: str) -> Block:
+def parse_block(text: str, rotary: str = "") -> Block:
     """Words of one line of a program; comments, blank lines and Fanuc O numbers give an empty block.
+
+    text   : the line
+    rotary : letters of the machine's rotary axes, such as 'AC'; none without
 
     Raises
     ------
@@ -90,32 +104,39 @@ def parse_block(text: str) -> Block:
     if "".join(a + b for a, b in words) != text:
         raise BlockError(f"cannot read '{text[:60]}'")
     for letter, digits in words:
-        _add(block, letter, digits)
+        _add(block, letter, digits, rotary)
     _check_groups("G", block.codes, _G_GROUPS)
     _check_groups("M", block.ms, _M_GROUPS)
     return block
 
 
-def _add(block: Block, letter: str, digits: str) -> None:
+def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
     number = float(digits)
     if not abs(number) <= LARGEST:
         raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, beyond {LARGEST:g}")
     if letter == "G":
-        if number not in _G_CODES:
+        if number not in _G_CODES and not (rotary and number == _TCP_G):
             hint = _HINTS.get(number)
             name = digits if "." in digits else f"{number:g}"
-            raise BlockError(f"unknown word G{name}" + (f" ({hint})" if hint else ""))
+            raise BlockError(f"unknown word G{name}" + (f" ({hint})" if hint else ""),
+                             NO_MACHINE if number == _TCP_G else None)
         block.codes.append(number)
         return
     if letter == "N":
         return
-    if letter not in "XYZIJKRPQLFSTHDM":
+    if letter in _ROTARY and letter not in rotary:
+        raise BlockError(f"unknown word {letter}{digits} (a rotary axis; the machine turns {' and '.join(rotary)})"
+                         if rotary else f"unknown word {letter}{digits} (a rotary axis; the machine has none)",
+                         None if rotary else NO_MACHINE)
+    if letter not in "XYZABCIJKRPQLFSTHDM":
         raise BlockError(f"unknown word {letter}{digits}")
     if letter in _WHOLE and (number != int(number) or number < 0):
         raise BlockError(f"unknown word {letter}{digits}: {letter} takes a whole number from 0")
     if letter == "M":
-        if number not in _M_CODES:
-            raise BlockError(f"unknown word M{digits}")
+        if number not in _M_CODES and not (rotary and number in _TCP_M):
+            hint = _M_HINTS.get(int(number))
+            raise BlockError(f"unknown word M{digits}" + (f" ({hint})" if hint else ""),
+                             NO_MACHINE if number in _TCP_M else None)
         block.ms.append(int(number))
     elif letter in block.values:
         raise BlockError(f"the word {letter} stands twice")
@@ -139,8 +160,8 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
     motion : G number in force
     moves  : whether the block makes a move of that motion
     """
-    used = "XYZFST"
-    if 43 in block.codes:
+    used = "XYZABCFST"
+    if 43 in block.codes or _TCP_G in block.codes:
         used += "H"
     if 64 in block.codes:
         used += "PQ"

@@ -1,0 +1,176 @@
+"""What rotary words do: where the axes stand, tool centre point control, and moves that turn the tool or the part.
+
+With tool centre point control (G43.4, M428) X, Y, Z are the tip in the setup frame, which goes straight whatever the
+axes do; without, they are the linear joints, and the tip of a turning block goes along a curve that the pivots give.
+In both cases every word of a block goes evenly from its start to its end. Turning blocks are written out in pieces
+(``dividing``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from verify.dividing import axis_pieces, tip_pieces
+from verify.kinematics import Kinematics
+from verify.log import Log
+from verify.program import NAN, State
+
+TURNED = 8
+"""Added to the unknown axes of a move whose rotary axes turn or stand off 0."""
+_LEAST = 1e-9  # mm, a block that moves X, Y, Z by less is one that only turns
+
+
+class Rotary:
+    """State, log and rotary axes of one reading.
+
+    machine : its rotary axes, or None without any
+    gauge   : mm by T number, spindle face to tip
+    turned  : letters of the rotary axes that the program has stated
+    """
+
+    def __init__(self, log: Log, machine: Kinematics | None, gauge: Mapping[int, float]) -> None:
+        self.log, self.machine, self.gauge = log, machine, gauge
+        self.rotary = machine.letters if machine else ""
+        self.s = State()
+        self.turned: set[str] = set()
+
+    def _turn(self, values: Mapping[str, float], *, absolute: bool = False) -> list[float] | None:
+        """(2,) deg, where the rotary words of a block take the axes; None where it has none."""
+        named = [letter in values for letter in self.rotary]
+        if not any(named):
+            return None
+        self.turned.update(letter for letter in self.rotary if letter in values)
+        relative = self.s.relative and not absolute
+        return [t if not n else values[letter] + (t if relative else 0.0)
+                for letter, n, t in zip(self.rotary, named, self.s.turn, strict=True)]
+
+    def _stand(self, turn: list[float]) -> None:
+        """The axes stand at ``turn`` now; the way there is not simulated."""
+        self.s.turn = turn
+        self.log.turned.stand(self.log.count, turn)
+
+    def _leave(self, named: Sequence[bool]) -> None:
+        """Linear axes went to a place of the machine's own; with the part or tool turned all of X, Y, Z follow."""
+        s = self.s
+        every = s.tcp and s.tilted and any(named)
+        s.position = [NAN if n or every else p for n, p in zip(named, s.position, strict=True)]
+
+    def _control(self, word: bool, switch: bool) -> None:
+        """Set tool centre point control by G43.4 and by M428; off 0 the same place then has other numbers."""
+        s = self.s
+        tip, was = self._tip(), s.tcp
+        s.tcp_word, s.tcp_switch = word, switch
+        if s.tcp == was or not s.tilted:
+            return
+        gauge = self._gauge()
+        known = self.machine is not None and gauge is not None and not any(map(math.isnan, tip))
+        if s.tcp or not known:
+            s.position = tip if s.tcp else [NAN] * 3
+        elif self.machine is not None and gauge is not None:
+            s.position = self.machine.joints(np.array([tip]), np.radians([s.turn]), gauge)[0].tolist()
+
+    def _tip(self) -> list[float]:
+        """(3,) mm, the tip in the setup frame; nan where it is not known."""
+        s = self.s
+        if s.tcp or not s.tilted:
+            return list(s.position)
+        gauge = self._gauge()
+        if gauge is None or any(map(math.isnan, s.position)):
+            return [NAN] * 3
+        return self._tips([s.position], [s.turn], gauge)[0]
+
+    def _tips(self, joints: Sequence[Sequence[float]], turns: Sequence[Sequence[float]],
+              gauge: float) -> list[list[float]]:
+        """Tips, mm, where the joints stand at ``joints``, mm, and the axes at ``turns``, deg."""
+        if self.machine is None:
+            return [list(j) for j in joints]
+        found: list[list[float]] = self.machine.tip(np.array(joints), np.radians(turns), gauge).tolist()
+        return found
+
+    def _gauge(self) -> float | None:
+        """mm from the spindle face to the tip, as far as tips depend on it; None where tips cannot be had at all."""
+        if self.machine is None or self.machine.pivots is None:
+            return None
+        return self.gauge.get(self.s.tool) if self.machine.tilts_head else 0.0
+
+    def _timing(self, feed: float, length: float, turn: list[float] | None) -> tuple[float, float]:
+        """Rate, mm/min, and minutes of a feed block; minutes are nan where length and rate say them.
+
+        feed   : mm/min, 1/min in inverse time (G93)
+        length : mm of X, Y, Z as programmed
+        turn   : (2,) deg, where the block takes the axes, None where it turns none
+
+        Inverse time says the minutes outright. Otherwise the length of X, Y, Z decides and the axes take as long;
+        where only axes turn, F is deg/min of both together, not scaled by G20. So LinuxCNC does it.
+        """
+        s = self.s
+        rate = feed * length if s.feed_mode == 93 else feed
+        if turn is None or turn == s.turn or math.isnan(length):
+            return rate, NAN
+        if s.feed_mode == 93:
+            return rate, 1.0 / feed
+        if length > _LEAST:
+            return rate, length / feed
+        return 0.0, math.dist(turn, s.turn) * s.scale / feed
+
+    def _write(self, start: list[float], target: list[float], kind: int, feed: float, unknown: int,
+               turn: list[float] | None, minutes: float) -> None:
+        """Write one straight block.
+
+        start, target : (3,) mm, of X, Y, Z as programmed; ``unknown`` : axes whose start is not known
+        feed, minutes : as of ``_timing``; turn : (2,) deg or None, where the block takes the axes
+        """
+        s, log = self.s, self.log
+        was, turning = s.turn, turn is not None and turn != s.turn
+        if turn is not None:
+            s.turn = turn
+        if not turning and (s.tcp or not s.tilted):
+            log.move(start, target, kind, feed, s.tool, unknown | TURNED if unknown and s.tilted else unknown)
+            return
+        gauge = 0.0 if s.tcp else self._gauge()
+        if gauge is None:
+            self._no_tips()
+        elif unknown:
+            self._stand(s.turn)
+            end = target if s.tcp else self._tips([target], [s.turn], gauge)[0]
+            log.move(start if s.tcp else end, end, kind, feed, s.tool, unknown | TURNED)
+        elif not turning:
+            tips = self._tips([start, target], [was, was], gauge)
+            log.move(tips[0], tips[1], kind, feed, s.tool, 0)
+        else:
+            self._swing(start, target, kind, feed, was, minutes, gauge)
+
+    def _swing(self, start: list[float], target: list[float], kind: int, feed: float, was: list[float],
+               minutes: float, gauge: float) -> None:
+        """Write a block that turns an axis from ``was`` to where it stands now, deg, in pieces."""
+        s, log = self.s, self.log
+        a, b = [math.radians(t) for t in was], [math.radians(t) for t in s.turn]
+        n = axis_pieces(a, b)
+        if not s.tcp and self.machine is not None:
+            n = max(n, tip_pieces(self.machine, start, target, (b[0] - a[0], b[1] - a[1]), gauge))
+        log.room(n)
+        points = [between(start, target, k / n) for k in range(n + 1)]
+        turns = [between(was, s.turn, k / n) for k in range(n + 1)]
+        if not s.tcp:
+            points = self._tips(points, turns, gauge)
+        for k in range(n):
+            log.turned.swing(log.count, turns[k], turns[k + 1], minutes / n)
+            log.move(points[k], points[k + 1], kind, feed, s.tool, 0)
+
+    def _no_tips(self) -> None:
+        """Refuse a move of the joints whose tip cannot be told."""
+        s = self.s
+        where = " ".join(f"{letter}{t:g}" for letter, t in zip(self.rotary, s.turn, strict=True))
+        if self.machine is not None and self.machine.pivots is not None:
+            return self.log.error(f"a move without tool centre point control at {where}, and the gauge length of "
+                                  f"T{s.tool} is not known", remedy="give the tool its gauge_length_mm")
+        return self.log.error(f"a move without tool centre point control at {where}, and where the rotary axes lie is "
+                              "not known", remedy="give machine.pivots_mm, or run the program with G43.4 or M428")
+
+
+def between(start: Sequence[float], end: Sequence[float], share: float) -> list[float]:
+    """The place at a share, 0 to 1, of the way from one list of numbers (mm or deg) to another; 1 is the end itself."""
+    return list(end) if share == 1.0 else [a + (b - a) * share for a, b in zip(start, end, strict=True)]
