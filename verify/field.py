@@ -21,9 +21,10 @@ from geometry.nearest import nearest
 from geometry.toolbody import ToolBody
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
+from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stock import EVENTS, Bodies, blank_cylinder, end_radii, gather, stock_bounds
+from verify.stock import EVENTS, Bodies, StockPass, blank_cylinder, descents, end_radii, gather, stock_bounds
 from verify.toolaxes import ToolAxes
 
 F32 = NDArray[np.float32]
@@ -129,33 +130,23 @@ def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float
     values[row] = np.where(inside[row], np.minimum(gap + reach, step), np.maximum(reach - gap, -step))
 
 
-@dataclass(frozen=True, eq=False)
-class FieldPass:
-    """What one pass over the field found.
-
-    events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
-    taken  : (m,) float64, mm³ by move; cut : (m,) bool, moves that took stock
-    dug    : (m,) float64, mm, mean depth that the end-cutting region of a steep move took off
-    """
-
-    events: F64
-    lost: int
-    taken: F64
-    cut: NDArray[np.bool_]
-    dug: F64
-
-
-def run_field(field: Field, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBody], setup: ProofSetup,
-              steep: NDArray[np.bool_], *, threads: int = 2, progress: Progress | None = None,
-              bow: float = BOW) -> FieldPass:
+def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
+              threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> StockPass:
     """Run all moves through the stock, in place, and collect what touches.
 
-    steep : (m,) bool, feed moves that go down steeper than a ramp
+    bare : cutting parts alone: bodies are not looked at
 
-    Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
+    Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
+
+    Notes
+    -----
+    Plunge: the volume that a steep descent takes off within the end-cutting region, over the area of that region, is
+    the mean depth it dug; such depths add up over the moves, and way made aside works them off at the slope of a ramp.
     """
-    cutters, bodies, ends = cutter_table(tools), Bodies.of(tools, setup), end_radii(tools)
-    reach = assembly_reach(cutters, bodies)
+    cutters, ends = cutter_table(tools), end_radii(tools)
+    bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
+    axes = moves.axes or ToolAxes.upright(len(moves))
+    reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
     spare: queue.SimpleQueue[NDArray[np.int64]] = queue.SimpleQueue()
     sums = [np.zeros((len(moves), 2), np.int64) for _ in range(max(1, threads))]
@@ -174,17 +165,20 @@ def run_field(field: Field, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBo
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
     taken = np.sum(sums, axis=0)
-    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * ends[moves.tool] ** 2) if len(moves) else np.zeros(0)
-    return FieldPass(events, lost, taken[:, 0] / VOLUME_UNITS, taken[:, 0] > 0, dug)
+    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * ends[moves.tool] ** 2)
+    plunges = _plunges(moves, dug, earned, setup.plunge_skin * 2.0 * cutters[:, 0])
+    return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, taken[:, 0] / VOLUME_UNITS)
 
 
-def assembly_reach(cutters: F64, bodies: Bodies) -> F64:
-    """(k,) float64, mm: how far each assembly, clearances included, reaches from its tip."""
-    out = np.hypot(cutters[:, 0], cutters[:, 2])
-    for k in range(len(out)):
-        rows = bodies.rows[bodies.first[k]:bodies.first[k + 1]]
-        out[k] = max(out[k], np.hypot(rows[:, 2:4].max(axis=1), rows[:, 1]).max(initial=0.0))
-    return np.asarray(out)
+def _plunges(moves: Moves, dug: F64, earned: F64, skins: F64) -> F64:
+    """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves with which more than the skin of their tool is open."""
+    rows, depth, paid = [], 0.0, 0.0
+    for m in np.flatnonzero(dug > 0.0).tolist():
+        depth = max(depth - (earned[m] - paid), 0.0) + dug[m]
+        paid = earned[m]
+        if depth > skins[moves.tool[m]]:
+            rows.append((m, PLUNGE, depth, 0.0, *moves.end[m].tolist()))
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)
 
 
 def _tiles(shape: tuple[int, ...]) -> list[NDArray[np.int64]]:

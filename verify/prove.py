@@ -23,10 +23,12 @@ from verify.findings import (
 )
 from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
+from verify.material import contacts
 from verify.model import Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.reader import FEED, Program, read_program
-from verify.removal import Moves, residual_on_normals
-from verify.stock import StockPass, blank, run_bodies, run_stock, stock_on_normals
+from verify.removal import BOW, Moves, residual_on_normals
+from verify.stock import StockPass, stock_on_normals
+from verify.toolaxes import ToolAxes
 
 RAY_ERROR = 1e-6
 LEAST_REACH = 1.0
@@ -77,19 +79,16 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     moves, source = _moves(read, tools)
     tell(0.1)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
-    field = blank(part.mesh, setup, threads=threads)
-    run = run_stock(field, moves, tools, setup, threads=threads,
-                    progress=lambda f: tell(0.6 + 0.25 * f))
-    body_points = np.concatenate([cuts.guard, cuts.edge])
-    touched, lost = run_bodies(body_points, moves, tools, setup, threads=threads,
-                               progress=lambda f: tell(0.85 + 0.15 * f))
+    met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, threads,
+                   lambda f: tell(0.6 + 0.4 * f))
+    run = met.run
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
-    findings = [*contact_findings(_merge(run.events, touched), moves.feed, source, setup.clearance_rapid, skins),
+    findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
-    notes = [f"{run.lost + lost} contacts more than the tables hold"] if run.lost + lost else []
+    notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2])))
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, tuple(notes))
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, met.spacing, tuple(notes))
 
 
 def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -116,8 +115,19 @@ def _moves(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, S
     number = number[known]
     tool = np.array([row[int(n)] for n in np.unique(number)], np.int32)[np.searchsorted(np.unique(number), number)] \
         if len(number) else np.zeros(0, np.int32)
-    moves = Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool)
+    axes = None
+    if any(p.poses is not None for p in read):
+        axes = ToolAxes.between(np.concatenate([_axes(p, True) for p in read])[known],
+                                np.concatenate([_axes(p, False) for p in read])[known])
+    moves = Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool, axes)
     return moves, Source(tuple(p.name for p in read), program, line, number)
+
+
+def _axes(p: Program, at_start: bool) -> F64:
+    """(m, 3) tool axes of a program at the start or the end of its moves."""
+    if p.poses is None:
+        return np.tile([0.0, 0.0, 1.0], (len(p), 1))
+    return p.poses.start_axis if at_start else p.poses.end_axis
 
 
 class _Cuts:
@@ -155,13 +165,6 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     out.gouges = gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
                                 setup.gouge_tolerance)
     return out
-
-
-def _merge(a: F64, b: F64) -> F64:
-    """Events of both passes, the deeper first where both saw the same body in the same move."""
-    events = np.concatenate([a, b])
-    order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
-    return events[order]
 
 
 def _program_findings(read: Sequence[Program]) -> list[Finding]:
@@ -230,7 +233,13 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
     return Proof(top, counts, cuts.residual, line, program, proved,
                  _zones(scored, cuts.residual, proved, setup, zone_ids), cuts.gouge_max, seconds,
                  float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
-                 RAY_ERROR + CHORD + max((p.blend for p in read), default=0.0), cuts.reach, spacing, notes)
+                 error_bound(read), cuts.reach, spacing, notes)
+
+
+def error_bound(read: Sequence[Program]) -> float:
+    """Largest error of a residual, mm: of the rays, of chords, of blending the programs allow, of turning tools."""
+    turning = BOW if any(p.poses is not None for p in read) else 0.0
+    return RAY_ERROR + CHORD + max((p.blend for p in read), default=0.0) + turning
 
 
 __all__ = ["Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

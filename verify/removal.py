@@ -50,6 +50,11 @@ class Moves:
     def __len__(self) -> int:
         return len(self.start)
 
+    def only(self, chosen: NDArray[np.bool_]) -> Moves:
+        """The moves where ``chosen`` (m,) bool is true."""
+        axes = None if self.axes is None else self.axes.only(chosen)
+        return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes)
+
 
 @dataclass(frozen=True, eq=False)
 class CellGrid:

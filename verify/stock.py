@@ -78,6 +78,14 @@ class Bodies:
             first.append(len(rows))
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
 
+    def reach(self, cutters: F64) -> F64:
+        """(k,) float64, mm: how far each assembly reaches from its tip; cutters (k, 3) as ``cutter_table``."""
+        out = np.hypot(cutters[:, 0], cutters[:, 2])
+        for k in range(len(out)):
+            own = self.rows[self.first[k]:self.first[k + 1]]
+            out[k] = max(out[k], np.hypot(np.maximum(own[:, 2], own[:, 3]), own[:, 1]).max(initial=0.0))
+        return np.asarray(out)
+
 
 def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float, float, float, int]]:
     neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
@@ -180,15 +188,22 @@ def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: flo
 def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
     """Feed moves that descend steeper than ``ramp_angle`` (rad), and what ramps could have taken since the beginning.
 
+    Down is along the tool, for one that turns along its axis half way.
+
     Returns
     -------
     steep : (m,) bool
     earned : (m,) float64, mm: sideways way of all moves before that are not steep, times the tangent of the angle;
              without end at a change of the tool
     """
-    d = moves.end - moves.start
-    aside, slope = np.hypot(d[:, 0], d[:, 1]), math.tan(ramp_angle)
-    steep = np.asarray(moves.feed & (-d[:, 2] > aside * slope + 1e-9))
+    d, slope = moves.end - moves.start, math.tan(ramp_angle)
+    if moves.axes is None:
+        rise, aside = d[:, 2], np.hypot(d[:, 0], d[:, 1])
+    else:
+        up = moves.axes.middle
+        rise = np.einsum("ij,ij->i", d, up)
+        aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
+    steep = np.asarray(moves.feed & (-rise > aside * slope + 1e-9))
     earned = np.cumsum(np.where(steep, 0.0, aside * slope))
     changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
     return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
@@ -200,11 +215,13 @@ class StockPass:
 
     events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
     cut    : (m,) bool, moves that took stock
+    taken  : (m,) float64, mm³ by move, or None where that is not known
     """
 
     events: F64
     lost: int
     cut: NDArray[np.bool_]
+    taken: F64 | None = None
 
 
 def end_radii(tools: Sequence[ToolBody]) -> F64:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64
 
@@ -41,6 +42,16 @@ class ToolAxes:
         about -= np.einsum("ij,ij->i", about, start)[:, None] * start
         about /= np.linalg.norm(about, axis=1)[:, None]
         return cls(np.ascontiguousarray(start), about, np.where(still, 0.0, angle))
+
+    @property
+    def middle(self) -> F64:
+        """(m, 3) float64 unit axes half way."""
+        half = 0.5 * self.angle[:, None]
+        return np.asarray(np.cos(half) * self.axis + np.sin(half) * np.cross(self.about, self.axis))
+
+    def only(self, chosen: NDArray[np.bool_]) -> ToolAxes:
+        """The axes where ``chosen`` (m,) bool is true."""
+        return ToolAxes(self.axis[chosen], self.about[chosen], self.angle[chosen])
 
     @classmethod
     def upright(cls, count: int) -> ToolAxes:

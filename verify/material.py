@@ -1,0 +1,74 @@
+"""What the moves do to the stock and what they touch, by the model that suits their tool axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64, TriangleMesh
+from geometry.toolbody import ToolBody
+from verify.clash import fixture_points, run_clashes
+from verify.field import Field, run_field, stock_field
+from verify.model import ProofSetup
+from verify.removal import Moves
+from verify.stock import StockPass, blank, run_bodies, run_stock
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """What one pass over the stock and the points of the part found.
+
+    run     : StockPass; its events hold those of the part as well, the deeper first
+    spacing : mm between the lines or nodes of the stock
+    """
+
+    run: StockPass
+    spacing: float
+
+
+def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, threads: int,
+             progress: Callable[[float], None]) -> Contacts:
+    """Run all moves through the stock and past the part.
+
+    mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
+
+    Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``).
+    """
+    def share(low: float, wide: float) -> Callable[[float], None]:
+        return lambda f: progress(low + wide * f)
+
+    if moves.axes is None:
+        lines = blank(mesh, setup, threads=threads)
+        run = run_stock(lines, moves, tools, setup, threads=threads, progress=share(0.0, 0.6))
+        met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=share(0.6, 0.4))
+        spacing = lines.step
+    else:
+        field = stock_field(mesh, setup, setup.line_spacing, threads=threads)
+        run = run_field(field, moves, tools, setup, threads=threads, progress=share(0.0, 0.7))
+        held = fixture_points(setup.fixtures, float(mesh.bounds[0, 2]))
+        fixed = np.repeat([False, True], [len(points), len(held)])
+        met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
+                                progress=share(0.7, 0.3))
+        spacing = field.step
+    return Contacts(StockPass(_merge(run.events, met), run.lost + lost, run.cut, run.taken), spacing)
+
+
+def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,
+             box: F64 | None = None, threads: int = 2, progress: Callable[[float], None] | None = None) -> Field:
+    """The stock after all feed moves, as fine as asked.
+
+    step : mm between nodes, wider where that would take over 24 million of them
+    box  : (2, 3) float64, mm, the piece of space looked at; all of the stock where None
+    """
+    field = stock_field(mesh, setup, step, box=box, threads=threads)
+    run_field(field, moves.only(moves.feed), tools, setup, bare=True, threads=threads, progress=progress)
+    return field
+
+
+def _merge(a: F64, b: F64) -> F64:
+    """Events of both passes, the deeper first where both saw the same body in the same move."""
+    events = np.concatenate([a, b])
+    order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
+    return np.asarray(events[order])
