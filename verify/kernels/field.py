@@ -125,12 +125,13 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, total
 
 
 @njit(**KERNEL)
-def _meet_node(v, q, d, body, grow, slack):
-    """Depth of the stock within v of a node in one body grown by ``grow``, as an event counts it."""
+def _meet_node(v, q, d, body, grow, slack, known):
+    """Depth of the stock within v of a node in one body grown by ``grow``, as an event counts it; 0 if under ``known``.
+    """
     z0, z1 = body[0] - v, body[1] + v
     depth = overlap(q[0], q[1], q[2], 0.0, 0.0, 0.0, d[0], d[1], d[2], z0, z1, body[2] + grow + v, body[3] + grow + v,
                     False)
-    if depth <= slack:
+    if depth <= max(slack, known):
         return 0.0
     clearance = body[4] + grow
     bare = penetration(q[0], q[1], q[2], d[0], d[1], d[2], z0, z1, body[2] - body[4] + v, body[3] - body[4] + v, False)
@@ -161,8 +162,9 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                 qx, qy, qz, dx, dy, dz = view(p, origin[0] + (i0 + 1.5) * h, origin[1] + (j0 + 1.5) * h,
                                               origin[2] + (k0 + 1.5) * h)
                 far = half + top
+                # no node here can be deeper than that
                 if overlap(qx, qy, qz, 0.0, 0.0, 0.0, dx, dy, dz, z0 - far, z1 + far, wide + far, wide + far,
-                           False) <= 0.0:
+                           False) <= best[code, 0]:
                     continue
                 for i in range(i0, min(i0 + 4, tile[1])):
                     for j in range(j0, min(j0 + 4, tile[3])):
@@ -180,7 +182,7 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                                                        cutter[2])
                                     depth = min(near, grow) if near > slack else 0.0
                             else:
-                                depth = _meet_node(v, (qx, qy, qz), (dx, dy, dz), body, grow, slack)
+                                depth = _meet_node(v, (qx, qy, qz), (dx, dy, dz), body, grow, slack, best[code, 0])
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
 
