@@ -58,7 +58,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     ProgramError
         A program cannot be read; the subjects name the lines.
     VerificationError
-        Two tools share a number, a cutting part is impossible, or samples and zones do not fit each other.
+        Two tools share a number, a cutting part is impossible, samples and zones do not fit each other, or a program
+        leaves rotary zero.
 
     Notes
     -----
@@ -72,6 +73,7 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                          blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
                          gauge_length=setup.gauge_length, spindle_tool=spindle_tool)
             for name, text in programs]
+    _check_standing(read)
     top = top_of_all(part.mesh.bounds, setup)
     read = [from_above(p, top + setup.clearance_rapid) for p in read]
     moves, source = _moves(read, tools)
@@ -88,7 +90,7 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                 *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost + lost} contacts more than the tables hold"] if run.lost + lost else []
-    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2])))
+    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, field.step, tuple(notes))
 
 
@@ -101,6 +103,17 @@ def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
         raise VerificationError("samples and zones do not fit each other", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))
+
+
+def _check_standing(read: Sequence[Program]) -> None:
+    """Refuse what the material model cannot simulate: it knows of tools along Z."""
+    for p in read:
+        if p.poses is not None:
+            m = int(np.argmin(np.minimum(p.poses.start_axis[:, 2], p.poses.end_axis[:, 2])))
+            raise VerificationError(f"{p.name}, line {p.line[m]}: the tool does not stand along Z, and removal is "
+                                    "simulated along Z only", code="tilted_tool_not_simulated",
+                                    subjects=(f"line {p.line[m]}",),
+                                    remedy="verify the blocks with both rotary axes at 0 as a program of their own")
 
 
 def _moves(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
