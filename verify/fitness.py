@@ -65,7 +65,11 @@ def _doglegs(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
     if not setup.dogleg or len(p) == 0:
         return
     clear = top + setup.clearance_rapid - 1e-6
-    moved = (np.abs(p.end - p.start) > 1e-9).sum(axis=1) > 1
+    start, end = joints_of(p, setup) or (p.start, p.end)
+    axes = (np.abs(end - start) > 1e-9).sum(axis=1)
+    if p.poses is not None:
+        axes += (p.poses.start_turn != p.poses.end_turn).sum(axis=1)
+    moved = axes > 1
     low = np.minimum(p.start[:, 2], p.end[:, 2])
     bad = np.flatnonzero((p.kind != FEED) & moved & (low < clear))
     if len(bad):

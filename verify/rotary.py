@@ -28,7 +28,7 @@ class Rotary:
 
     machine : its rotary axes, or None without any
     gauge   : mm by T number, spindle face to tip
-    turned  : letters of the rotary axes that the program has stated
+    turned  : letters of the rotary axes whose angle the program has stated
     """
 
     def __init__(self, log: Log, machine: Kinematics | None, gauge: Mapping[int, float]) -> None:
@@ -42,8 +42,9 @@ class Rotary:
         named = [letter in values for letter in self.rotary]
         if not any(named):
             return None
-        self.turned.update(letter for letter in self.rotary if letter in values)
         relative = self.s.relative and not absolute
+        if not relative:
+            self.turned.update(letter for letter in self.rotary if letter in values)
         return [t if not n else values[letter] + (t if relative else 0.0)
                 for letter, n, t in zip(self.rotary, named, self.s.turn, strict=True)]
 
