@@ -22,8 +22,6 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite JSON number; strings and booleans are refused."""
 Count = Annotated[int, Field(strict=True)]
 """A JSON integer; strings and booleans are refused."""
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-"""Three numbers x, y, z."""
 LARGEST = 1e6
 """Largest component of a position (mm: a kilometre) or direction; beyond it double precision has no micrometre."""
 BoundedNumber = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]

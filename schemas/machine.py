@@ -1,4 +1,4 @@
-"""The machine of a setup: what is built so far is one tool axis, LinuxCNC."""
+"""The machine of a setup: plans are for one tool axis and LinuxCNC; programs of five axes can be verified."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.base import Number, Triple, Vector, WireModel
+from schemas.base import BoundedNumber, Number, Triple, WireModel
 
 BUILT_DIALECTS = ("linuxcnc",)
+AngleRange = Annotated[list[BoundedNumber], Field(min_length=2, max_length=2)]
+"""Least and greatest angle, deg."""
 
 
 class Machine(WireModel):
@@ -17,21 +19,35 @@ class Machine(WireModel):
     model_config = {"json_schema_extra": {"examples": [{
         "kind": "3-axis", "dialects": ["linuxcnc"], "max_rpm": 18000, "rapid_mm_min": 10000}]}}
 
-    kind: Annotated[Literal["3-axis", "5-axis"], Field(description="5-axis is not built yet.")] = "3-axis"
+    kind: Annotated[Literal["3-axis", "5-axis"], Field(
+        description="Programs of a 5-axis machine can be verified; zones and plans for one are not built "
+                    "yet.")] = "3-axis"
     kinematics: Annotated[Literal["table-table-AC", "table-table-BC", "head-table-BC", "head-head-BC",
-                                  "head-head-AC"] | None,
-                          Field(description="Rotary axes of a 5-axis machine; null on a 3-axis one.")] = None
+                                  "head-head-AC"] | None, Field(
+        description="Rotary axes of a 5-axis machine, the tilting one first, by what carries them; needed there, null "
+                    "on a 3-axis one. A table turns the part by Rz(C) and then Rx(A) or Ry(B), as LinuxCNC's "
+                    "xyzac-trt does; a head turns the tool by Rx(A) or Ry(B) and then Rz(C).")] = None
     tcp: Annotated[bool, Field(description="The control keeps the tool tip in rotary moves; no effect on a 3-axis "
-                                           "machine.")] = True
+                                           "machine, nor on a program that is verified: that says so by G43.4 or "
+                                           "M428.")] = True
     dialects: Annotated[list[str], Field(min_length=1, max_length=8,
                                          description="Controls to write for; built so far: linuxcnc.")] = ["linuxcnc"]
     travel_mm: Annotated[Triple | None, Field(
         description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
                     "counted; where on the machine is for the work offset. null: not limited.")] = None
-    rotary_deg: Annotated[list[list[Number]] | None, Field(description="Limits of the rotary axes, deg; null on a "
-                                                                       "3-axis machine.")] = None
-    pivots_mm: Annotated[list[Vector] | None, Field(description="Pivot points of the rotary axes, mm; null on a "
-                                                                "3-axis machine.")] = None
+    rotary_deg: Annotated[list[AngleRange] | None, Field(
+        min_length=2, max_length=2, description="Least and greatest angle of the rotary axes, the tilting one first, "
+                                                "deg; null: not limited, and on a 3-axis machine.")] = None
+    rotary_rate_deg_min: Annotated[Number | None, Field(
+        ge=1, le=1e7, description="Fastest a rotary axis turns in a feed move, deg/min; null: not limited, and on a "
+                                  "3-axis machine.")] = None
+    pivots_mm: Annotated[list[Triple] | None, Field(
+        min_length=1, max_length=2,
+        description="Where the rotary axes lie, mm, in the frame of the program while both stand at 0. table-table: a "
+                    "point on the tilting and one on the turning axis; head-table: [0, 0, spindle face up to the "
+                    "swivel] and a point on the turning axis; head-head: the first alone. null: travel of the linear "
+                    "axes is not checked, and programs without tool centre point control are refused off 0; on a "
+                    "3-axis machine.")] = None
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed, 1/min; null: plans stay at or below 18000, and programs are "
                                   "held to no limit but those of the tools.")] = None
@@ -49,11 +65,7 @@ class Machine(WireModel):
 
     @model_validator(mode="after")
     def _check(self) -> Machine:
-        if self.kind == "5-axis":
-            raise ValueError("machine.kind '5-axis' is not built yet; use '3-axis'")
-        for name in ("kinematics", "rotary_deg", "pivots_mm"):
-            if getattr(self, name) is not None:
-                raise ValueError(f"machine.{name} belongs to a 5-axis machine, which is not built yet; leave it null")
+        self._check_rotary()
         if absent := [d for d in self.dialects if d not in BUILT_DIALECTS]:
             raise ValueError(f"dialect {', '.join(map(repr, absent))} is not built yet; "
                              f"use {', '.join(BUILT_DIALECTS)}")
@@ -62,3 +74,24 @@ class Machine(WireModel):
         if self.travel_mm is not None and min(self.travel_mm) <= 0:
             raise ValueError("machine.travel_mm must be positive in X, Y and Z")
         return self
+
+    def _check_rotary(self) -> None:
+        """What belongs to rotary axes stands on a 5-axis machine only, and fits them."""
+        if self.kind == "3-axis":
+            for name in ("kinematics", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"machine.{name} belongs to a 5-axis machine; leave it null, or say kind '5-axis'")
+            return
+        if self.kinematics is None:
+            raise ValueError("machine.kinematics is needed where machine.kind is '5-axis', such as 'table-table-AC'")
+        for letter, limits in zip(self.kinematics[-2:], self.rotary_deg or (), strict=False):
+            if limits[0] >= limits[1]:
+                raise ValueError(f"machine.rotary_deg of {letter}: {limits[0]:g} is not below {limits[1]:g}")
+        if self.pivots_mm is None:
+            return
+        if len(self.pivots_mm) != (wanted := 1 if self.kinematics.startswith("head-head") else 2):
+            raise ValueError(f"machine.pivots_mm has {len(self.pivots_mm)} points, {self.kinematics} takes {wanted}")
+        x, y, z = self.pivots_mm[0]
+        if self.kinematics.startswith("head") and (x != 0 or y != 0 or z < 0):
+            raise ValueError(f"machine.pivots_mm of {self.kinematics} begins with [0, 0, distance from the spindle "
+                             "face up to the swivel]")

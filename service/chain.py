@@ -23,7 +23,7 @@ from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
-from service.convert import tool_bodies
+from service.convert import check_plannable, check_spindle_tool, machine_kinematics, rotary_limits, tool_bodies
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
@@ -63,6 +63,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
     CamError
         Wrong input, limits exceeded, or a bug.
     """
+    check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
     ready = prepare(part_path, setup, progress)
     scored = score(ready)
@@ -137,6 +138,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
     CamError
         As ``plan``.
     """
+    check_plannable(setup)
     ready = prepare(part_path, setup, progress)
     out = reporting.dry_report(ready)
     progress("done", 1.0)
@@ -144,26 +146,30 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
 
 
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
-                   access: str | None = None) -> dict[str, Any]:
+                   access: str | None = None, spindle_tool: int = 0) -> dict[str, Any]:
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
-    frame of one access, the first where ``access`` is None.
+    frame of one access, the first where ``access`` is None; ``spindle_tool`` is the T number that stands in the
+    spindle, its length offset on, before its first line, 0 for none.
 
     Raises
     ------
     CamError
-        As ``plan``; ``ProgramError`` where the program cannot be read, ``SetupError`` (``no_such_access``).
+        As ``plan``; ``ProgramError`` where the program cannot be read, ``SetupError`` (``no_such_access``,
+        ``no_such_tool``).
     """
     known = [a.id for a in setup.access]
     if access is not None and access not in known:
         raise SetupError(f"the setup has no access {access}; it has {', '.join(known)}", code="no_such_access",
                          subjects=(access,), remedy="name one of them, or leave it out for the first")
+    check_spindle_tool(setup, spindle_tool)
     ready = prepare(part_path, setup, progress)
     view = ready.view(access or known[0])
     dense = turned_samples(score(ready).samples, view.rotation @ view.first.T)
     proof = prove([("program", program_text)], view.part, tool_bodies(setup), proof_setup(ready, view),
-                  ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f))
+                  ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f),
+                  spindle_tool=spindle_tool)
     progress("done", 1.0)
     return reporting.verification_report(ready, in_setup_frame(view, proof), dense)
 
@@ -252,7 +258,9 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
         gauge_length={body.number: t.gauge_length_mm or 0.0 for t, body in zip(s.tools, tool_bodies(s), strict=True)},
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
-                 if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])})
+                 if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
+        kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
+        rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
 
 
 def _preview(ready: Prepared, sides: list[Side], report: dict[str, Any], stays: np.ndarray, path: Path) -> None:

@@ -1,8 +1,9 @@
 # The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
 """``python -m service.child REQUEST.json FD``: run one job, send progress lines to the pipe FD.
 
-The request is {"kind", "part", "setup", "program", "out", "chain", "address_bytes"}. Lines on the pipe are JSON:
-{"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
+The request is {"kind", "part", "setup", "program", "spindle_tool", "out", "chain", "address_bytes"}. Lines on the pipe
+are JSON: {"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an
+error.
 """
 
 
@@ -61,7 +62,8 @@ def compute(request, progress):
         state = "done"
     else:
         text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
-        result, name = chain.verify_program(part, setup, text, progress), "report.json"
+        result = chain.verify_program(part, setup, text, progress, spindle_tool=request["spindle_tool"])
+        name = "report.json"
         state = "unproved" if result["findings"] else "proved"
     if not (out / name).exists():
         (out / name).write_text(json.dumps(result, indent=1, sort_keys=True, allow_nan=False) + "\n")

@@ -63,6 +63,8 @@ def verify(part: Part, setup: SetupPath,
            program: Annotated[Path, typer.Option("--program", metavar="FILE.ngc", help="The NC program.")],
            access: Annotated[str | None, typer.Option(help="Access of the setup the program is for; default the "
                                                           "first.")] = None,
+           spindle_tool: Annotated[int, typer.Option(min=0, help="T number of the tool in the spindle, length offset "
+                                                                 "on, before the first line; 0 for none.")] = 0,
            as_json: AsJson = False) -> None:
     """Prove any program, also a foreign one; prints the findings."""
 
@@ -70,7 +72,7 @@ def verify(part: Part, setup: SetupPath,
         from service.chain import verify_program
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        result = verify_program(part, given, read_program(program), progress, access)
+        result = verify_program(part, given, read_program(program), progress, access, spindle_tool)
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     _exit(part, setup, run, as_json)

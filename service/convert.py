@@ -13,8 +13,10 @@ from pydantic import ValidationError
 
 from geometry.errors import SetupError
 from geometry.toolbody import HolderSegment, ToolBody
+from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
+from verify.kinematics import Kinematics
 
 OBJECT_WANTED = ("model_type", "model_attributes_type", "dict_type")
 Library = Mapping[str, Mapping[str, Any]]
@@ -84,6 +86,50 @@ def check_blank(setup: Setup) -> None:
                          subjects=("quality.stock_allowance_mm", "stock.margin_mm", "stock.uncertainty_mm"),
                          measured=allowance, limit=grown, remedy="leave less on the part, or give the blank a larger "
                                                                  "margin_mm")
+
+
+def check_plannable(setup: Setup) -> None:
+    """Refuse a machine that zones and plans are not built for.
+
+    Raises
+    ------
+    SetupError
+        Code 'five_axis_not_planned'.
+    """
+    if setup.machine.kind == "5-axis":
+        raise SetupError("zones and plans are for machines of three axes so far; on a 5-axis one only finished "
+                         "programs can be verified", code="five_axis_not_planned", subjects=("machine.kind",),
+                         measured=setup.machine.kind, limit="3-axis",
+                         remedy="take machine.kind '3-axis' without rotary fields, or verify a program: zonemill "
+                                "verify, POST /v1/verifications")
+
+
+def check_spindle_tool(setup: Setup, number: int) -> None:
+    """Refuse a tool in the spindle that the setup does not have; 0 is none.
+
+    Raises
+    ------
+    SetupError
+        Code 'no_such_tool'.
+    """
+    known = sorted(t.number or 0 for t in setup.tools)
+    if number != 0 and number not in known:
+        raise SetupError(f"the setup has no tool T{number} that could stand in the spindle; it has "
+                         f"{', '.join(f'T{n}' for n in known)}", code="no_such_tool", subjects=("spindle_tool",),
+                         measured=number, limit=known, remedy="name one of them, or leave it out")
+
+
+def machine_kinematics(machine: Machine) -> Kinematics | None:
+    """Rotary axes of a machine in the words of the proof; None on one of three axes."""
+    if machine.kinematics is None:
+        return None
+    pivots = machine.pivots_mm
+    return Kinematics(machine.kinematics, None if pivots is None else tuple((x, y, z) for x, y, z in pivots))
+
+
+def rotary_limits(machine: Machine) -> NDArray[np.float64] | None:
+    """(2, 2) float64, rad, least and greatest angle of the tilting and the turning axis; None where not limited."""
+    return None if machine.rotary_deg is None else np.radians(machine.rotary_deg)
 
 
 def read_setup(path: Path, library: Library | None = None) -> Setup:

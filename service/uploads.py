@@ -15,7 +15,7 @@ from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_text import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.artifacts import Artifacts
-from service.convert import parse_setup
+from service.convert import check_plannable, check_spindle_tool, parse_setup
 from service.engine import Engine
 from service.errors import RequestError
 from service.store import NewJob
@@ -23,6 +23,8 @@ from service.store import NewJob
 CHUNK = 1 << 20
 MAX_SETUP_BYTES = 4_000_000
 KEY_LIMIT = 255
+TOOL_DIGITS = 6
+SPINDLE_TOOL = "spindle_tool"
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class Form:
     part: UploadFile
     setup: bytes
     program: UploadFile | None
+    spindle_tool: int = 0
 
 
 async def read_form(request: Request, *, with_program: bool) -> Form:
@@ -40,7 +43,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     Raises
     ------
     RequestError
-        A part is missing or stands there twice, or one is not known.
+        A part is missing or stands there twice, one is not known, or ``spindle_tool`` is no T number.
     """
     wanted = {"part", "setup"} | ({"program"} if with_program else set())
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
@@ -55,10 +58,11 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                            remedy="let the client write the multipart body: curl -F part=@PART.step -F "
                                   "'setup=@SETUP.json;type=application/json'") from None
     names = [name for name, _ in form.multi_items()]
-    for name in sorted(set(names) - wanted):
+    optional = {SPINDLE_TOOL} if with_program else set()
+    for name in sorted(set(names) - wanted - optional):
         raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
                            remedy=f"send {' and '.join(sorted(wanted))}, each once")
-    for name in sorted(wanted):
+    for name in sorted(wanted | (optional & set(names))):
         if (count := names.count(name)) != 1:
             raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
                                subjects=(name,), code="repeated_part" if count else "missing_part", measured=count,
@@ -67,7 +71,16 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     if not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile)):
         raise RequestError("part and program must be sent as files, with a file name", code="not_a_file",
                            subjects=("part",), remedy="curl -F part=@PART.step")
-    return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None)
+    return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
+                _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0)
+
+
+def _tool_number(data: bytes) -> int:
+    if not data.isdigit() or len(data) > TOOL_DIGITS:
+        raise RequestError(f"{SPINDLE_TOOL} is to be a T number, digits only", code="bad_spindle_tool",
+                           subjects=(SPINDLE_TOOL,), measured=ascii(data[:20]),
+                           remedy="send the number of the tool in the spindle, or leave the field out")
+    return int(data)
 
 
 async def _bytes_of(field: Any) -> bytes:
@@ -94,11 +107,14 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
         raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
                            measured=len(key), limit=KEY_LIMIT, remedy="a UUID will do")
     setup = parse_setup(form.setup, engine.library.all())
+    if kind != "verify":
+        check_plannable(setup)
+    check_spindle_tool(setup, form.spindle_tool)
     part_sha = store_part(engine.artifacts, form.part.file)
     program_sha = _store_program(engine.artifacts, form.program.file) if form.program else None
     setup_sha = setup_sha256(setup)
-    return NewJob(kind, principal, content_of(part_sha, setup_sha, program_sha), part_sha, setup_sha,
-                  canonical_json(setup).decode(), _labels(setup), program_sha, key)
+    return NewJob(kind, principal, content_of(part_sha, setup_sha, program_sha, form.spindle_tool), part_sha, setup_sha,
+                  canonical_json(setup).decode(), _labels(setup), program_sha, form.spindle_tool, key)
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
@@ -132,9 +148,11 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
         yield chunk
 
 
-def content_of(part_sha256: str, setup_sha: str, program_sha256: str | None = None) -> str:
-    """The content hash of ``schemas.setup.content_hash``, from hashes; a program counts too."""
+def content_of(part_sha256: str, setup_sha: str, program_sha256: str | None = None,
+               spindle_tool: int = 0) -> str:
+    """The content hash of ``schemas.setup.content_hash``, from hashes; a program and the tool before it count too."""
     text = f"{part_sha256}:{setup_sha}" + (f":{program_sha256}" if program_sha256 else "")
+    text += f":T{spindle_tool}" if spindle_tool else ""
     return hashlib.sha256(text.encode()).hexdigest()
 
 

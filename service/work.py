@@ -79,7 +79,8 @@ class _Attempt:
     def run(self) -> tuple[str, str]:
         """Final state and key of the result."""
         row = self.row
-        key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"])
+        key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
+                           row["spindle_tool"])
         if not self.artifacts.has_result(key):
             self._make(key)
         return (self.artifacts.result(key) / "state").read_text().strip(), key
@@ -99,7 +100,7 @@ class _Attempt:
         request = {
             "kind": self.row["kind"], "part": str(self.artifacts.blob(self.row["part_sha256"])),
             "setup": self.row["setup_json"], "program": str(self.artifacts.blob(program)) if program else None,
-            "out": str(workspace), "chain": self.config.chain,
+            "spindle_tool": self.row["spindle_tool"], "out": str(workspace), "chain": self.config.chain,
         }
         try:
             state = supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,

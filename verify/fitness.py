@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from verify.cycles import FEED
@@ -15,6 +16,8 @@ from verify.stock import stock_bounds
 
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 Z_AXIS = 4
+LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
+RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from decimals
 
 
 def top_of_all(bounds: F64, setup: ProofSetup) -> float:
@@ -62,7 +65,11 @@ def _doglegs(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
     if not setup.dogleg or len(p) == 0:
         return
     clear = top + setup.clearance_rapid - 1e-6
-    moved = (np.abs(p.end - p.start) > 1e-9).sum(axis=1) > 1
+    start, end = joints_of(p, setup) or (p.start, p.end)
+    axes = (np.abs(end - start) > 1e-9).sum(axis=1)
+    if p.poses is not None:
+        axes += (p.poses.start_turn != p.poses.end_turn).sum(axis=1)
+    moved = axes > 1
     low = np.minimum(p.start[:, 2], p.end[:, 2])
     bad = np.flatnonzero((p.kind != FEED) & moved & (low < clear))
     if len(bad):
@@ -81,26 +88,92 @@ def _low_stops(p: Program, top: float) -> Iterator[Finding]:
 
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
-    """What the machine or a tool cannot do: travel, feed, spindle speed; one finding per program and limit."""
-    return [found for p in read for found in (*_travel(p, setup), *_feeds(p, setup), *_speeds(p, setup))]
+    """What the machine or a tool cannot do: travel, angles, rates, feed, spindle speed; one per program and limit."""
+    return [found for p in read for found in (*_travel(p, setup), *_angles(p, setup), *_rates(p, setup),
+                                              *_feeds(p, setup), *_speeds(p, setup))]
+
+
+def joints_of(p: Program, setup: ProofSetup) -> tuple[F64, F64] | None:
+    """Linear joints, (m, 3) float64, mm, where every move starts and ends; None where poses need pivots nobody gave.
+
+    While the rotary axes stand at 0 the joints are the tip.
+    """
+    if p.poses is None or setup.kinematics is None:
+        return p.start, p.end
+    if setup.kinematics.pivots is None:
+        return None
+    gauge = _gauges(p, setup)
+    return (setup.kinematics.joints(p.start, p.poses.start_turn, gauge),
+            setup.kinematics.joints(p.end, p.poses.end_turn, gauge))
+
+
+def _gauges(p: Program, setup: ProofSetup) -> F64:
+    """(m,) mm from the spindle face to the tip, move by move."""
+    numbers, which = np.unique(p.tool, return_inverse=True)
+    lengths = np.array([setup.gauge_length.get(int(t), 0.0) for t in numbers])
+    return np.asarray(lengths[which])
 
 
 def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
     """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it."""
     if setup.travel is None or len(p) == 0:
         return
-    lengths = {int(t): setup.gauge_length.get(int(t), 0.0) for t in np.unique(p.tool)}
-    spindle = p.end + np.array([[0.0, 0.0, lengths[t]] for t in p.tool.tolist()])
+    joints = joints_of(p, setup)
+    if joints is None:
+        return
+    end, lengths = joints[1], _gauges(p, setup)
+    spindle = end + np.column_stack([np.zeros((len(p), 2)), lengths])
     for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
         low, high = int(np.argmin(spindle[:, axis])), int(np.argmax(spindle[:, axis]))
         span = float(spindle[high, axis] - spindle[low, axis])
         if span > limit + 1e-6:
-            ends = " to ".join(f"{p.end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
-            more = f" and tool lengths from {lengths[int(p.tool[low])]:g} to {lengths[int(p.tool[high])]:g} mm" \
-                if axis == 2 and any(lengths.values()) else ""
+            ends = " to ".join(f"{end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
+            more = f" and tool lengths from {lengths[low]:g} to {lengths[high]:g} mm" \
+                if axis == 2 and lengths.any() else ""
+            what = "the program moves" if p.poses is None else "the program moves the linear axes"
             yield _finding(FindingKind.LIMIT, p, max(low, high), span - limit, limit,
-                           f"the program moves over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
+                           f"{what} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
                            f"travels {limit:g} mm")
+
+
+def _angles(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    if p.poses is None or setup.kinematics is None or setup.rotary_limits is None:
+        return
+    turn, (low, high) = np.degrees(p.poses.end_turn), np.degrees(setup.rotary_limits).T
+    beyond = np.maximum(low - turn, turn - high)
+    for k, letter in enumerate(setup.kinematics.letters):
+        m = int(np.argmax(beyond[:, k]))
+        if beyond[m, k] > LEAST_ANGLE:
+            limit = float(high[k] if turn[m, k] > high[k] else low[k])
+            yield _finding(FindingKind.LIMIT, p, m, float(beyond[m, k]), limit,
+                           f"{letter}{turn[m, k]:g} is beyond the {low[k]:g} to {high[k]:g} deg the machine turns "
+                           f"{letter} to", int((beyond[:, k] > LEAST_ANGLE).sum()))
+
+
+def _rates(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    """Feed moves that ask a linear axis for more than its rapid, or a rotary one for more than its rate.
+
+    Near the pole a slow tip makes them race.
+    """
+    if p.poses is None or setup.kinematics is None:
+        return
+    joints, fed = joints_of(p, setup), p.minutes > 0
+    if joints is not None:
+        yield from _racing(p, np.abs(joints[1] - joints[0]), fed, "XYZ", setup.rapid_feed, "mm/min")
+    if setup.rotary_rate is not None:
+        turned = np.degrees(np.abs(p.poses.end_turn - p.poses.start_turn))
+        yield from _racing(p, turned, fed, setup.kinematics.letters, float(np.degrees(setup.rotary_rate)), "deg/min")
+
+
+def _racing(p: Program, way: F64, fed: NDArray[np.bool_], letters: str, limit: float, unit: str) -> Iterator[Finding]:
+    """One finding per axis whose way (m, n) over the minutes of its move is faster than a limit."""
+    rate = np.divide(way, p.minutes[:, None], out=np.zeros(way.shape), where=fed[:, None])
+    over = rate > limit * (1.0 + RATE_ROUNDING)
+    for k in np.flatnonzero(over.any(axis=0)).tolist():
+        m = int(np.argmax(rate[:, k]))
+        yield _finding(FindingKind.LIMIT, p, m, float(rate[m, k]) - limit, limit,
+                       f"the feed asks {rate[m, k]:.6g} {unit} of {letters[k]}, which the machine moves at {limit:g} "
+                       f"{unit} at most: feed slower, or tilt the tool away from the pole", int(over[:, k].sum()))
 
 
 def _feeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
@@ -121,8 +194,9 @@ def _speeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
                           f"S{speed:g} with T{tool} is over the {limit:g} 1/min it may turn at")
 
 
-def notes_on(p: Program, bottom: float) -> Iterator[str]:
-    """What is no finding and should be known: words taken for granted; tips below ``bottom`` mm, the part's underside.
+def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
+    """What is no finding and should be known: words taken for granted; tips below ``bottom`` mm, the part's underside;
+    axes nobody could hold against their limits.
 
     The proof knows of no table that is not a fixture of the setup.
     """
@@ -132,6 +206,9 @@ def notes_on(p: Program, bottom: float) -> Iterator[str]:
         m = int(np.argmin(p.end[:, 2]))
         yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
                "part; what stands there is not known unless it is a fixture of the setup")
+    if joints_of(p, setup) is None:
+        yield (f"{p.name} turns rotary axes and machine.pivots_mm is not given: travel and rates of the linear axes "
+               "were not held against the machine's")
 
 
 def _place(point: F64) -> str:

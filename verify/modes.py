@@ -113,7 +113,7 @@ class Modes(Rotary):
             words.append(f"T{self.spindle_tool} M6")
         if self.spindle_tool and self.stated.isdisjoint({43, 43.4, 49}):
             words.append(f"G43 H{self.spindle_tool}")
-        words.extend(f"{letter}0" for letter in self.rotary if letter not in self.turned)
+        words.extend(f"{letter}0" for letter in self.rotary if letter not in self.stated_axes)
         self.assumed = tuple(words)
 
     def stop(self, what: str) -> None:

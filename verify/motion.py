@@ -94,6 +94,7 @@ class Motion(Modes):
     def _home(self, axes: list[float | None], turn: list[float] | None, values: dict[str, float]) -> None:
         """G28 and G30 pass a programmed point, then the axes named (all without any) go home; rotary home is 0."""
         named = [a is not None for a in axes]
+        self.stated_axes.update(letter for letter in self.rotary if letter in values or not (any(named) or turn))
         if not any(named) and turn is None:
             return self._away([True] * 3, [0.0, 0.0] if self.rotary else None)
         self._line_to(self._target(axes), RAPID, NAN, turn)

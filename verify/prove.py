@@ -60,7 +60,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     ProgramError
         A program cannot be read; the subjects name the lines.
     VerificationError
-        Two tools share a number, a cutting part is impossible, or samples and zones do not fit each other.
+        Two tools share a number, a cutting part is impossible, samples and zones do not fit each other, or a program
+        leaves rotary zero.
 
     Notes
     -----
@@ -87,7 +88,7 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                 *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
                 *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
-    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2])))
+    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, met.spacing, tuple(notes))
 
 

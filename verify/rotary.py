@@ -28,22 +28,23 @@ class Rotary:
 
     machine : its rotary axes, or None without any
     gauge   : mm by T number, spindle face to tip
-    turned  : letters of the rotary axes that the program has stated
+    stated_axes : letters of the rotary axes whose angle the program has stated
     """
 
     def __init__(self, log: Log, machine: Kinematics | None, gauge: Mapping[int, float]) -> None:
         self.log, self.machine, self.gauge = log, machine, gauge
         self.rotary = machine.letters if machine else ""
         self.s = State()
-        self.turned: set[str] = set()
+        self.stated_axes: set[str] = set()
 
     def _turn(self, values: Mapping[str, float], *, absolute: bool = False) -> list[float] | None:
         """(2,) deg, where the rotary words of a block take the axes; None where it has none."""
         named = [letter in values for letter in self.rotary]
         if not any(named):
             return None
-        self.turned.update(letter for letter in self.rotary if letter in values)
         relative = self.s.relative and not absolute
+        if not relative:
+            self.stated_axes.update(letter for letter in self.rotary if letter in values)
         return [t if not n else values[letter] + (t if relative else 0.0)
                 for letter, n, t in zip(self.rotary, named, self.s.turn, strict=True)]
 

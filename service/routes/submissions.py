@@ -47,8 +47,14 @@ def multipart(with_program: bool) -> dict[str, Any]:
     if with_program:
         properties["program"] = {"type": "string", "format": "binary", "description": "The NC program."}
         encoding["program"] = {"contentType": "text/plain, application/octet-stream"}
+    required = list(properties)
+    if with_program:
+        properties["spindle_tool"] = {
+            "type": "integer", "minimum": 0, "maximum": 999999, "default": 0,
+            "description": "T number of the tool that stands in the spindle, its length offset on, before the first "
+                           "line of the program; 0 for none."}
     schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
-              "properties": properties, "required": list(properties), "additionalProperties": False}
+              "properties": properties, "required": required, "additionalProperties": False}
     return {"requestBody": {"required": True, "content": {"multipart/form-data": {
         "schema": schema, "encoding": encoding}}}}
 

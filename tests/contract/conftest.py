@@ -64,15 +64,17 @@ def setup_json():
 
 @pytest.fixture
 def post(setup_json):
-    """Post a job: (client, do, path, part, key, setup, program) -> response."""
+    """Post a job: (client, do, path, part, key, setup, program, spindle_tool) -> response."""
 
-    def send(client, do="", *, path="/v1/jobs", part=STEP, key=None, setup=None, program=None, headers=None):
+    def send(client, do="", *, path="/v1/jobs", part=STEP, key=None, setup=None, program=None, headers=None,
+             spindle_tool=None):
         text = json.dumps(setup_json(do)) if setup is None else setup if isinstance(setup, str) else json.dumps(setup)
         files = {"part": ("part.step", part, "model/step"), "setup": ("setup.json", text, "application/json")}
         if program is not None:
             files["program"] = ("x.ngc", program, "text/plain")
         extra = {"Idempotency-Key": key} if key is not None else {}
-        return client.post(path, files=files, headers={**extra, **(headers or {})})
+        fields = {} if spindle_tool is None else {"spindle_tool": spindle_tool}
+        return client.post(path, files=files, data=fields, headers={**extra, **(headers or {})})
 
     return send
 

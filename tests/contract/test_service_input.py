@@ -77,6 +77,15 @@ def test_malformed_forms(client, post):
                 "bad_multipart")
     _is_problem(post(client, path="/v1/verifications"), 422, "missing_part")
     _is_problem(post(client, path="/v1/verifications", program=b""), 422, "empty_program")
+    for number, code in (("9", "no_such_tool"), ("-1", "bad_spindle_tool"), ("", "bad_spindle_tool"),
+                         ("1" * 7, "bad_spindle_tool")):
+        body = _is_problem(post(client, path="/v1/verifications", program=b"M2\n", spindle_tool=number), 422, code)
+        assert body["subjects"] == ["spindle_tool"]
+    _is_problem(post(client, spindle_tool="1"), 422, "unknown_part")
+    five = {"tools": [TOOL], "machine": {"kind": "5-axis", "kinematics": "head-head-BC"}}
+    for path in ("/v1/jobs", "/v1/zones"):
+        _is_problem(post(client, path=path, setup=json.dumps(five)), 422, "five_axis_not_planned")
+    assert post(client, path="/v1/verifications", setup=json.dumps(five), program=b"M2\n").status_code == 202
     answer = client.post("/v1/jobs", files={"part": ("a.step", STEP)},
                          data={"setup": json.dumps({"tools": [TOOL]})})
     assert answer.status_code == 202  # a plain form field will do as well

@@ -82,6 +82,10 @@ def test_zones_and_verifications_are_jobs_too(client, post, finish):
     bad = finish(client, post(client, path="/v1/verifications", program=b"(GOUGE)\nM2\n").json())
     assert (good["state"], bad["state"]) == ("proved", "unproved")
     assert client.get(bad["links"]["report"]).json()["findings"] == [{"kind": "gouge"}]
+    held = [post(client, path="/v1/verifications", program=b"(SPINDLE)\nM2\n", key="t", spindle_tool=n)
+            for n in ("1", "1", "0")]
+    assert [a.status_code for a in held] == [202, 202, 422] and held[0].json()["id"] == held[1].json()["id"]
+    assert client.get(finish(client, held[0].json())["links"]["report"]).json()["findings"] == [{"spindle_tool": 1}]
 
 
 def test_same_key_and_content_is_the_same_job_and_other_content_is_refused(client, post, setup_json):

@@ -9,6 +9,7 @@ import pytest
 
 from geometry.errors import VerificationError
 from verify.kinematics import KINDS, Kinematics
+from verify.reader import read_program
 
 ZERO = (0.0, 0.0, 0.0)
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),
@@ -22,6 +23,8 @@ PRINTED = [("table-table-AC", (10, 0, 5), (30, 90), (0, 6.16, 9.33)),
            ("table-table-BC", (10, 0, 5), (30, 90), (2.5, 10, 4.33)),
            ("table-table-BC", (-12.5, 7, 3), (-71.841, -35.93), (-4.725, 13.003, -4.78)),
            ("table-table-BC", (4, -9, 20), (100, 400), (18.159, -4.323, -12.188))]
+IMPELLER = Path("/usr/share/doc/linuxcnc/examples/sample-configs/sim/axis/vismach/5axis/table-rotary-tilting/demos/"
+                "impeller-7bl-xyzac.ngc")
 CONTROLLER = Path(__file__).parents[2].parent / "shared" / "tools" / "linuxcnc_run.sh"
 
 
@@ -131,6 +134,22 @@ def test_joints_want_pivots():
     with pytest.raises(VerificationError) as caught:
         Kinematics("table-table-AC").joints(np.zeros((1, 3)), np.zeros((1, 2)), 0.0)
     assert caught.value.code == "no_pivots" and "machine.pivots_mm" in caught.value.remedy
+
+
+@pytest.mark.skipif(not IMPELLER.exists(), reason="the example programs of LinuxCNC are not installed")
+def test_an_impeller_by_others_is_read_and_its_joints_go_as_far_as_on_the_controller():
+    """LinuxCNC's own demo. The controller, which rounds corners, was asked for its joints every 20 ms of 157 s."""
+    machine = Kinematics("table-table-AC", (ZERO, ZERO))
+    p = read_program(IMPELLER.read_text(), kinematics=machine, spindle_tool=1)
+    assert len(np.unique(p.line)) == 4492 and p.remarks == () and (p.tool == 1).all()
+    assert p.assumed == ("G21", "G90", "G17", "G54", "T1 M6", "G43 H1")
+    assert np.nansum(p.minutes) == pytest.approx(sum(
+        1 / float(line.split("F")[1]) for line in IMPELLER.read_text().splitlines() if line.startswith("G1")))
+    joints = machine.joints(p.end, p.poses.end_turn, 0.0)
+    for found, printed in ((joints.min(axis=0), (-45.434, -19.826, -9.295)),
+                           (joints.max(axis=0), (30.524, 43.559, 44.268))):
+        np.testing.assert_allclose(found, printed, atol=0.45)
+    np.testing.assert_allclose(np.degrees(p.poses.end_turn).min(axis=0), (-74.49, -399.805))
 
 
 @pytest.mark.slow

@@ -35,8 +35,9 @@ class FakeChain(types.ModuleType):
     def zones_only(self, part_path, setup, progress):
         return self._say(progress)
 
-    def verify_program(self, part_path, setup, program_text, progress, access=None):
+    def verify_program(self, part_path, setup, program_text, progress, access=None, spindle_tool=0):
         assert program_text.strip()
+        self.spindle_tool = spindle_tool
         return self._say(progress)
 
 
@@ -82,6 +83,8 @@ def test_verify_answers_0_without_and_3_with_findings(chain, files):
     assert call(*args).exit_code == 0
     chain.answer = {"state": "unproved", "findings": [{"kind": "gouge"}]}
     assert call(*args).exit_code == 3
+    assert chain.spindle_tool == 0 and call(*args, "--spindle-tool", 4).exit_code == 3 and chain.spindle_tool == 4
+    assert call(*args, "--spindle-tool", -1).exit_code == 2
     (files / "x.ngc").write_text("\n")
     got = call(*args)
     assert got.exit_code == 2 and "empty_program" in got.stderr

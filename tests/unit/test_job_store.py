@@ -1,12 +1,16 @@
 """The job table: guarded changes only."""
 
 import threading
+from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
 
+import service.db
 from service.artifacts import Artifacts, artifact_key
-from service.db import connect, metadata, migrate
+from service.db import connect, jobs, metadata, migrate
 from service.errors import KeyConflictError, NotFoundError
 from service.store import JobStore, LibraryStore, NewJob
 
@@ -36,6 +40,22 @@ def test_the_migrations_make_the_tables_of_the_code(url):
     with connect(url).connect() as c:
         assert c.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
         assert c.exec_driver_sql("PRAGMA synchronous").scalar() == 2  # FULL
+
+
+def test_jobs_of_the_first_schema_are_kept(tmp_path):
+    url = f"sqlite:///{tmp_path / 'old.db'}"
+    config = Config()
+    config.set_main_option("script_location", str(Path(service.db.__file__).parent / "migrations"))
+    row = {c.name: 0 if isinstance(c.type, sa.Integer | sa.Float) else "x" for c in jobs.columns if not c.nullable}
+    with connect(url).connect() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0001")
+        old = sa.Table("jobs", sa.MetaData(), autoload_with=connection)
+        assert "spindle_tool" not in old.columns
+        connection.execute(old.insert().values({k: v for k, v in row.items() if k in old.columns}))
+        connection.commit()
+    migrate(url)
+    assert JobStore(connect(url)).get("x")["spindle_tool"] == 0
 
 
 def test_a_key_names_one_job_per_principal(store):

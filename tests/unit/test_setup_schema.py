@@ -10,10 +10,20 @@ from hypothesis import strategies as st
 from geometry.errors import SetupError
 from schemas.materials import MATERIALS, find_material
 from schemas.setup import Setup, canonical_json, content_hash, setup_sha256
-from service.convert import face_numbers, parse_setup, placement_frame, tool_bodies
+from service.convert import (
+    check_plannable,
+    check_spindle_tool,
+    face_numbers,
+    machine_kinematics,
+    parse_setup,
+    placement_frame,
+    rotary_limits,
+    tool_bodies,
+)
 from service.materials import cutting_data, feed_per_tooth
 
 TOOL = {"id": "T1", "kind": "ball", "diameter_mm": 3}
+FIVE = {"kind": "5-axis", "kinematics": "table-table-AC"}
 HOLDER = [{"diameter_mm": 20, "length_mm": 30}]
 
 
@@ -79,7 +89,14 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (setup(access=[{"id": "A1"}, {"id": "A2", "direction": [0, 0, 3]}]), "has the direction of A1"),
     (setup(access=[{"id": "A1"}, {"id": "A1", "direction": [0, 0, -1]}]), "two accesses have the id A1"),
     (setup(access=[]), "at least 1"),
-    (setup(machine={"kind": "5-axis"}), "not built yet"), (setup(machine={"dialects": ["heidenhain"]}), "not built"),
+    (setup(machine={"kind": "5-axis"}), "machine.kinematics is needed"),
+    (setup(machine={"kinematics": "table-table-AC"}), "5-axis machine"),
+    (setup(machine={**FIVE, "rotary_deg": [[-30, 30], [10, 10]]}), "machine.rotary_deg of C: 10 is not below 10"),
+    (setup(machine={**FIVE, "rotary_deg": [[-30, 30]]}), "at least 2"),
+    (setup(machine={**FIVE, "pivots_mm": [[0, 0, 0]]}), "machine.pivots_mm has 1 points, table-table-AC takes 2"),
+    (setup(machine={**FIVE, "kinematics": "head-head-BC", "pivots_mm": [[0, 1, 50]]}), "begins with [0, 0, distance"),
+    (setup(machine={"rotary_rate_deg_min": 100}), "5-axis machine"),
+    (setup(machine={"dialects": ["heidenhain"]}), "not built"),
     (setup(machine={"pivots_mm": [[0, 0, 0]]}), "5-axis machine"),
     (setup(stock={"kind": "cylinder"}), "not built yet"), (setup(stock={"kind": "step"}), "not built yet"),
     (setup(stock={"box_mm": [[0, 0, 0], [1, 1, 1]]}), "belongs to stock.kind 'box'"),
@@ -98,6 +115,30 @@ def test_what_is_wrong_is_said(given_setup, words):
         parse_setup(json.dumps(given_setup))
     assert any(words in p["problem"] for p in caught.value.measured), caught.value.measured
     assert caught.value.subjects and caught.value.remedy
+
+
+def test_a_machine_of_five_axes_is_read_for_verifying_and_refused_for_planning():
+    given_setup = parse_setup(setup(machine={**FIVE, "rotary_deg": [[-30, 120], [-360, 360]],
+                                             "pivots_mm": [[0, 0, -50], [0, 0, -20]]}))
+    found = machine_kinematics(given_setup.machine)
+    assert (found.kind, found.pivots) == ("table-table-AC", ((0, 0, -50), (0, 0, -20)))
+    np.testing.assert_allclose(rotary_limits(given_setup.machine), np.radians([[-30, 120], [-360, 360]]))
+    assert machine_kinematics(parse_setup(setup(machine=FIVE)).machine).pivots is None
+    plain = parse_setup(setup())
+    assert machine_kinematics(plain.machine) is None and rotary_limits(plain.machine) is None
+    with pytest.raises(SetupError, match="only finished programs can be verified") as caught:
+        check_plannable(given_setup)
+    assert caught.value.code == "five_axis_not_planned" and "zonemill verify" in caught.value.remedy
+    check_plannable(plain)
+
+
+def test_the_tool_in_the_spindle_is_one_of_the_setup():
+    given_setup = parse_setup({"tools": [{**TOOL, "id": "T7"}, {**TOOL, "id": "T3"}]})
+    check_spindle_tool(given_setup, 0)
+    check_spindle_tool(given_setup, 7)
+    with pytest.raises(SetupError, match="no tool T5 .* it has T3, T7") as caught:
+        check_spindle_tool(given_setup, 5)
+    assert caught.value.code == "no_such_tool"
 
 
 def test_numbers_are_the_digits_of_the_id_where_unique_else_the_place():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.errors import ProgramError
+from geometry.errors import CamError, ProgramError
 from verify.arcs import CHORD
 from verify.dividing import MOST_TURN, TURN, axis_pieces
 from verify.kinematics import Kinematics
@@ -215,3 +215,42 @@ def test_plain_lines_under_centre_point_control_keep_their_pose():
     np.testing.assert_array_equal(p.end[rows, 0], np.arange(1, 9))
     np.testing.assert_allclose(np.degrees(p.poses.start_turn[rows]), np.tile([20, 5], (8, 1)))
     np.testing.assert_allclose(p.minutes[rows], 0.01)
+
+
+@pytest.mark.parametrize("kind", PIVOTS)
+def test_any_words_give_poses_that_hang_together_or_an_error_with_a_line(kind):
+    """Random words: what is read is finite, axes have length one, and each known move begins where the last ended."""
+    rng = np.random.default_rng(5)
+    words = "G0 G1 G2 G3 G17 G18 G28 G43 G43.4 G49 G53 G81 G90 G91 G93 G94 M428 M429 M6".split()
+    numbers = "0 1 2 5 -3 0.5 12.75 360 -90 40".split()
+    read_through = turned = 0
+    for _ in range(800):
+        body = ""
+        for _ in range(rng.integers(1, 6)):
+            letters = rng.choice([*"XYZXYZIJKRPF", kind[-2], "C", "C"], rng.integers(0, 6))
+            picked = [a + str(rng.choice(numbers)) for a in dict.fromkeys(letters.tolist())]
+            body += " ".join([*rng.choice(words, rng.integers(0, 2)), *picked]) + "\n"
+        try:
+            p = read("G0 F100\n" + body, kind)
+        except CamError as error:
+            assert error.subjects[0].startswith("line ") and error.code == "bad_program", body
+            continue
+        read_through += 1
+        assert np.isfinite(p.start).all() and np.isfinite(p.end).all(), body
+        if p.poses is None:
+            continue
+        turned += 1
+        for axis in (p.poses.start_axis, p.poses.end_axis):
+            np.testing.assert_allclose(np.linalg.norm(axis, axis=1), 1.0, atol=1e-12)
+        if len(p.unknown) == 1:  # nothing but the start of the program is unknown
+            np.testing.assert_allclose(p.start[1:], p.end[:-1], atol=1e-9, err_msg=body)
+            np.testing.assert_allclose(p.poses.start_turn[1:], p.poses.end_turn[:-1], atol=1e-12, err_msg=body)
+    assert read_through > 60 and turned > 30
+
+
+def test_what_home_and_increments_say_of_where_an_axis_stood():
+    machine = Kinematics("table-table-AC")
+    for words, taken in (("G0 A0", ("C0",)), ("G91 G0 A5 C5", ("A0", "C0")), ("G28", ()), ("G91 G28 C0", ("A0",)),
+                         ("G53 G0 A0 C0", ()), ("G0", ("A0", "C0"))):
+        p = read_program(f"T1 M6\nG43 H1\nM428\n{words}\nG90 G0 X0 Y0 Z50\nM30\n", kinematics=machine)
+        assert tuple(w for w in p.assumed if w in ("A0", "C0")) == taken, words

@@ -61,7 +61,9 @@ def zones_only(part_path, setup, progress):
     return {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}
 
 
-def verify_program(part_path, setup, program_text, progress):
+def verify_program(part_path, setup, program_text, progress, access=None, spindle_tool=0):
     progress("verify", 0.5)
     findings = [{"kind": "gouge"}] if "GOUGE" in program_text else []
+    if "SPINDLE" in program_text:
+        findings.append({"spindle_tool": spindle_tool})
     return {"state": "unproved" if findings else "proved", "findings": findings}
