@@ -62,21 +62,21 @@ def _blind(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
 
 
 def _doglegs(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
-    if not setup.dogleg or len(p) == 0:
+    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.dogleg``)."""
+    if not setup.dogleg or p.poses is None:
         return
     clear = top + setup.clearance_rapid - 1e-6
     start, end = joints_of(p, setup) or (p.start, p.end)
-    axes = (np.abs(end - start) > 1e-9).sum(axis=1)
-    if p.poses is not None:
-        axes += (p.poses.start_turn != p.poses.end_turn).sum(axis=1)
-    moved = axes > 1
     low = np.minimum(p.start[:, 2], p.end[:, 2])
-    bad = np.flatnonzero((p.kind != FEED) & moved & (low < clear))
+    turning = (p.poses.start_turn != p.poses.end_turn).sum(axis=1)
+    several = (np.abs(end - start) > 1e-9).sum(axis=1) + turning > 1
+    bad = np.flatnonzero((p.kind != FEED) & (turning > 0) & several & (low < clear))
     if len(bad):
         m = int(bad[0])
         yield _finding(FindingKind.RAPID, p, m, float(clear - low[bad].min()), float(clear),
-                       f"a rapid moves several axes below Z{clear:.3f}; on this machine (rapid_motion dogleg) its way "
-                       "is no straight line, so it cannot be simulated: move Z alone, or X and Y above that", len(bad))
+                       f"a rapid below Z{clear:.3f} turns a rotary axis while another axis moves; on this machine "
+                       "(rapid_motion dogleg) its way cannot be known: turn above that, or one axis at a time",
+                       len(bad))
 
 
 def _low_stops(p: Program, top: float) -> Iterator[Finding]:

@@ -121,6 +121,23 @@ class Kinematics:
         """
         return self._in_machine(tip, turn) - self._swing(turn, gauge)
 
+    def slides(self, turn: F64) -> F64:
+        """Where the linear axes of the machine point on the part.
+
+        turn : (n, 2) float64, rad
+
+        Returns (n, 3, 3) float64: rows are the directions of X, Y and Z.
+        """
+        out = np.tile(np.eye(3), (len(turn), 1, 1))
+        if self.turns_head:
+            return out
+        for row in range(3):
+            way = out[:, row].copy()
+            if not self.tilts_head:
+                way = _turned(self.letters[0], -turn[:, 0], way)
+            out[:, row] = _turned("C", -turn[:, 1], way)
+        return out
+
     def points(self) -> tuple[Point, ...]:
         """The pivots, mm.
 

@@ -6,11 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
 from verify.clash import fixture_points, run_clashes
+from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
+from verify.fitness import top_of_all
 from verify.model import ProofSetup
 from verify.removal import Moves
 from verify.stock import StockPass, blank, run_bodies, run_stock
@@ -28,17 +31,23 @@ class Contacts:
     spacing: float
 
 
-def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, threads: int,
-             progress: Callable[[float], None]) -> Contacts:
+def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
+             slides: F64 | None, threads: int, progress: Callable[[float], None]) -> Contacts:
     """Run all moves through the stock and past the part.
 
     mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
+    slides       : where the linear axes point, move by move (``verify.dogleg``); only used where rapids are doglegs
 
     Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``).
     """
     def share(low: float, wide: float) -> Callable[[float], None]:
         return lambda f: progress(low + wide * f)
 
+    given, origin = moves, None
+    if setup.dogleg:
+        clear = top_of_all(mesh.bounds, setup) + setup.clearance_rapid
+        radius = np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+        moves, origin = spread(moves, slides, radius, clear)
     if moves.axes is None:
         lines = blank(mesh, setup, threads=threads)
         run = run_stock(lines, moves, tools, setup, threads=threads, progress=share(0.0, 0.6))
@@ -52,7 +61,20 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=share(0.7, 0.3))
         spacing = field.step
-    return Contacts(StockPass(_merge(run.events, met), run.lost + lost, run.cut, run.taken), spacing)
+    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
+
+
+def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, count: int) -> StockPass:
+    """The pass in terms of the ``count`` moves given, where some were spread out."""
+    if origin is None:
+        return StockPass(events, run.lost + lost, run.cut, run.taken)
+    events = events.copy()
+    events[:, 0] = origin[events[:, 0].astype(np.int64)]
+    cut, taken = np.zeros(count, np.bool_), np.zeros(count)
+    cut[origin[run.cut]] = True
+    if run.taken is not None:
+        np.add.at(taken, origin, run.taken)
+    return StockPass(events, run.lost + lost, cut, None if run.taken is None else taken)
 
 
 def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,

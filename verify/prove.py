@@ -23,12 +23,13 @@ from verify.findings import (
 )
 from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
+from verify.joining import joined, slides_of
 from verify.material import contacts
 from verify.model import Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
-from verify.reader import FEED, Program, read_program
+from verify.reader import Program, read_program
 from verify.removal import BOW, Moves, residual_on_normals
+from verify.repeats import repeat_findings
 from verify.stock import StockPass, stock_on_normals
-from verify.toolaxes import ToolAxes
 
 RAY_ERROR = 1e-6
 LEAST_REACH = 1.0
@@ -77,16 +78,17 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
             for name, text in programs]
     top = top_of_all(part.mesh.bounds, setup)
     read = [from_above(p, top + setup.clearance_rapid) for p in read]
-    moves, source = _moves(read, tools)
+    moves, source = joined(read, tools)
     tell(0.1)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
-    met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, threads,
-                   lambda f: tell(0.6 + 0.4 * f))
+    met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup,
+                   slides_of(read, tools, setup), threads, lambda f: tell(0.6 + 0.4 * f))
     run = met.run
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
-                *_idle_findings(read, run, moves, source), *_residuals(scored, cuts.residual, setup, zone_ids)]
+                *_idle_findings(read, run, moves, source), *repeat_findings(moves, run.cut, source),
+                *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, met.spacing, tuple(notes))
@@ -101,34 +103,6 @@ def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
         raise VerificationError("samples and zones do not fit each other", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))
-
-
-def _moves(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
-    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them."""
-    row = {t.number: i for i, t in enumerate(tools)}
-    number = np.concatenate([p.tool for p in read]) if read else np.zeros(0, np.int32)
-    known = np.isin(number, list(row))
-    start = np.concatenate([p.start for p in read])[known] if read else np.zeros((0, 3))
-    end = np.concatenate([p.end for p in read])[known] if read else np.zeros((0, 3))
-    kind = np.concatenate([p.kind for p in read])[known] if read else np.zeros(0, np.int8)
-    line = np.concatenate([p.line for p in read])[known] if read else np.zeros(0, np.int32)
-    program = np.repeat(np.arange(len(read), dtype=np.int32), [len(p) for p in read])[known]
-    number = number[known]
-    tool = np.array([row[int(n)] for n in np.unique(number)], np.int32)[np.searchsorted(np.unique(number), number)] \
-        if len(number) else np.zeros(0, np.int32)
-    axes = None
-    if any(p.poses is not None for p in read):
-        axes = ToolAxes.between(np.concatenate([_axes(p, True) for p in read])[known],
-                                np.concatenate([_axes(p, False) for p in read])[known])
-    moves = Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool, axes)
-    return moves, Source(tuple(p.name for p in read), program, line, number)
-
-
-def _axes(p: Program, at_start: bool) -> F64:
-    """(m, 3) tool axes of a program at the start or the end of its moves."""
-    if p.poses is None:
-        return np.tile([0.0, 0.0, 1.0], (len(p), 1))
-    return p.poses.start_axis if at_start else p.poses.end_axis
 
 
 class _Cuts:

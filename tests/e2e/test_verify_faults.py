@@ -235,14 +235,26 @@ def test_a_way_from_an_unstated_place_into_the_work_is_named(way):
     assert run([*lines[:4], *above, *lines[7:]]).clean
 
 
-def test_a_dogleg_is_no_straight_line():
+def test_a_dogleg_takes_the_whole_box_of_its_move():
+    """From beside the block steeply up over it: the straight way is clear, the way across first and then up is not."""
     lines = program()
-    way = ["G0 X7", "X-7 Z1", "Z1.5"]
-    lines = [*lines[:6], *way, *lines[7:]]
+    lines = [*lines[:-4], "G0 Z20", "X-30", "Z-2", "X-12 Z25", *lines[-3:]]
     assert run(lines).clean
-    found = first(run(lines, setup=replace(SETUP, dogleg=True)), FindingKind.RAPID)
-    assert found.line == 8 and "dogleg" in found.message
-    assert run(program(), setup=replace(SETUP, dogleg=True)).clean
+    proof = run(lines, setup=replace(SETUP, dogleg=True))
+    assert {f.line for f in proof.findings} == {line_of(lines, "X-12 Z25")}
+    found = first(proof, FindingKind.RAPID)
+    assert "cutting part into stock" in found.message and found.depth == pytest.approx(2.5, abs=1e-6)
+    assert found.point[0] <= -12 + TOOL.radius and run(program(), setup=replace(SETUP, dogleg=True)).clean
+
+
+def test_a_pass_pasted_twice_is_named():
+    lines = program()
+    a, b = line_of(lines, "(layer -3.000)"), line_of(lines, "(layer -3.500)")
+    twice = [*lines[:b - 1], *lines[a - 1:b - 1], *lines[b - 1:]]
+    proof = run(twice)
+    found = first(proof, FindingKind.PROGRAM)
+    assert proof.counts == {"program": 1} and b < found.line <= b + 3
+    assert f"run again what lines {a + found.line - b}" in found.message
 
 
 def test_a_stop_in_the_stock_is_named():

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from verify.kernels.heights import overlap
+from verify.kernels.heights import contact
 from verify.kernels.rays import plan_distance
 from verify.kernels.stock import _note, _worse
 
@@ -37,9 +37,9 @@ def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bo
                              plan2) > wide + half:
                 continue
             for i in range(first[row + low], first[row + high + 1]):
-                depth = overlap(points[i, 0], points[i, 1], points[i, 2], a[0], a[1], a[2], d[0], d[1], d[2],
-                                z0, z1, r0, r1, False)
-                if depth > slack:
+                depth = contact(points[i, 0] - a[0], points[i, 1] - a[1], points[i, 2] - a[2], d[0], d[1], d[2], z0, z1,
+                                r0, r1, body[4], slack, best[int(body[5]), 0], False)
+                if depth > 0.0:
                     _worse(best, int(body[5]), depth, body[4], points[i, 0], points[i, 1], points[i, 2])
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from geometry.kernels.options import KERNEL
-from verify.kernels.heights import overlap, penetration
+from verify.kernels.heights import contact, overlap
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse
@@ -41,27 +41,13 @@ def _meets(p, balls, node, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def meet_body(q, d, body, grow, slack):
-    """Depth of a point in one body grown by ``grow`` as an event counts it, 0 where it is none.
-
-    q, d : the point and the displacement as the tool sees them; body : row of ``stock``
-    """
-    depth = overlap(q[0], q[1], q[2], 0.0, 0.0, 0.0, d[0], d[1], d[2], body[0], body[1], body[2] + grow,
-                    body[3] + grow, False)
-    if depth <= slack:
-        return 0.0
-    clearance = body[4] + grow
-    bare = penetration(q[0], q[1], q[2], d[0], d[1], d[2], body[0], body[1], body[2] - body[4], body[3] - body[4],
-                       False)
-    return clearance + bare if bare > slack else min(depth, clearance)
-
-
-@njit(**KERNEL)
 def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack):
     """Depth of a point in body b of a tool on piece p as an event counts it; b < 0 is the cutting part."""
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     if b >= 0:
-        return meet_body((qx, qy, qz), (dx, dy, dz), bodies[b], grow, slack)
+        body, clearance = bodies[b], bodies[b, 4] + grow
+        return contact(qx, qy, qz, dx, dy, dz, body[0], body[1], body[2] + grow, body[3] + grow, clearance, slack, 0.0,
+                       False)
     a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
     bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
     if bare > slack:

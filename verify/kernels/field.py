@@ -22,7 +22,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.heights import overlap, penetration
+from verify.kernels.heights import contact, overlap
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.rays import gap
@@ -125,20 +125,6 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, total
 
 
 @njit(**KERNEL)
-def _meet_node(v, q, d, body, grow, slack, known):
-    """Depth of the stock within v of a node in one body grown by ``grow``, as an event counts it; 0 if under ``known``.
-    """
-    z0, z1 = body[0] - v, body[1] + v
-    depth = overlap(q[0], q[1], q[2], 0.0, 0.0, 0.0, d[0], d[1], d[2], z0, z1, body[2] + grow + v, body[3] + grow + v,
-                    False)
-    if depth <= max(slack, known):
-        return 0.0
-    clearance = body[4] + grow
-    bare = penetration(q[0], q[1], q[2], d[0], d[1], d[2], z0, z1, body[2] - body[4] + v, body[3] - body[4] + v, False)
-    return clearance + bare if bare > slack else min(depth, clearance)
-
-
-@njit(**KERNEL)
 def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow, slack, best):
     """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p."""
     z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
@@ -182,7 +168,9 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                                                        cutter[2])
                                     depth = min(near, grow) if near > slack else 0.0
                             else:
-                                depth = _meet_node(v, (qx, qy, qz), (dx, dy, dz), body, grow, slack, best[code, 0])
+                                # the ball of radius v round the node is stock
+                                depth = contact(qx, qy, qz, dx, dy, dz, z0 - v, z1 + v, body[2] + grow + v,
+                                                body[3] + grow + v, clearance, slack, best[code, 0], False)
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
 

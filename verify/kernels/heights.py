@@ -155,6 +155,20 @@ def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
 
 
 @njit(cache=True, nogil=True)
+def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, column):
+    """How deep a body grown by ``clearance`` takes in a point (or the column below it), as an event counts it.
+
+    r0, r1 hold the clearance. Up to the clearance that is how much nearer than it, aside; above it the clearance and
+    how deep the point is in the bare body (``penetration``). 0 where it is no deeper than ``slack`` or ``known``.
+    """
+    depth = overlap(wx, wy, wz, 0.0, 0.0, 0.0, dx, dy, dz, z0, z1, r0, r1, column)
+    if depth <= max(slack, known):
+        return 0.0
+    bare = penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, column)
+    return clearance + bare if bare > slack else min(depth, clearance)
+
+
+@njit(cache=True, nogil=True)
 def _cells(lo, hi, origin, step, first, stop):
     """Lines whose coordinate lies in [lo, hi], cut to first..stop-1."""
     return (max(first, math.ceil((lo - origin) / step - 0.5)), min(stop - 1, math.floor((hi - origin) / step - 0.5)))

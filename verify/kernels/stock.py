@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from verify.kernels.heights import INF, _cells, lowest, overlap
+from verify.kernels.heights import INF, _cells, contact, lowest
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
@@ -111,8 +111,9 @@ def _meet_body(height, fixed, box, origin, step, a, d, body, grow, slack, best):
                 top = height[i, j] if k == 0 else fixed[i, j]
                 if top <= under:
                     continue
-                depth = overlap(x, y, top, a[0], a[1], a[2], d[0], d[1], d[2], z0, z1, r0, r1, True)
-                if depth > slack:
+                depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], z0, z1, r0, r1, body[4] + grow, slack,
+                                best[code + k * FIXTURE, 0], True)
+                if depth > 0.0:
                     _worse(best, code + k * FIXTURE, depth, body[4] + grow, x, y, top)
 
 
