@@ -7,7 +7,8 @@ from collections.abc import Collection
 
 from verify.log import Log
 from verify.program import NAN, State, Stop
-from verify.words import CYCLES, MOTION_CODES, WORK_OFFSETS, Block
+from verify.saved import SavedModes
+from verify.words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
 
 INCH = 25.4
 
@@ -23,6 +24,7 @@ class Modes:
     def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float) -> None:
         self.log, self.tools, self.work_offset, self.blend_limit = log, tools, work_offset, blend_limit
         self.s = State()
+        self.saved = SavedModes()
         self.incremental_line = 0
         self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
         self.stated: set[float] = set()
@@ -30,6 +32,10 @@ class Modes:
 
     def _set_modes(self, block: Block) -> None:
         s, values = self.s, block.values
+        if not SAVES.isdisjoint(block.ms):
+            if values or block.codes or len(block.ms) > 1:
+                raise BlockError(f"M{block.ms[0]} beside other words: give it a block of its own")
+            self.saved.run(block.ms[0], s)
         if "S" in values:
             s.speed = values["S"]
             if s.speed < 0:

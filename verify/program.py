@@ -49,6 +49,7 @@ class Program:
     blend   : mm, the most G64 lets the control leave the path by, as far as a P bounds it
     lines   : number of lines read
     remarks : what should not be run
+    notes   : what was done and should be known
     """
 
     name: str
@@ -66,6 +67,7 @@ class Program:
     stops: tuple[Stop, ...]
     assumed: tuple[str, ...]
     blend: float
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)
@@ -78,6 +80,10 @@ class State:
     position  : mm, nan where the program has not stated it or a machine move left it
     speed     : as S, nan before the first
     parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
+    cycle     : words of the drilling cycle in force, and where its series began
+    table     : mm, by how much G10 moved the zero of the work offset
+    shift     : mm, by how much G92 or G52 moved program zero
+    kept      : mm, the shift that G92.3 brings back
     """
 
     position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
@@ -98,6 +104,14 @@ class State:
     cycle: dict[str, float] = field(default_factory=dict)
     parked: bool = False
     ended: bool = False
+    table: list[float] = field(default_factory=lambda: [0.0] * 3)
+    shift: list[float] = field(default_factory=lambda: [0.0] * 3)
+    kept: list[float] = field(default_factory=lambda: [0.0] * 3)
+
+    @property
+    def origin(self) -> list[float]:
+        """mm, where program zero lies in the setup frame."""
+        return [a + b for a, b in zip(self.table, self.shift, strict=True)]
 
     @property
     def turning(self) -> bool:
