@@ -1,4 +1,4 @@
-"""LinuxCNC's own interpreter as a judge: a program to its canonical moves, and the comparison with those of the reader."""
+"""LinuxCNC's own interpreter as a judge: a program to its canonical moves, compared with those of the reader."""
 
 import math
 import re
@@ -55,7 +55,7 @@ def judge(text, folder):
 
 
 def _moves(canon):
-    at, unit, feed, plane = np.zeros(3), 1.0, math.nan, "XY"
+    at, unit, coarse, feed, plane = np.zeros(3), 1.0, 1.0, math.nan, "XY"
     offsets = {"SET_G5X_OFFSET": np.zeros(3), "SET_G92_OFFSET": np.zeros(3)}
     for name, words in (m.groups() for m in map(_CALL.fullmatch, canon.splitlines()) if m):
         numbers = [float(w) for w in words.replace(",", " ").split()] if re.fullmatch(r"[-0-9., ]+", words) else []
@@ -65,12 +65,13 @@ def _moves(canon):
             at += zero - sum(offsets.values())
         elif name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE"):
             at = np.array(numbers[:3]) * unit
-            yield Canonical(FEED if name == "STRAIGHT_FEED" else RAPID, (at + zero)[None], feed, 1e-4 * unit)
+            yield Canonical(FEED if name == "STRAIGHT_FEED" else RAPID, (at + zero)[None], feed, 1e-4 * coarse)
         elif name == "ARC_FEED":
             at, points = _arc(at, numbers, unit, plane)
-            yield Canonical(FEED, points + zero, feed, 1e-4 * unit)
+            yield Canonical(FEED, points + zero, feed, 1e-4 * coarse)
         elif name == "USE_LENGTH_UNITS":
             unit = {"CANON_UNITS_INCHES": INCH, "CANON_UNITS_MM": 1.0}[words]
+            coarse = max(unit, coarse)  # what was printed in inches stays as coarse as that
         elif name == "SET_FEED_RATE":
             feed = numbers[0] * unit
         elif name == "SELECT_PLANE":
@@ -85,6 +86,8 @@ def _arc(at, numbers, unit, plane):
     turns = int(numbers[4])
     centre = np.array(numbers[2:4]) * unit
     start = at.copy()
+    if np.abs(end - start)[[i, j]].max() <= 2e-4 * unit:  # a full circle, but for the digits printed
+        start[i], start[j] = end[i], end[j]
     return end, arc_points(start, end, centre, turns < 0, (i, j, k), abs(turns))
 
 
@@ -94,6 +97,7 @@ def difference(program, judged, gaps=False):
     gaps : whether the judge may have moves the reader has not (ways from and to the machine's own places)
     """
     keep = (program.start != program.end).any(axis=1)
+    keep[program.unknown[:, 0]] = True  # these start where they end, as nothing else is known
     ours, kinds, feeds, lines = (a[keep] for a in (program.end, program.kind, program.feed, program.line))
     n, at = 0, np.zeros(3)  # where the interpreter starts
     for move in judged.moves:
@@ -128,17 +132,16 @@ def _arc_difference(ours, n, move):
     points = np.vstack([ours[n - 1], move.points])
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
     gone, near = 0.0, 0.003 + 4 * move.grain
-    while gone < length - near and n < len(ours):
+    while n < len(ours) and gone < 1.01 * length + near:
         gone += float(np.linalg.norm(ours[n] - ours[n - 1]))
         part = int(np.abs(points - ours[n]).sum(axis=1).argmin())
         gap = _distance(ours[n], points[max(part - 1, 0):part + 2])
         if gap > near:
             return f"{ours[n]} lies {gap:.4f} mm off the arc to {move.points[-1]}", n
         n += 1
-    off = np.abs(ours[n - 1] - move.points[-1]).max()
-    if off > 2 * move.grain or abs(gone - length) > 2e-3 * length + 2 * near:
-        return f"an arc ends at {ours[n - 1]} after {gone:.4f} mm instead of {move.points[-1]} after {length:.4f}", n - 1
-    return "", n
+        if abs(gone - length) <= 2e-3 * length + near and np.abs(ours[n - 1] - move.points[-1]).max() <= 2 * move.grain:
+            return "", n
+    return f"an arc goes on to {ours[n - 1]} after {gone:.4f} mm, not {move.points[-1]} after {length:.4f}", n - 1
 
 
 def _distance(p, line):

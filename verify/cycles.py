@@ -56,7 +56,7 @@ class Hole:
 def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[float], int]]:
     """Targets (x, y, z) in mm and kinds of the moves over the hole, down, and back.
 
-    over : (3,) mm, above the hole where the tip is by then, not below ``hole.clear`` along ``axis``
+    over : (3,) mm, above the hole at the height the tip goes across, not below ``hole.clear`` along ``axis``
     """
     def at(height: float) -> list[float]:
         return [height if k == axis else p for k, p in enumerate(over)]

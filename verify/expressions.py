@@ -17,8 +17,6 @@ from verify.words import NUMBER, BlockError
 
 Value = Callable[[Parameters], float]
 
-MOST_CHARACTERS = 255
-"""What LinuxCNC reads of a line; it also bounds how deep an expression can be."""
 MOST_BRACKETS = 40
 EQUAL = 1e-5
 
@@ -47,9 +45,6 @@ class Reading:
 
     def __init__(self, text: str) -> None:
         self.text, self.at, self._depth = text, 0, 0
-        if len(text) > MOST_CHARACTERS:
-            raise BlockError(f"a line with parameters or expressions of {len(text)} characters, and LinuxCNC reads "
-                             f"{MOST_CHARACTERS}: split it")
 
     @property
     def rest(self) -> str:
@@ -97,10 +92,7 @@ class Reading:
         self.take("]")
 
         def checked(scope: Parameters) -> float:
-            try:
-                result = inside(scope)
-            except OverflowError:
-                result = math.inf
+            result = inside(scope)
             if not math.isfinite(result):
                 raise BlockError("an expression whose value is no finite number")
             return result
@@ -160,7 +152,14 @@ def _power(left: float, right: float) -> float:
         raise BlockError(f"{left:g} ** {right:g}: a negative number has whole powers only")
     if left == 0 and right < 0:
         raise BlockError(f"0 ** {right:g} has no value")
-    return math.pow(left, right)
+    return _small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
+
+
+def _small_enough(name: str, compute: Callable[[], float]) -> float:
+    try:
+        return compute()
+    except OverflowError:
+        raise BlockError(f"{name} is no finite number") from None
 
 
 def _within(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[[float], float]:
@@ -185,7 +184,8 @@ _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "or": lambda a, b: float(a != 0 or b != 0), "xor": lambda a, b: float((a != 0) != (b != 0)),
 }
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "abs": abs, "fix": math.floor, "fup": math.ceil, "round": _rounded, "exp": math.exp,
+    "abs": abs, "fix": math.floor, "fup": math.ceil, "round": _rounded,
+    "exp": lambda v: _small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
     "acos": _within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
     "asin": _within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),
     "cos": lambda v: math.cos(math.radians(v)), "sin": lambda v: math.sin(math.radians(v)),

@@ -71,7 +71,7 @@ class Flow:
             "if": self._if, "else": lambda step: step.end + 1, "elseif": lambda step: step.end + 1,
             "endif": lambda step: step.at + 1, "while": self._while, "endwhile": lambda step: step.start,
             "do": lambda step: step.at + 1, "repeat": self._repeat, "endrepeat": self._again,
-            "break": lambda step: step.end + 1, "continue": self._continue,
+            "break": lambda step: step.end + 1, "continue": lambda step: step.start,
         }
 
     def blocks(self) -> Iterator[tuple[int, str]]:
@@ -149,9 +149,6 @@ class Flow:
     def _again(self, step: Step) -> int:
         self.scope.frame.repeats[step.start] -= 1
         return step.start + 1 if self.scope.frame.repeats[step.start] > 0 else step.at + 1
-
-    def _continue(self, step: Step) -> int:
-        return step.end if step.kind == "repeat" else step.start
 
     def _call(self, step: Step) -> int:
         word = step.word

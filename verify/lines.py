@@ -17,6 +17,8 @@ _KEYWORD = re.compile(r"endsub|endif|endwhile|endrepeat|elseif|else|sub|return|c
 _CONDITIONS = frozenset({"if", "elseif", "while", "repeat"})
 _MOST_VALUES = {"call": 30, "return": 1, "endsub": 1, "if": 1, "elseif": 1, "while": 1, "repeat": 1}
 _WHOLE = frozenset("MTDHL")
+MOST_CHARACTERS = 255
+"""What LinuxCNC reads of a line; it also bounds how deep an expression can be."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def is_plain(raw: str) -> bool:
 def read_line(raw: str) -> Line:
     """Words and assignments of a line that is not plain; BlockError where it cannot be read."""
     text = _compact(raw)
-    reading = Reading(text)
+    reading = _reading(raw, text)
     deleted = text.startswith("/")
     reading.at = int(deleted)
     words: list[tuple[str, Value]] = []
@@ -101,7 +103,7 @@ def read_o_word(raw: str) -> OWord | None:
         return None
     if found[1]:
         raise BlockError("a / before an O-word: the way of the program would depend on a switch of the machine")
-    reading = Reading(text)
+    reading = _reading(raw, text)
     reading.at = found.end()
     label, computed = found[2] or (str(int(found[3])) if found[3] else ""), None
     if not label:
@@ -119,6 +121,13 @@ def read_o_word(raw: str) -> OWord | None:
     if len(values) > most or (keyword in _CONDITIONS and not values):
         raise BlockError(f"{keyword} takes {most or 'no'} values in brackets, and {len(values)} stand there")
     return OWord(label, computed, keyword, tuple(values))
+
+
+def _reading(raw: str, text: str) -> Reading:
+    if len(raw.rstrip()) > MOST_CHARACTERS:
+        raise BlockError(f"a line with parameters, expressions or O-words has {len(raw.rstrip())} characters, and "
+                         f"LinuxCNC reads {MOST_CHARACTERS}: split it")
+    return Reading(text)
 
 
 def _compact(raw: str) -> str:

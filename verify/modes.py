@@ -31,7 +31,7 @@ class Modes:
         self.assumed: tuple[str, ...] = ()
 
     def _set_modes(self, block: Block) -> None:
-        s, values = self.s, block.values
+        s, values, scale = self.s, block.values, self.s.scale
         if not SAVES.isdisjoint(block.ms):
             if values or block.codes or len(block.ms) > 1:
                 raise BlockError(f"M{block.ms[0]} beside other words: give it a block of its own")
@@ -49,6 +49,9 @@ class Modes:
             self._mode(g, values)
         if 64 in block.codes:
             self._blending(values)
+        if "F" in values and s.scale != scale:
+            self.log.remark("unit_feed", f"F{values['F']:g} beside the word that changes the unit: LinuxCNC reads it "
+                            "in the old unit, other controls in the new one; give F a line of its own", self.log.line)
         if "F" in values:
             s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
 

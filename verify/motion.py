@@ -189,7 +189,8 @@ class Motion(Origins):
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """A drilling cycle along the third axis of the plane, written out as rapids and feeds.
 
-        In a series of them G98 goes back to, and G91 counts R from, the height where the series began.
+        In a series of them G98 goes back to, and G91 counts R from, the height where the series began, as in LinuxCNC;
+        so does its way over the next hole, which climbs while it goes where the last hole was left at R.
         """
         s, error = self.s, self.log.error
         k = PLANE_AXES[s.plane][2]
@@ -212,10 +213,11 @@ class Motion(Origins):
             return None
         self.log.room(repeats * hole.moves)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
+        if s.cycle["top"] < hole.clear != s.position[k]:
+            self._line_to([hole.clear if axis == k else p for axis, p in enumerate(s.position)], RAPID, NAN)
         for _ in range(repeats):
-            if hole.clear > s.position[k]:
-                self._line_to([hole.clear if axis == k else p for axis, p in enumerate(s.position)], RAPID, NAN)
             at = self._target(across)
+            at[k] = at[k] if at[k] > hole.clear else hole.back
             self._check_cutting(at)
             for point, kind in hole_moves(hole, at, k):
                 self._line_to(point, kind, feed if kind == FEED else NAN)

@@ -10,7 +10,6 @@ from verify.words import BlockError
 
 _OPENS = frozenset({"sub", "if", "while", "do", "repeat"})
 _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
-LOOPS = frozenset({"while", "do", "repeat"})
 
 
 @dataclass
@@ -146,10 +145,12 @@ class _Pairing:
     def _leave(self, step: Step) -> None:
         for k in range(len(self.open) - 1, -1, -1):
             loop = self.open[k]
-            if loop.kind in LOOPS and loop.word.label == step.word.label:
+            if loop.kind in ("while", "do", "repeat") and loop.word.label == step.word.label:
+                if loop.kind == "repeat":
+                    raise BlockError(f"{_name(step)} of a repeat, which LinuxCNC does not run: use while and endwhile")
                 if loop.kind == "do" and step.word.keyword == "continue":
-                    raise BlockError("continue in do and while, which LinuxCNC takes for the end of the loop; use "
-                                     "while and endwhile")
+                    raise BlockError(f"{_name(step)} of do and while, which LinuxCNC takes for the end of the loop: "
+                                     "use while and endwhile")
                 step.kind = loop.kind
                 self.members[k].append(step)
                 return
