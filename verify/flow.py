@@ -21,7 +21,7 @@ from verify.words import BlockError
 MOST_BLOCKS = 5_000_000
 MOST_CALLS = 9
 """Calls within one another that LinuxCNC runs."""
-_KEPT_LINES = 20_000
+MOST_KEPT = 20_000
 _O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
 
 
@@ -88,6 +88,9 @@ class Flow:
             return self.machine.log.error(str(problem), problem.line)
         at, runs = 0, 0
         plain, steps = self.structure.plain, self.structure.steps
+        if not all(plain):
+            self.machine.log.note("parameters, expressions and O-words were read as LinuxCNC reads them; other "
+                                  "controls differ")
         while at < len(plain):
             runs += 1
             if runs > MOST_BLOCKS:
@@ -112,11 +115,12 @@ class Flow:
         return None
 
     def _line(self, at: int) -> Line:
+        """The line as read; kept only where it comes again, as keeping them all slows the collector of garbage."""
         line = self._kept.get(at)
         if line is None:
-            if len(self._kept) >= _KEPT_LINES:
-                self._kept.clear()
-            line = self._kept[at] = read_line(self.lines[at])
+            line = read_line(self.lines[at])
+            if self.structure.again[at] and len(self._kept) < MOST_KEPT:
+                self._kept[at] = line
         return line
 
     def _endless(self, line: int) -> None:

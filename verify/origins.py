@@ -77,7 +77,11 @@ class Origins(Modes):
                         "stays: run again, the program starts from another zero", self.log.line)
 
     def _known(self, k: int, word: float) -> float:
-        place = self.s.position[k]
+        s = self.s
+        place = s.position[k]
+        if k == 2 and s.length_off:
+            raise BlockError(f"G{word:g} Z with the length offset off: the place it names is not the tip's; give G43 "
+                             f"H{s.tool} first")
         if math.isnan(place):
             raise BlockError(f"G{word:g} {'XYZ'[k]} where the program has not stated {'XYZ'[k]}: the shift is not "
                              "known; state the place first")

@@ -72,7 +72,9 @@ class Parameters:
         raise BlockError(f"#<{name}> is read before the program gives it a value; set it first")
 
     def exists(self, name: str) -> bool:
-        """Whether a name has a value, or is one of the control's own."""
+        """Whether a name has a value, or is one of the control's own; BlockError where that hangs on the machine."""
+        if name.startswith(("_ini[", "_hal[")):
+            raise BlockError(f"EXISTS[#<{name}>] hangs on the machine, which the proof cannot know")
         return name in self._held(name) or is_served(name)
 
     def put(self, number: float, value: float) -> None:

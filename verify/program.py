@@ -114,6 +114,11 @@ class State:
         return [a + b for a, b in zip(self.table, self.shift, strict=True)]
 
     @property
+    def length_off(self) -> bool:
+        """Whether Z of the control is not that of the tip, for want of the length offset of the tool."""
+        return self.tool > 0 and self.offset != self.tool
+
+    @property
     def turning(self) -> bool:
         """Whether the spindle runs."""
         return self.spindle and self.speed > 0

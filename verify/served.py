@@ -38,6 +38,8 @@ def served(state: State, key: int | str) -> float:
     if key in POSITION:
         k = POSITION[key]
         place = (state.position[k] - state.origin[k]) / state.scale
+        if k == 2 and state.length_off:
+            raise BlockError(f"{label} with the length offset off is not the tip's; give G43 H{state.tool} first")
         if math.isnan(place):
             raise BlockError(f"{label} is read where the program has not stated {'XYZ'[k]}; state it first")
         return place

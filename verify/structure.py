@@ -34,11 +34,16 @@ class Step:
 
 @dataclass
 class Structure:
-    """Steps by line and subroutines by label, both with lines numbered from 0; ``plain`` lines need no stage before."""
+    """Steps by line and subroutines by label, with lines numbered from 0.
+
+    plain : by line, whether it needs no stage before the blocks
+    again : by line, whether a loop or call may run it more than once
+    """
 
     steps: dict[int, Step] = field(default_factory=dict)
     subs: dict[str, Step] = field(default_factory=dict)
     plain: list[bool] = field(default_factory=list)
+    again: list[bool] = field(default_factory=list)
 
 
 class StructureError(BlockError):
@@ -62,6 +67,7 @@ def find_structure(lines: Sequence[str]) -> Structure:
         if percents == 2:
             break
         found.plain.append(is_plain(raw))
+        found.again.append(False)
         if found.plain[-1]:
             continue
         try:
@@ -130,6 +136,8 @@ class _Pairing:
         if last.word.keyword != "else":
             last.other = step.at
         step.kind = first.kind
+        if first.kind != "if":
+            self.found.again[first.at:step.at] = [True] * (step.at - first.at)
         for member in [*members, step]:
             member.start, member.end = first.at, step.at
 

@@ -1,12 +1,14 @@
 """Parameters, expressions and flow of a program, polar words and shifts of its zero: values by hand."""
 
 import math
+import random
 
 import numpy as np
 import pytest
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import CamError, ProgramError, VerificationError
 from verify import flow
+from verify.fitness import notes_on
 from verify.flow import has_flow
 from verify.lines import is_plain
 from verify.reader import FEED, RAPID, read_program
@@ -89,10 +91,10 @@ def test_conditions():
 def test_loops():
     assert [e[0] for e in ends("#1=0\no1 while [#1 LT 3]\n#1=[#1+1]\nX#1\no1 endwhile\n")] == [1, 2, 3]
     assert [e[0] for e in ends("#1=5\no1 do\nX#1\n#1=[#1+1]\no1 while [#1 LT 3]\n")] == [5]
-    assert [e[0] for e in ends("#1=0\no1 repeat [2.6]\n#1=[#1+1]\nX#1\no1 endrepeat\no2 repeat [-1]\nX9\no2 endrepeat\n")
-            ] == [1, 2, 3]
-    body = ("#1=0\no1 while [1]\n#1=[#1+1]\no2 if [#1 EQ 2]\no1 continue\no2 endif\no3 if [#1 GT 3]\no1 break\no3 endif\n"
-            "X#1\no1 endwhile\nY1\n")
+    body = "#1=0\no1 repeat [2.6]\n#1=[#1+1]\nX#1\no1 endrepeat\no2 repeat [-1]\nX9\no2 endrepeat\n"
+    assert [e[0] for e in ends(body)] == [1, 2, 3]
+    body = ("#1=0\no1 while [1]\n#1=[#1+1]\no2 if [#1 EQ 2]\no1 continue\no2 endif\no3 if [#1 GT 3]\no1 break\n"
+            "o3 endif\nX#1\no1 endwhile\nY1\n")
     assert ends(body) == [[1, 0, 10], [3, 0, 10], [3, 1, 10]]
     nested = "o1 repeat [2]\no2 repeat [2]\nG91 X1\no2 endrepeat\no1 endrepeat\nG90\n"
     assert [e[0] for e in ends(nested)] == [1, 2, 3, 4]
@@ -126,6 +128,13 @@ def test_a_shift_of_zero_is_known_to_the_bit():
     assert p.notes == ("line 9: G92 moves program zero to X8.0000 mm",) and p.remarks == ()
     p = read("X10\nG92 X2\n")
     assert "ends with its zero shifted" in p.remarks[0].message and p.remarks[0].line == 10
+
+
+def test_notes_reach_the_proof():
+    p = read("X[10]\nG52 X2\nG92.1\n")
+    assert list(notes_on(p, -100.0)) == [
+        "program, parameters, expressions and O-words were read as LinuxCNC reads them; other controls differ",
+        "program, line 9: G52 moves program zero to X2.0000 mm"]
 
 
 def test_offset_table_of_the_setup():
@@ -187,3 +196,27 @@ def test_structure_pairs_what_belongs_together():
     found = find_structure(["o1 if [1]", "o2 while [1]", "o2 break", "o2 endwhile", "o1 else", "o1 endif"])
     assert (found.steps[0].other, found.steps[0].end, found.steps[4].end) == (4, 5, 5)
     assert (found.steps[2].end, found.steps[3].start) == (3, 1) and found.subs == {}
+
+
+def test_any_pieces_give_a_program_or_an_error_with_a_line(monkeypatch):
+    """A reading of random pieces ends in finite moves or names a line; nothing else escapes."""
+    monkeypatch.setattr(flow, "MOST_BLOCKS", 2000)
+    r = random.Random(5)
+    pieces = ("# [ ] #1 #2 #<a> #<_x> 1 2 -3 0.5 + - * / ** MOD EQ AND = = o1 o2 o<f> sub endsub if else endif while "
+              "do endwhile repeat endrepeat call return break continue [1] [0] [#1] X Y1 G1 G0 F50 ATAN SIN[ LN "
+              "EXISTS[ ] @ ^ G92 G52 M70 M72 M73 ( ) ; / % 99999999").split()
+    whole = ["#1=1", "#<a>=[#1+1]", "G1 X#1", "o1 if [#1]", "o1 endif", "o1 while [#1 LT 9]", "#1=[#1+1]",
+             "o1 endwhile", "o<f> sub", "o<f> endsub [2]", "o<f> call [1]", "X[#<a>/2]", "M73", "o2 repeat [3]",
+             "o2 endrepeat"]
+    read_through = 0
+    for _ in range(4000):
+        body = "\n".join(" ".join(r.choices(pieces, k=r.randint(1, 7))) if r.random() < 0.2 else r.choice(whole)
+                         for _ in range(r.randint(1, 7))) + "\n"
+        try:
+            p = read(body)
+        except CamError as error:
+            assert error.subjects[0].startswith("line "), body
+            continue
+        read_through += 1
+        assert np.isfinite(p.start).all() and np.isfinite(p.end).all(), body
+    assert read_through > 50
