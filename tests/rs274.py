@@ -51,11 +51,12 @@ def judge(text, folder):
                           stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, errors="replace")
     said = [x for x in done.stderr.splitlines() if x.strip() and x.strip() != "executing"]
     refused = "" if done.returncode == 0 else " | ".join(said[:2]) or f"code {done.returncode}"
-    return Judged(list(_moves((folder / "out.txt").read_text(errors="replace"))), refused)
+    out = folder / "out.txt"  # not there where the first block already is refused
+    return Judged(list(_moves(out.read_text(errors="replace"))) if out.exists() else [], refused)
 
 
 def _moves(canon):
-    at, unit, coarse, feed, plane = np.zeros(3), 1.0, 1.0, math.nan, "XY"
+    at, unit, coarse, feed, plane, by_turn = np.zeros(3), 1.0, 1.0, math.nan, "XY", False
     offsets = {"SET_G5X_OFFSET": np.zeros(3), "SET_G92_OFFSET": np.zeros(3)}
     for name, words in (m.groups() for m in map(_CALL.fullmatch, canon.splitlines()) if m):
         numbers = [float(w) for w in words.replace(",", " ").split()] if re.fullmatch(r"[-0-9., ]+", words) else []
@@ -73,7 +74,9 @@ def _moves(canon):
             unit = {"CANON_UNITS_INCHES": INCH, "CANON_UNITS_MM": 1.0}[words]
             coarse = max(unit, coarse)  # what was printed in inches stays as coarse as that
         elif name == "SET_FEED_RATE":
-            feed = numbers[0] * unit
+            feed = math.nan if by_turn else numbers[0] * unit  # by the turn is not compared
+        elif name == "SET_FEED_MODE":
+            by_turn = numbers[-1] == 1
         elif name == "SELECT_PLANE":
             plane = words.rsplit("_", 1)[1]
 
@@ -122,7 +125,7 @@ def difference(program, judged, gaps=False):
             wrong, n = _arc_difference(ours, n, move)
             if wrong:
                 return f"line {lines[min(n, len(lines) - 1)]}: {wrong}"
-        if move.kind == FEED and not math.isnan(feeds[n - 1]) and abs(feeds[n - 1] - move.feed) > 2 * move.grain:
+        if move.kind == FEED and abs(feeds[n - 1] - move.feed) > 2 * move.grain + 3e-4 * move.feed:
             return f"line {lines[n - 1]}: feed {feeds[n - 1]} instead of {move.feed}"
     return "" if n == len(ours) else f"line {lines[n]}: {ours[n]} has no counterpart"
 
@@ -134,8 +137,8 @@ def _arc_difference(ours, n, move):
     gone, near = 0.0, 0.003 + 4 * move.grain
     while n < len(ours) and gone < 1.01 * length + near:
         gone += float(np.linalg.norm(ours[n] - ours[n - 1]))
-        part = int(np.abs(points - ours[n]).sum(axis=1).argmin())
-        gap = _distance(ours[n], points[max(part - 1, 0):part + 2])
+        nearest = np.abs(points - ours[n]).sum(axis=1).argsort()[:4]  # turns lie on one another
+        gap = min(_distance(ours[n], points[max(part - 1, 0):part + 2]) for part in nearest)
         if gap > near:
             return f"{ours[n]} lies {gap:.4f} mm off the arc to {move.points[-1]}", n
         n += 1

@@ -72,7 +72,7 @@ class Motion(Origins):
         target = [p if a is None else (p + a * s.scale if s.relative else a * s.scale + zero)
                   for a, p, zero in zip(axes, s.position, s.origin, strict=True)]
         if self.polar:
-            target[:2] = self._polar_place()
+            target[:2] = self._polar_place(*self.polar)
         return target
 
     def _machine_move(self, absolute: bool, axes: list[float | None]) -> None:
@@ -213,7 +213,7 @@ class Motion(Origins):
             return None
         self.log.room(repeats * hole.moves)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
-        if s.cycle["top"] < hole.clear != s.position[k]:
+        if s.cycle["top"] + s.origin[k] < hole.clear != s.position[k]:
             self._line_to([hole.clear if axis == k else p for axis, p in enumerate(s.position)], RAPID, NAN)
         for _ in range(repeats):
             at = self._target(across)
@@ -227,9 +227,12 @@ class Motion(Origins):
     def _hole(self, k: int) -> Hole | None:
         """The hole of the cycle in force along axis ``k``."""
         s = self.s
-        top = s.cycle.setdefault("top", s.position[k])
+        top = s.cycle.setdefault("top", s.position[k] - s.origin[k]) + s.origin[k]
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
+        if top > clear and self.stated.isdisjoint((98, 99)):
+            self.log.note("drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they "
+                          "began)")
         if bottom > clear:
             self.log.error(f"the drilling depth {'XYZ'[k]} lies above R")
             return None

@@ -105,14 +105,12 @@ class Origins(Modes):
             raise BlockError("polar words on the way to a place of the machine's own")
         self.polar = values.get("@"), values.get("^")
 
-    def _polar_place(self) -> tuple[float, float]:
+    def _polar_place(self, radius: float | None, angle: float | None) -> tuple[float, float]:
         """X and Y, mm in the setup frame, of the polar words: radius and angle round program zero from the X axis.
 
         A word left out, and both of them in incremental coordinates, go on from where the tip is.
         """
         s = self.s
-        assert self.polar is not None
-        radius, angle = self.polar
         x, y = s.position[0] - s.origin[0], s.position[1] - s.origin[1]
         whole_place = radius is not None and angle is not None and not s.relative
         if math.isnan(x + y) and not whole_place:

@@ -154,6 +154,18 @@ def test_cycles_in_other_planes_and_series():
     assert steps[-3:] == [[10, 10, 6], [10, 10, 3], [10, 10, 6]] and steps[2] == [5, 5, 3]
 
 
+def test_a_series_under_a_shifted_zero_keeps_its_number():
+    """LinuxCNC keeps the height a series goes back to as a number of the program, and so as another place."""
+    series = ends("G98 G81 X1 Z-3 R1\nG52 Z5\nX2\nG80\nG92.1\n")
+    assert series[3] == [1, 0, 10] and series[-1] == [2, 0, 15]
+
+
+def test_a_way_back_that_is_not_stated_is_told():
+    assert read("G81 X1 Z-3 R1\nG80\n").notes == (
+        "drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they began)",)
+    assert read("G98 G81 X1 Z-3 R1\nG80\n").notes == () == read("G81 X1 Z-3 R10\nG80\n").notes
+
+
 @pytest.mark.parametrize("code, kinds, dwell", [
     (81, [FEED, RAPID], 0), (85, [FEED, FEED, RAPID], 0), (86, [FEED, RAPID], 0.5), (89, [FEED, FEED], 0.5)])
 def test_how_a_cycle_leaves_its_hole(code, kinds, dwell):
