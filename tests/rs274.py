@@ -47,12 +47,18 @@ def judge(text, folder):
         "[EMC]\nVERSION=1.1\nMACHINE=judge\n[TRAJ]\nCOORDINATES=XYZABC\nLINEAR_UNITS=mm\nANGULAR_UNITS=degree\n"
         f"[RS274NGC]\nPARAMETER_FILE={folder / 'check.var'}\n")
     (folder / "in.ngc").write_text(text)
-    done = subprocess.run([RS274, "-g", "-i", "check.ini", "-t", "tool.tbl", "in.ngc", "out.txt"], cwd=folder,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, errors="replace")
+    done = _run(folder)
+    if done.returncode < 0:  # killed by a signal: it shares memory with others of its kind that run beside it
+        done = _run(folder)
     said = [x for x in done.stderr.splitlines() if x.strip() and x.strip() != "executing"]
     refused = "" if done.returncode == 0 else " | ".join(said[:2]) or f"code {done.returncode}"
     out = folder / "out.txt"  # not there where the first block already is refused
     return Judged(list(_moves(out.read_text(errors="replace"))) if out.exists() else [], refused)
+
+
+def _run(folder):
+    return subprocess.run([RS274, "-g", "-i", "check.ini", "-t", "tool.tbl", "in.ngc", "out.txt"], cwd=folder,
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, errors="replace")
 
 
 def _moves(canon):
