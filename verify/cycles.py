@@ -5,22 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import Enum
 
 RAPID, FEED = 0, 1
-PECK_LIFT = 0.25
+PECK_LIFT = 0.254
 MOVES_A_PECK = 3
-MOVES_A_HOLE = 4
+MOVES_A_HOLE = 5
+
+
+class Out(Enum):
+    """How a cycle leaves the bottom: at once, feeding to the R plane (G85), or feeding all the way (G89)."""
+
+    RAPID = 0
+    FEED_TO_CLEAR = 1
+    FEED = 2
 
 
 @dataclass(frozen=True)
 class Hole:
-    """One hole along Z.
+    """One hole along the axis across the plane.
 
     clear  : mm, the R plane
     bottom : mm, depth of the tip
     back   : mm, height left to afterwards
     peck   : mm a peck takes, > 0; the whole depth for G81 and G82
-    lift   : whether each peck goes back to ``clear`` (G83) or lifts 0.25 mm to break the chip
+    lift   : whether each peck goes back to ``clear`` (G83) or lifts 0.254 mm to break the chip
+    out    : how it leaves the bottom
     """
 
     clear: float
@@ -28,6 +38,7 @@ class Hole:
     back: float
     peck: float
     lift: bool
+    out: Out = Out.RAPID
 
     @property
     def pecks(self) -> float:
@@ -42,21 +53,24 @@ class Hole:
         return MOVES_A_HOLE + MOVES_A_PECK * self.pecks
 
 
-def hole_moves(hole: Hole, start: list[float], x: float, y: float) -> Iterator[tuple[list[float], int]]:
-    """Targets (x, y, z) in mm and kinds of the moves from ``start`` over the hole, down, and back."""
-    top = start[2]
-    if hole.clear > top:
-        top = hole.clear
-        yield [start[0], start[1], top], RAPID
-    yield [x, y, top], RAPID
-    yield [x, y, hole.clear], RAPID
+def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[float], int]]:
+    """Targets (x, y, z) in mm and kinds of the moves over the hole, down, and back.
+
+    over : (3,) mm, above the hole at the height the tip goes across, not below ``hole.clear`` along ``axis``
+    """
+    def at(height: float) -> list[float]:
+        return [height if k == axis else p for k, p in enumerate(over)]
+    yield at(over[axis]), RAPID
+    yield at(hole.clear), RAPID
     pecks = int(hole.pecks)
     for k in range(1, pecks + 1):
         depth = max(hole.clear - k * hole.peck, hole.bottom) if k < pecks else hole.bottom
-        yield [x, y, depth], FEED
+        yield at(depth), FEED
         if k == pecks:
             break
-        yield [x, y, hole.clear if hole.lift else depth + PECK_LIFT], RAPID
+        yield at(hole.clear if hole.lift else depth + PECK_LIFT), RAPID
         if hole.lift:
-            yield [x, y, min(depth + PECK_LIFT, hole.clear)], RAPID
-    yield [x, y, hole.back], RAPID
+            yield at(min(depth + PECK_LIFT, hole.clear)), RAPID
+    if hole.out is Out.FEED_TO_CLEAR:
+        yield at(hole.clear), FEED
+    yield at(hole.back), FEED if hole.out is Out.FEED else RAPID

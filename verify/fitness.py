@@ -200,6 +200,7 @@ def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
 
     The proof knows of no table that is not a fixture of the setup.
     """
+    yield from (f"{p.name}, {note}" for note in p.notes)
     if p.assumed:
         yield f"{p.name} does not state {', '.join(p.assumed)} before its first move; it was read as if it did"
     if len(p) and float(p.end[:, 2].min()) < bottom - LEAST_BELOW:

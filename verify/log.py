@@ -36,6 +36,7 @@ class Log:
         self.line = 0
         self.rows: list[Row] = []
         self.errors: list[tuple[int, str]] = []
+        self.notes: list[str] = []
         self._remarks: dict[tuple[str, object], Remark] = {}
         self._count: dict[str, int] = {}
         self._chunks: list[F64] = []
@@ -71,6 +72,11 @@ class Log:
         self._count[key] = self._count.get(key, 0) + 1
         if self._count[key] <= MAX_REMARKS:
             self._remarks[key, detail] = Remark(line or self.line, message)
+
+    def note(self, message: str) -> None:
+        """Note what should be known and hinders nothing, once each, twenty at most."""
+        if message not in self.notes and len(self.notes) < MAX_REMARKS:
+            self.notes.append(message)
 
     def remarks(self) -> tuple[Remark, ...]:
         """All remarks by line; the last kept of a key says how many more there are."""
@@ -134,10 +140,11 @@ class Log:
         """Raise ProgramError where a line could not be read."""
         if not self.errors:
             return
-        line, message = self.errors[0]
-        more = f" (and {len(self.errors) - 1} more)" if len(self.errors) > 1 else ""
+        errors = list(dict.fromkeys(self.errors))  # a line in a loop is named once
+        line, message = errors[0]
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise ProgramError(f"{self.name}, line {line}: {message}{more}",
-                           subjects=tuple(f"line {n}" for n, _ in self.errors), measured=[m for _, m in self.errors],
+                           subjects=tuple(f"line {n}" for n, _ in errors), measured=[m for _, m in errors],
                            remedy=self._remedy or "correct the lines named, or leave out what the reader does not know")
 
     def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:

@@ -9,7 +9,8 @@ from verify.kinematics import Kinematics
 from verify.log import Log
 from verify.program import NAN, Stop
 from verify.rotary import Rotary
-from verify.words import CYCLES, MOTION_CODES, WORK_OFFSETS, Block
+from verify.saved import SavedModes
+from verify.words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
 
 INCH = 25.4
 
@@ -30,6 +31,7 @@ class Modes(Rotary):
                  spindle_tool: int = 0) -> None:
         super().__init__(log, machine, gauge or {})
         self.tools, self.work_offset, self.blend_limit = tools, work_offset, blend_limit
+        self.saved = SavedModes()
         self.spindle_tool, self.loaded = spindle_tool, False
         if spindle_tool:
             self.s.tool = self.s.selected = self.s.offset = spindle_tool
@@ -39,7 +41,11 @@ class Modes(Rotary):
         self.assumed: tuple[str, ...] = ()
 
     def _set_modes(self, block: Block) -> None:
-        s, values = self.s, block.values
+        s, values, scale = self.s, block.values, self.s.scale
+        if not SAVES.isdisjoint(block.ms):
+            if values or block.codes or len(block.ms) > 1:
+                raise BlockError(f"M{block.ms[0]} beside other words: give it a block of its own")
+            self.saved.run(block.ms[0], s)
         if "S" in values:
             s.speed = values["S"]
             if s.speed < 0:
@@ -55,6 +61,9 @@ class Modes(Rotary):
             self._mode(g, values)
         if 64 in block.codes:
             self._blending(values)
+        if "F" in values and s.scale != scale:
+            self.log.remark("unit_feed", f"F{values['F']:g} beside the word that changes the unit: LinuxCNC reads it "
+                            "in the old unit, other controls in the new one; give F a line of its own", self.log.line)
         if "F" in values:
             s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
 

@@ -8,16 +8,16 @@ import math
 import numpy as np
 
 from verify.arcs import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
-from verify.cycles import FEED, RAPID, Hole, hole_moves
+from verify.cycles import FEED, RAPID, Hole, Out, hole_moves
 from verify.dividing import TIP
 from verify.log import MOST_MOVES_A_BLOCK
-from verify.modes import Modes
+from verify.origins import Origins
 from verify.program import NAN
 from verify.rotary import between
-from verify.words import CYCLES, Block, whole
+from verify.words import CYCLES, SHIFTS, Block, whole
 
 
-class Motion(Modes):
+class Motion(Origins):
     """Moves of the blocks, written to the log; ``dwell`` is what they wait, s."""
 
     dwell = 0.0
@@ -25,15 +25,18 @@ class Motion(Modes):
     def _move(self, block: Block) -> None:
         s, values = self.s, block.values
         axes = [values.get(a) for a in "XYZ"]
+        self._polar_words(block)
         turn = self._turn(values, absolute=53 in block.codes)
         if 4 in block.codes:
-            return self._wait(turn is not None or any(a is not None for a in axes), values)
+            return self._wait(turn is not None or bool(self.polar) or any(a is not None for a in axes), values)
+        if not SHIFTS.isdisjoint(block.codes):
+            return self._shift_origin(block, axes)
         if 53 in block.codes:
             return self._machine_place(axes, turn)
         if not {28, 30}.isdisjoint(block.codes):
             return self._home(axes, turn, values)
         full_circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
-        if all(a is None for a in axes) and turn is None and not full_circle:
+        if all(a is None for a in axes) and turn is None and not self.polar and not full_circle:
             return None
         if s.motion is None or s.motion == 80:
             return self.log.error("coordinates without a motion word")
@@ -71,8 +74,11 @@ class Motion(Modes):
                 if a and math.isnan(p):
                     self.log.remark("incremental_unknown", f"an incremental move ({letter}{a:g}, G91 of line "
                                     f"{self.incremental_line}) from a place the program has not stated")
-        return [p if a is None else (p + a * s.scale if s.relative else a * s.scale)
-                for a, p in zip(axes, s.position, strict=True)]
+        target = [p if a is None else (p + a * s.scale if s.relative else a * s.scale + zero)
+                  for a, p, zero in zip(axes, s.position, s.origin, strict=True)]
+        if self.polar:
+            target[:2] = self._polar_place(*self.polar)
+        return target
 
     def _machine_place(self, axes: list[float | None], turn: list[float] | None) -> None:
         """G53: the linear axes named are unknown afterwards, the rotary ones stand where it says.
@@ -186,7 +192,7 @@ class Motion(Modes):
                 offset = np.array([values.get(c, 0.0) * s.scale for c in letters])
                 if s.centre_absolute and not all(c in values for c in letters):
                     return error(f"absolute arc centres (G90.1) need both {letters[0]} and {letters[1]}")
-                centre = offset if s.centre_absolute else start[list(axes[:2])] + offset
+                centre = offset + (np.array(s.origin) if s.centre_absolute else start)[list(axes[:2])]
             else:
                 return error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
             if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
@@ -211,48 +217,59 @@ class Motion(Modes):
         return CHORD - TIP if bent else CHORD
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
-        """G81, G82, G83, G73 in the XY plane, written out as rapids and feeds."""
+        """A drilling cycle along the third axis of the plane, written out as rapids and feeds.
+
+        In a series of them G98 goes back to, and G91 counts R from, the height where the series began, as in LinuxCNC;
+        so does its way over the next hole, which climbs while it goes where the last hole was left at R.
+        """
         s, error = self.s, self.log.error
-        if s.plane != 17:
-            return error(f"a drilling cycle in plane G{s.plane}")
-        s.cycle.update({k: values[k] for k in "RQP" if k in values})
-        if axes[2] is not None:
-            s.cycle["Z"] = axes[2]
-        missing = [k for k in ("Z", "R", *(("Q",) if s.motion in (73, 83) else ())) if k not in s.cycle]
+        k = PLANE_AXES[s.plane][2]
+        if s.cycle.setdefault("plane", s.plane) != s.plane:
+            return error("a drilling cycle goes on in another plane: end it with G80 first")
+        s.cycle.update({c: values[c] for c in "RQP" if c in values})
+        if (depth := axes[k]) is not None:
+            s.cycle["XYZ"[k]] = depth
+        missing = [c for c in ("XYZ"[k], "R", *(("Q",) if s.motion in (73, 83) else ())) if c not in s.cycle]
         if missing:
             return error(f"a drilling cycle without {', '.join(missing)}")
-        if math.isnan(s.position[2]):
+        if math.isnan(s.position[k]):
             return error("a drilling cycle from a height the program has not stated")
         if s.cycle.get("P", 0.0) < 0:
             return error(f"P{s.cycle['P']:g} waits a negative time")
         feed = self._feed(values)
         repeats = whole(values, "L" if "L" in values else "K", 1)
-        if feed is None:
+        hole = self._hole(k) if feed is not None else None
+        if hole is None or feed is None:
             return None
+        self.log.room(repeats * hole.moves)
+        across = [None if axis == k else a for axis, a in enumerate(axes)]
+        if s.cycle["top"] + s.origin[k] < hole.clear != s.position[k]:
+            self._line_to([hole.clear if axis == k else p for axis, p in enumerate(s.position)], RAPID, NAN)
         for _ in range(repeats):
-            hole = self._hole()
-            if hole is None:
-                return None
-            self.log.room(repeats * hole.moves)
-            at = self._target([axes[0], axes[1], None])
+            at = self._target(across)
+            at[k] = at[k] if at[k] > hole.clear else hole.back
             self._check_cutting(at)
-            for point, kind in hole_moves(hole, s.position, at[0], at[1]):
+            for point, kind in hole_moves(hole, at, k):
                 self._line_to(point, kind, feed if kind == FEED else NAN)
-            self.dwell += 0.0 if s.motion == 81 else s.cycle.get("P", 0.0)
+            self.dwell += 0.0 if s.motion in (81, 85) else s.cycle.get("P", 0.0)
         return None
 
-    def _hole(self) -> Hole | None:
-        """The hole of the cycle in force from the present height."""
+    def _hole(self, k: int) -> Hole | None:
+        """The hole of the cycle in force along axis ``k``."""
         s = self.s
-        top = s.position[2]
-        clear = s.cycle["R"] * s.scale + (top if s.relative else 0.0)
-        bottom = s.cycle["Z"] * s.scale + (clear if s.relative else 0.0)
+        top = s.cycle.setdefault("top", s.position[k] - s.origin[k]) + s.origin[k]
+        clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
+        bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
+        if top > clear and self.stated.isdisjoint((98, 99)):
+            self.log.note("drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they "
+                          "began)")
         if bottom > clear:
-            self.log.error("the drilling depth Z lies above R")
+            self.log.error(f"the drilling depth {'XYZ'[k]} lies above R")
             return None
         pecking = s.motion in (73, 83)
         peck = abs(s.cycle["Q"]) * s.scale if pecking else max(clear - bottom, 1e-9)
         if peck <= 0 and clear > bottom:
             self.log.error("a drilling cycle with Q0 never ends")
             return None
-        return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83)
+        out = {85: Out.FEED_TO_CLEAR, 89: Out.FEED}.get(int(s.motion or 0), Out.RAPID)
+        return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)

@@ -67,6 +67,7 @@ class Program:
     lines   : number of lines read
     remarks : what should not be run
     poses   : None where the tool stands along Z throughout: no rotary axis ever leaves 0
+    notes   : what was done and should be known
     """
 
     name: str
@@ -86,6 +87,7 @@ class Program:
     blend: float
     minutes: F64
     poses: Poses | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)
@@ -101,6 +103,10 @@ class State:
     tcp_word, tcp_switch : tool centre point control by G43.4, by M428
     speed     : as S, nan before the first
     parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
+    cycle     : words of the drilling cycle in force, and where its series began
+    table     : mm, by how much G10 moved the zero of the work offset
+    shift     : mm, by how much G92 or G52 moved program zero
+    kept      : mm, the shift that G92.3 brings back
     """
 
     position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
@@ -124,6 +130,19 @@ class State:
     tcp_word: bool = False
     tcp_switch: bool = False
     ended: bool = False
+    table: list[float] = field(default_factory=lambda: [0.0] * 3)
+    shift: list[float] = field(default_factory=lambda: [0.0] * 3)
+    kept: list[float] = field(default_factory=lambda: [0.0] * 3)
+
+    @property
+    def origin(self) -> list[float]:
+        """mm, where program zero lies in the setup frame."""
+        return [a + b for a, b in zip(self.table, self.shift, strict=True)]
+
+    @property
+    def length_off(self) -> bool:
+        """Whether Z of the control is not that of the tip, for want of the length offset of the tool."""
+        return self.tool > 0 and self.offset != self.tool
 
     @property
     def turning(self) -> bool:

@@ -1,6 +1,7 @@
 """NC text to moves of the tool tip: a LinuxCNC / Fanuc reader of its own for three to five axes.
 
-A program is read line by line by one modal machine. The common line, one straight move in modal
+A program is read line by line by one modal machine; parameters, expressions and O-words of
+LinuxCNC are worked out in a stage before it (``flow``). The common line, one straight move in modal
 coordinates, is taken by one regular expression; everything else goes through the full block (``words``).
 What the reader does not know it names with its line (``ProgramError``): nothing is skipped in silence.
 What it understands but a machinist should not run (length offset off, another work offset, spindle
@@ -14,16 +15,18 @@ the path; rotary axes stand at 0; what it takes for granted so is told (``Progra
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
 from geometry.errors import ProgramError
 from verify.cycles import FEED, RAPID
+from verify.flow import Flow, has_flow
 from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
 from verify.motion import Motion
 from verify.program import NAN, Program, Remark
+from verify.served import served
 from verify.words import STRAIGHT, Block, BlockError, parse_block, used_letters
 
 BLEND_LIMIT = 0.01
@@ -35,28 +38,43 @@ class Reader(Motion):
     def read(self, text: str) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says."""
         log, lines = self.log, text.split("\n")
-        percents = self._scan(lines)
+        percents = self._scan(Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1))
         self.stop("end of the program")
-        if not self.s.ended and percents < 2:
+        if not self.s.ended and percents < 2 and not log.errors:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
         log.raise_errors()
         if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
             log.remark("incremental", "the program turns to incremental coordinates (G91) after cuts in absolute ones "
                        "and never turns back", line=self.incremental_line)
+        if any(self.s.shift):
+            log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps that "
+                       "for the next run: take it back with G92.1")
         table = log.table()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
                        table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
-                       log.turned.poses(len(table), self.machine))
+                       log.turned.poses(len(table), self.machine), tuple(log.notes))
 
-    def _scan(self, lines: list[str]) -> int:
-        """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""
+    def served(self, key: int | str) -> float:
+        """A parameter that the control keeps by itself (``verify.served``)."""
+        return served(self.s, key)
+
+    def enter(self) -> None:
+        """A subroutine begins: it has kept no modes."""
+        self.saved.enter()
+
+    def leave(self) -> None:
+        """A subroutine ends: the modes its M73 kept come back."""
+        self.saved.leave(self.s)
+
+    def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
+        """Run blocks given with their lines; the fast path serves plain straight moves, and only in the plain state."""
         s, log, fast, rows, full = self.s, self.log, STRAIGHT, self.log.rows, Log.full
         percents = 0
         plain = begun = False
-        for number, raw in enumerate(lines, 1):
+        for number, raw in blocks:
             if plain and (m := fast(raw)):
                 g, x, y, z, f = m.groups()
                 if g is not None:
@@ -102,6 +120,7 @@ class Reader(Motion):
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
+                and not any(s.origin)
                 and not any(math.isnan(v) for v in s.position))
 
     def _block(self, text: str) -> None:
@@ -124,7 +143,7 @@ class Reader(Motion):
     def _name_unused(self, block: Block) -> None:
         motion = self.s.motion
         moves = {28, 30, 53}.isdisjoint(block.codes) and not block.values.keys().isdisjoint(
-            "XYZABCIJK" if motion in (2, 3) else "XYZABC")
+            "XYZABCIJK@^" if motion in (2, 3) else "XYZABC@^")
         used = used_letters(block, motion, moves)
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:

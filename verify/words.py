@@ -10,8 +10,12 @@ import math
 import re
 from dataclasses import dataclass, field
 
-MOTION_CODES = frozenset({0, 1, 2, 3, 80, 73, 81, 82, 83})
-CYCLES = frozenset({73, 81, 82, 83})
+CYCLES = frozenset({73, 81, 82, 83, 85, 86, 89})
+MOTION_CODES = frozenset({0, 1, 2, 3, 80}) | CYCLES
+SHIFTS: frozenset[float] = frozenset({10, 52, 92, 92.1, 92.2, 92.3})
+"""Words that move program zero."""
+SAVES = frozenset({70, 71, 72, 73})
+"""M words that keep the modes, forget and restore what was kept."""
 WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
                 59.3: "G59.3"}
 LARGEST = 1e15
@@ -22,28 +26,31 @@ NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 _SHORT = r"[+-]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)"
 STRAIGHT = re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?(?:X({_SHORT}) ?)?(?:Y({_SHORT}) ?)?(?:Z({_SHORT}) ?)?"
                       rf"(?:F({_SHORT}) ?)?\r?").fullmatch
-_WORD = re.compile(rf"([A-Z])({NUMBER})")
+_WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
+_SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
 _FOREIGN = re.compile(r"[^\t -~]")
-_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30}) | SAVES
 _ROTARY = "ABC"
 _TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
 _WHOLE = "THDLM"
 
 # The modal groups of RS274: a control refuses two words of one, or takes the last; G80 has a group of its own on Fanuc.
 _G_GROUPS: tuple[frozenset[float], ...] = (
-    frozenset({4, 28, 30, 53}), MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}), frozenset({90, 91}),
-    frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}), frozenset({43, 43.4, 49}),
+    frozenset({4, 28, 30, 53}) | SHIFTS, MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}),
+    frozenset({90, 91}), frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}),
+    frozenset({43, 43.4, 49}),
     frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}),
     frozenset({50}), frozenset({69}),
 )
 _M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
-                                           frozenset({7, 8, 9}), _TCP_M)
+                                           frozenset({7, 8, 9}), _TCP_M, SAVES)
 _G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G}
 _HINTS = {
-    10: "a changed offset table", 41: "cutter radius compensation", 42: "cutter radius compensation",
-    43.4: "tool centre point control", 43.5: "tool centre point control by vectors", 52: "a shifted origin",
-    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 92: "a shifted origin",
+    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing", 41: "cutter radius compensation",
+    42: "cutter radius compensation", 43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
+    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 74: "tapping",
+    76: "threading", 84: "tapping", 87: "boring from below", 88: "boring with a stop for the hand",
 }
 _M_HINTS = {428: "tool centre point control", 429: "tool centre point control", 430: "kinematics of the shop's own"}
 NO_MACHINE = "give the machine of the setup its rotary axes: kind 5-axis and machine.kinematics"
@@ -88,12 +95,7 @@ def parse_block(text: str, rotary: str = "") -> Block:
         Text that is no word, an open comment, a character outside ASCII, an unknown word, a letter that stands twice,
         two words of one modal group, a fraction where the address takes whole numbers, a number above 1e15.
     """
-    text = _COMMENT.sub(" ", text).split(";", 1)[0]
-    if "(" in text or ")" in text:
-        raise BlockError("a comment is not closed")
-    if strange := _FOREIGN.search(text.strip()):
-        raise BlockError(f"a character that is no part of a word: {ascii(strange.group())}")
-    text = "".join(text.upper().split())
+    text = "".join(bare(text).upper().split())
     block = Block(deleted=text.startswith("/"))
     text = text[1:] if block.deleted else text
     if text.startswith("O"):
@@ -108,6 +110,24 @@ def parse_block(text: str, rotary: str = "") -> Block:
     _check_groups("G", block.codes, _G_GROUPS)
     _check_groups("M", block.ms, _M_GROUPS)
     return block
+
+
+def bare(text: str) -> str:
+    """A line without its comments.
+
+    Raises
+    ------
+    BlockError
+        An open comment, a comment that LinuxCNC runs as Python, a character outside ASCII.
+    """
+    if _SCRIPT.search(text):
+        raise BlockError("a comment that LinuxCNC runs as Python ('py,')")
+    text = _COMMENT.sub(" ", text).split(";", 1)[0]
+    if "(" in text or ")" in text:
+        raise BlockError("a comment is not closed")
+    if strange := _FOREIGN.search(text.strip()):
+        raise BlockError(f"a character that is no part of a word: {ascii(strange.group())}")
+    return text
 
 
 def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
@@ -128,7 +148,7 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
         raise BlockError(f"unknown word {letter}{digits} (a rotary axis; the machine turns {' and '.join(rotary)})"
                          if rotary else f"unknown word {letter}{digits} (a rotary axis; the machine has none)",
                          None if rotary else NO_MACHINE)
-    if letter not in "XYZABCIJKRPQLFSTHDM":
+    if letter not in "XYZABCIJKRPQLFSTHDM@^":
         raise BlockError(f"unknown word {letter}{digits}")
     if letter in _WHOLE and (number != int(number) or number < 0):
         raise BlockError(f"unknown word {letter}{digits}: {letter} takes a whole number from 0")
@@ -161,6 +181,8 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
     moves  : whether the block makes a move of that motion
     """
     used = "XYZABCFST"
+    if 10 in block.codes:
+        return used + "LP"
     if 43 in block.codes or _TCP_G in block.codes:
         used += "H"
     if 64 in block.codes:
@@ -169,11 +191,12 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
         return used + "P"
     if not moves:
         return used
+    used += "@^"
     if motion in (2, 3):
         return used + ("RP" if "R" in block.values else "IJKP")
     if motion in CYCLES:
         used += "R" + ("L" if "L" in block.values else "K")
-        return used + {81: "", 82: "P"}.get(int(motion or 0), "PQ")
+        return used + {81: "", 85: "", 82: "P", 86: "P", 89: "P"}.get(int(motion or 0), "PQ")
     return used
 
 

@@ -157,6 +157,8 @@ def test_axes_that_never_leave_zero_change_nothing():
     ("G43.5 H1\n", "unknown word G43.5", "correct"),
     ("G68.2 X0\n", "unknown word G68.2 (a tilted plane)", "correct"),
     ("M430\n", "unknown word M430 (kinematics of the shop's own)", "correct"),
+    ("G92 A0\n", "G92 A (a shifted rotary zero)", "correct"),
+    ("M70\nG43.4 H1\nM72\n", "M72 back over a G43.4", "correct"),
     ("G43 G43.4 H1\n", "G43 and G43.4 in one block", "correct"),
     ("M428 M429\n", "M428 and M429 in one block", "correct"),
     ("G81 X1 Y1 Z-1 R1 A5 F100\n", "a drilling cycle whose block turns an axis", "correct"),

@@ -1,0 +1,194 @@
+"""Numbers, parameters and expressions of LinuxCNC: read once, worked out whenever their line is run.
+
+Precedence, from the closest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. All of them run from left to right,
+and a sign belongs to the value behind it. Angles are degrees. Numbers nearer than 1e-5 are equal for EQ and NE.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from verify.parameters import Parameters
+from verify.words import NUMBER, BlockError
+
+Value = Callable[[Parameters], float]
+
+MOST_BRACKETS = 40
+EQUAL = 1e-5
+
+_NUMBER = re.compile(NUMBER)
+_NAME = re.compile(r"<([^<>]*)>")
+_FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
+_OPERATOR = re.compile(r"\*\*|[*/+-]|mod|eq|ne|gt|ge|lt|le|and|or|xor")
+_PRECEDENCE = {"**": 5, "*": 4, "/": 4, "mod": 4, "+": 3, "-": 3, "eq": 2, "ne": 2, "gt": 2, "ge": 2, "lt": 2, "le": 2,
+               "and": 1, "or": 1, "xor": 1}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A parameter as it is written: its name, or what its number comes from."""
+
+    name: str
+    number: Value | None
+
+    def read(self, scope: Parameters) -> float:
+        """Its value now."""
+        return scope.named(self.name) if self.number is None else scope.numbered(self.number(scope))
+
+
+class Reading:
+    """One left-to-right reading of the text of a line, which has no blanks and is in lower case."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.at, self._depth = text, 0, 0
+
+    @property
+    def rest(self) -> str:
+        """What is still to read, for messages."""
+        return self.text[self.at:self.at + 40]
+
+    def take(self, sign: str) -> None:
+        """Pass over ``sign``; BlockError where it is not there."""
+        if not self.text.startswith(sign, self.at):
+            raise BlockError(f"'{sign}' is missing before '{self.rest}'")
+        self.at += len(sign)
+
+    def value(self) -> Value:
+        """A number, a parameter, a function, an expression in brackets, or one of these with a sign."""
+        self._depth += 1
+        if self._depth > MOST_BRACKETS:
+            raise BlockError(f"more than {MOST_BRACKETS} brackets, signs or # in one another")
+        found = self._value()
+        self._depth -= 1
+        return found
+
+    def _value(self) -> Value:
+        if number := _NUMBER.match(self.text, self.at):
+            self.at = number.end()
+            fixed = float(number.group())
+            return lambda scope: fixed
+        sign = self.text[self.at:self.at + 1]
+        if sign == "[":
+            return self.bracket()
+        if sign == "#":
+            return self.target().read
+        if sign in ("+", "-") and sign:
+            self.at += 1
+            behind = self.value()
+            return behind if sign == "+" else lambda scope: -behind(scope)
+        if function := _FUNCTION.match(self.text, self.at):
+            self.at = function.end()
+            return self._function(function.group())
+        raise BlockError(f"cannot read a number, parameter or expression at '{self.rest}'")
+
+    def bracket(self) -> Value:
+        """An expression in brackets."""
+        self.take("[")
+        inside = self._joined(1)
+        self.take("]")
+
+        def checked(scope: Parameters) -> float:
+            result = inside(scope)
+            if not math.isfinite(result):
+                raise BlockError("an expression whose value is no finite number")
+            return result
+        return checked
+
+    def target(self) -> Target:
+        """The parameter behind a # sign."""
+        self.take("#")
+        if name := _NAME.match(self.text, self.at):
+            self.at = name.end()
+            return Target(name.group(1), None)
+        return Target("", self.value())
+
+    def _joined(self, least: int) -> Value:
+        """Values joined by operators of at least this precedence."""
+        left = self.value()
+        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= least:
+            self.at = sign.end()
+            left = _join(_OPERATIONS[sign.group()], left, self._joined(_PRECEDENCE[sign.group()] + 1))
+        return left
+
+    def _function(self, name: str) -> Value:
+        if name == "exists":
+            self.take("[")
+            target = self.target()
+            self.take("]")
+            if target.number is not None:
+                raise BlockError("EXISTS of a numbered parameter: it takes a name, such as EXISTS[#<depth>]")
+            return lambda scope: float(scope.exists(target.name))
+        first = self.bracket()
+        if name == "atan":
+            self.take("/")
+            return _join(lambda y, x: math.degrees(math.atan2(y, x)), first, self.bracket())
+        function = _FUNCTIONS[name]
+        return lambda scope: function(first(scope))
+
+
+def _join(operation: Callable[[float, float], float], left: Value, right: Value) -> Value:
+    return lambda scope: operation(left(scope), right(scope))
+
+
+def _divided(left: float, right: float) -> float:
+    if right == 0:
+        raise BlockError(f"{left:g} is divided by zero")
+    return left / right
+
+
+def _modulo(left: float, right: float) -> float:
+    """The remainder, never negative."""
+    if right == 0:
+        raise BlockError(f"{left:g} MOD zero has no value")
+    return left % abs(right)
+
+
+def _power(left: float, right: float) -> float:
+    if left < 0 and right != math.floor(right):
+        raise BlockError(f"{left:g} ** {right:g}: a negative number has whole powers only")
+    if left == 0 and right < 0:
+        raise BlockError(f"0 ** {right:g} has no value")
+    return _small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
+
+
+def _small_enough(name: str, compute: Callable[[], float]) -> float:
+    try:
+        return compute()
+    except OverflowError:
+        raise BlockError(f"{name} is no finite number") from None
+
+
+def _within(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[[float], float]:
+    """``function`` of a number from ``least`` to ``most``; any other is refused with the name."""
+    def applied(number: float) -> float:
+        if not least <= number <= most:
+            raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {least:g} to {most:g}")
+        return function(number)
+    return applied
+
+
+def _rounded(number: float) -> float:
+    """Nearest whole number, halves away from zero."""
+    return math.copysign(math.floor(abs(number) + 0.5), number)
+
+
+_OPERATIONS: dict[str, Callable[[float, float], float]] = {
+    "**": _power, "*": operator.mul, "/": _divided, "mod": _modulo, "+": operator.add, "-": operator.sub,
+    "eq": lambda a, b: float(abs(a - b) < EQUAL), "ne": lambda a, b: float(abs(a - b) >= EQUAL),
+    "gt": lambda a, b: float(a > b), "ge": lambda a, b: float(a >= b), "lt": lambda a, b: float(a < b),
+    "le": lambda a, b: float(a <= b), "and": lambda a, b: float(a != 0 and b != 0),
+    "or": lambda a, b: float(a != 0 or b != 0), "xor": lambda a, b: float((a != 0) != (b != 0)),
+}
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "abs": abs, "fix": math.floor, "fup": math.ceil, "round": _rounded,
+    "exp": lambda v: _small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
+    "acos": _within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
+    "asin": _within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),
+    "cos": lambda v: math.cos(math.radians(v)), "sin": lambda v: math.sin(math.radians(v)),
+    "tan": lambda v: math.tan(math.radians(v)),
+    "ln": _within("LN", math.log, math.ulp(0.0), math.inf), "sqrt": _within("SQRT", math.sqrt, 0, math.inf),
+}

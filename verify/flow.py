@@ -1,0 +1,185 @@
+"""The stage before the blocks: parameters worked out, subroutines, conditions and loops run, plain blocks handed on.
+
+A program without any of these never comes here. Every block keeps the line number of its text. An error in a parameter
+or an O-word ends the reading: where the program would go from there is not known.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+from geometry.errors import VerificationError
+from verify.expressions import Value
+from verify.lines import Line, read_line
+from verify.log import Log
+from verify.parameters import LOCAL, Frame, Parameters
+from verify.structure import Step, Structure, StructureError, find_structure
+from verify.words import BlockError
+
+MOST_BLOCKS = 5_000_000
+MOST_CALLS = 9
+"""Calls within one another that LinuxCNC runs."""
+MOST_KEPT = 20_000
+_O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
+
+
+def has_flow(text: str) -> bool:
+    """Whether a program has parameters, expressions or O-words; True also where only a comment looks so."""
+    if "#" in text or "[" in text:
+        return True
+    for letter in "oO":
+        at = text.find(letter)
+        while at >= 0:
+            if _O_WORD.match(text, at):
+                return True
+            at = text.find(letter, at + 1)
+    return False
+
+
+class Machine(Protocol):
+    """What the flow needs of the reader."""
+
+    log: Log
+
+    def served(self, key: int | str) -> float:
+        """A parameter of the control."""
+
+    def enter(self) -> None:
+        """A subroutine begins."""
+
+    def leave(self) -> None:
+        """A subroutine ends."""
+
+
+class Flow:
+    """One run of a program.
+
+    lines   : its text
+    machine : the reader, asked for its state and told of calls
+    """
+
+    def __init__(self, lines: Sequence[str], machine: Machine) -> None:
+        self.lines, self.machine = lines, machine
+        self.scope = Parameters(machine.served)
+        self.structure = Structure()
+        self._back: list[int] = []
+        self._kept: dict[int, Line] = {}
+        self._runs: dict[str, Callable[[Step], int]] = {
+            "sub": lambda step: step.end + 1, "endsub": self._return, "return": self._return, "call": self._call,
+            "if": self._if, "else": lambda step: step.end + 1, "elseif": lambda step: step.end + 1,
+            "endif": lambda step: step.at + 1, "while": self._while, "endwhile": lambda step: step.start,
+            "do": lambda step: step.at + 1, "repeat": self._repeat, "endrepeat": self._again,
+            "break": lambda step: step.end + 1, "continue": lambda step: step.start,
+        }
+
+    def blocks(self) -> Iterator[tuple[int, str]]:
+        """Line numbers from 1 and plain blocks, in the order they are run; an error is logged and ends them.
+
+        Raises
+        ------
+        VerificationError
+            Code program_too_long: more than 5 000 000 lines run.
+        """
+        try:
+            self.structure = find_structure(self.lines)
+        except StructureError as problem:
+            return self.machine.log.error(str(problem), problem.line)
+        at, runs = 0, 0
+        plain, steps = self.structure.plain, self.structure.steps
+        if not all(plain):
+            self.machine.log.note("parameters, expressions and O-words were read as LinuxCNC reads them; other "
+                                  "controls differ")
+        while at < len(plain):
+            runs += 1
+            if runs > MOST_BLOCKS:
+                self._endless(at + 1)
+            if plain[at]:
+                at += 1
+                yield at, self.lines[at - 1]
+                continue
+            self.machine.log.line = at + 1
+            try:
+                if at in steps:
+                    at = self._runs[steps[at].word.keyword](steps[at])
+                    continue
+                text = self._line(at).run(self.scope)
+            except BlockError as problem:
+                return self.machine.log.error(str(problem))
+            at += 1
+            if text:
+                yield at, text
+        if len(plain) < len(self.lines):
+            yield len(plain) + 1, "%"
+        return None
+
+    def _line(self, at: int) -> Line:
+        """The line as read; kept only where it comes again, as keeping them all slows the collector of garbage."""
+        line = self._kept.get(at)
+        if line is None:
+            line = read_line(self.lines[at])
+            if self.structure.again[at] and len(self._kept) < MOST_KEPT:
+                self._kept[at] = line
+        return line
+
+    def _endless(self, line: int) -> None:
+        log = self.machine.log
+        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MOST_BLOCKS} lines, so a loop "
+                                "may have no end", code="program_too_long", subjects=(f"line {line}",),
+                                measured=MOST_BLOCKS + 1, limit=MOST_BLOCKS,
+                                remedy="correct the condition of the loop, or split the program")
+
+    def _holds(self, step: Step) -> bool:
+        return step.word.values[0](self.scope) != 0
+
+    def _if(self, step: Step) -> int:
+        """Go from branch to branch until one holds."""
+        while step.word.keyword in ("if", "elseif") and not self._holds(step):
+            step = self.structure.steps[step.other]
+            self.machine.log.line = step.at + 1
+        return step.at + 1
+
+    def _while(self, step: Step) -> int:
+        if step.kind == "do":
+            return step.start + 1 if self._holds(step) else step.at + 1
+        return step.at + 1 if self._holds(step) else step.end + 1
+
+    def _repeat(self, step: Step) -> int:
+        times = step.word.values[0](self.scope)
+        self.scope.frame.repeats[step.start] = round(times) if times < MOST_BLOCKS else MOST_BLOCKS
+        return step.at + 1 if self.scope.frame.repeats[step.start] > 0 else step.end + 1
+
+    def _again(self, step: Step) -> int:
+        self.scope.frame.repeats[step.start] -= 1
+        return step.start + 1 if self.scope.frame.repeats[step.start] > 0 else step.at + 1
+
+    def _call(self, step: Step) -> int:
+        word = step.word
+        label = word.label if word.computed is None else _label(word.computed, self.scope)
+        sub = self.structure.subs.get(label)
+        if sub is None:
+            raise BlockError(f"the subroutine '{label}' is not in the program: it would be in the file {label}.ngc; "
+                             "put it into the program")
+        if len(self._back) >= MOST_CALLS:
+            raise BlockError(f"more than {MOST_CALLS} calls in one another, which is all LinuxCNC runs")
+        numbers = dict.fromkeys(range(1, LOCAL + 1), 0.0)
+        numbers.update(enumerate((value(self.scope) for value in word.values), 1))
+        self.scope.frames.append(Frame(numbers))
+        self._back.append(step.at + 1)
+        self.machine.enter()
+        return sub.at + 1
+
+    def _return(self, step: Step) -> int:
+        values = step.word.values
+        self.scope.returned = (values[0](self.scope), 1.0) if values else (0.0, 0.0)
+        self.scope.frames.pop()
+        self.machine.leave()
+        return self._back.pop()
+
+
+def _label(computed: Value, scope: Parameters) -> str:
+    number = computed(scope)
+    if number < 0 or number != round(number):
+        raise BlockError(f"O{number:g} is no label")
+    return str(int(number))
