@@ -176,16 +176,23 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
 
 
 @njit(**KERNEL)
-def _solid(tops, out):
-    """Bricks that hold stock, as first and last in each direction, into ``out`` (6,); first > last where none does."""
+def _solid(tops, band, out):
+    """Bricks that hold stock, as first and last in each direction, into ``out`` (6,); first > last where none does.
+
+    Returns whether a cut can still lower any node: those below zero count too, as the surface beside them and the
+    shares of cells depend on how far below they are.
+    """
     nx, ny, nz = tops.shape
     out[0], out[1], out[2], out[3], out[4], out[5] = nx, ny, nz, -1, -1, -1
+    changing = False
     for i in range(nx):
         for j in range(ny):
             for k in range(nz):
+                changing = changing or tops[i, j, k] > -band
                 if tops[i, j, k] > 0.0:
                     out[0], out[1], out[2] = min(out[0], i), min(out[1], j), min(out[2], k)
                     out[3], out[4], out[5] = max(out[3], i), max(out[4], j), max(out[5], k)
+    return changing
 
 
 @njit(**KERNEL)
@@ -203,7 +210,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
     """
     tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
     solid = np.zeros(6, np.int64)
-    _solid(tops, solid)
+    changing = _solid(tops, band, solid)
     best, piece, totals = np.zeros((16, 5)), np.empty(PIECE), np.zeros(3)
     rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
     sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
@@ -212,9 +219,11 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
     rad = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
     count, cuts = 0, 0
     for m in range(len(starts)):
+        if not changing:
+            break
         k, feed = tool[m], feeds[m]
         far = reach[k] + rad + band + bow + rapid_grow
-        if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far or solid[0] > solid[3]:
+        if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
         lift = not feed and is_lift(angle[m], axis[m], starts[m], ends[m])
         grow = 0.0 if feed or lift else rapid_grow
@@ -237,6 +246,6 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
             cuts += 1
             if cuts % 64 == 0:
-                _solid(tops, solid)
+                changing = _solid(tops, band, solid)
         count = _note(events, count, m, best)
     return count
