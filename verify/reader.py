@@ -24,18 +24,20 @@ from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
 from verify.motion import Motion
 from verify.program import NAN, Program, Remark
+from verify.progress import Report, silent
 from verify.words import STRAIGHT, Block, BlockError, parse_block, used_letters
 
 BLEND_LIMIT = 0.01
+TOLD = 4096  # lines between two reports of how far the reading is
 
 
 class Reader(Motion):
     """One reading of one program; use ``read_program``."""
 
-    def read(self, text: str) -> Program:
-        """Moves and remarks of ``text``; raises as ``read_program`` says."""
+    def read(self, text: str, report: Report = silent) -> Program:
+        """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
         log, lines = self.log, text.split("\n")
-        percents = self._scan(lines)
+        percents = self._scan(lines, report)
         self.stop("end of the program")
         if not self.s.ended and percents < 2:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
@@ -51,12 +53,14 @@ class Reader(Motion):
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine))
 
-    def _scan(self, lines: list[str]) -> int:
+    def _scan(self, lines: list[str], report: Report) -> int:
         """Run every line; the fast path serves plain straight moves, and only in the plain modal state."""
         s, log, fast, rows, full = self.s, self.log, STRAIGHT, self.log.rows, Log.full
         percents = 0
         plain = begun = False
         for number, raw in enumerate(lines, 1):
+            if number % TOLD == 0:
+                report(number / len(lines))
             if plain and (m := fast(raw)):
                 g, x, y, z, f = m.groups()
                 if g is not None:
@@ -133,7 +137,8 @@ class Reader(Motion):
 
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
-                 gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0) -> Program:
+                 gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
+                 report: Report = silent) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -144,6 +149,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     gauge_length : mm by T number, spindle face to tip; a machine whose head tilts needs them in programs without
                   tool centre point control
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
+    report      : called with the share read, 0 to 1, every 4096 lines; what it raises ends the reading
 
     Returns
     -------
@@ -166,7 +172,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         raise ProgramError(f"{name}: T{spindle_tool}, named as the tool in the spindle, is not in the tool table",
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="name a tool of the table as spindle_tool")
-    return Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool).read(text)
+    reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
+    return reader.read(text, report)
 
 
 __all__ = ["FEED", "RAPID", "Program", "Reader", "Remark", "read_program"]
