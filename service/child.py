@@ -61,7 +61,7 @@ def compute(request, progress):
         state = "done"
     else:
         text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
-        result, name = chain.verify_program(part, setup, text, progress), "report.json"
+        result, name = chain.verify_program(part, setup, text, progress, out=out), "report.json"
         state = "unproved" if result["findings"] else "proved"
     if not (out / name).exists():
         (out / name).write_text(json.dumps(result, indent=1, sort_keys=True, allow_nan=False) + "\n")

@@ -29,14 +29,16 @@ class FakeChain(types.ModuleType):
             raise self.answer
         return self.answer
 
-    def plan(self, part_path, setup, out, progress):
+    def plan(self, part_path, setup, out, progress, mesh=None):
+        self.mesh = mesh
         return self._say(progress)
 
     def zones_only(self, part_path, setup, progress):
         return self._say(progress)
 
-    def verify_program(self, part_path, setup, program_text, progress, access=None):
+    def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None):
         assert program_text.strip()
+        self.out, self.mesh = out, mesh
         return self._say(progress)
 
 

@@ -61,7 +61,8 @@ def zones_only(part_path, setup, progress):
     return {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}
 
 
-def verify_program(part_path, setup, program_text, progress):
+def verify_program(part_path, setup, program_text, progress, access=None, out=None, mesh=None):
     progress("verify", 0.5)
+    (out / "deviation.png").write_bytes(b"\x89PNG of the fake")
     findings = [{"kind": "gouge"}] if "GOUGE" in program_text else []
     return {"state": "unproved" if findings else "proved", "findings": findings}
