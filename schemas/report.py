@@ -50,6 +50,41 @@ class ToolUse(ReportModel):
     deflection_mm: float | None = None
 
 
+class LeftOver(ReportModel):
+    """Stock left over the allowance at the samples of a face, mm along the normal; cut deeper counts 0."""
+
+    p50: float | None = None
+    p99: float | None = None
+    max: float | None = None
+
+
+class FaceDeviation(ReportModel):
+    """What the proof measured on one face, over the samples that were to be judged."""
+
+    face: Annotated[str, Field(examples=["F12"])]
+    area_mm2: Annotated[float, Field(description="Judged area of the face.")]
+    residual_mm: LeftOver
+    gouge_mm: Annotated[float, Field(description="Deepest cut into the part at a sample of the face.")]
+    uncut_mm2: Annotated[float, Field(description="Area no feed move ever reached that stands higher than the budget "
+                                                  "allows.")]
+    coverage: Annotated[Share, Field(description="Area within the budget / judged area.")]
+
+
+class MachinedPart(ReportModel):
+    """machined.stl: the stock as all programs leave it, in the coordinates of the program."""
+
+    file: str
+    access: Annotated[str, Field(description="Access direction of the programs; their coordinates are those of the "
+                                             "mesh.")]
+    volume_mm3: Annotated[float, Field(description="What stands, in the window where one was asked for.")]
+    step_mm: Annotated[float, Field(description="Distance of the nodes; wider than asked for where that would take "
+                                                "over 24 million.")]
+    error_mm: Annotated[float, Field(description="No corner of the mesh is farther from what the tools leave. What is "
+                                                 "thinner may be missing.")]
+    box_mm: Annotated[list[list[float]], Field(description="Lower and upper corner of the mesh.")]
+    triangles: int
+
+
 class ReportFile(ReportModel):
     """One file of the plan."""
 
@@ -74,6 +109,10 @@ class Report(Zones):
     reach_coverage: Annotated[Share | None, Field(description="The same / the area some tool can reach.")] = None
     machining_time_s: float | None = None
     tools: list[ToolUse]
+    deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number; of several accesses "
+                                                                "the least residual of a place counts.")] = []
+    machined: Annotated[list[MachinedPart], Field(description="Meshes of the machined part, one for each access, where "
+                                                              "they were asked for.")] = []
     files: list[ReportFile]
     version: str
 
@@ -83,3 +122,6 @@ class Verification(ReportModel):
 
     state: Literal["proved", "unproved"]
     findings: list[Any]
+    deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number.")] = []
+    machined: Annotated[MachinedPart | None, Field(description="The machined part, where it was asked for.")] = None
+    files: list[ReportFile] = []

@@ -17,7 +17,11 @@ from pathlib import Path
 
 from geometry.errors import InputError
 
-RESULT_FILES = ("program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "report.json", "zones.json", "preview.png")
+RESULT_FILES = ("program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "report.json", "zones.json", "preview.png",
+                "deviation.png", "machined.stl")
+ACCESS_FILES = ("program.*.linuxcnc.ngc", "job.*.stpnc", "machined.*.stl")  # of further accesses
+VERIFICATION_FILES = ("report.json", "deviation.png", "machined.stl")
+PLAN_MARKS = ("program.linuxcnc.ngc", "program.*.linuxcnc.ngc", "job.stpnc", "job.*.stpnc", "zones.json")
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
 
 
@@ -29,11 +33,33 @@ def clear_results(folder: Path) -> None:
     InputError
         One of them cannot be deleted.
     """
-    for name in RESULT_FILES:
+    _clear(folder, (*RESULT_FILES, *ACCESS_FILES))
+
+
+def clear_verification(folder: Path) -> None:
+    """Delete the files of an earlier verification from a folder.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be deleted; ``out_holds_a_job``: files of a plan lie there, perhaps the very program that is
+        to be proved, and the report of a plan must not be taken from beside its programs.
+    """
+    plan = sorted({p.name for pattern in PLAN_MARKS for p in folder.glob(pattern)})
+    if plan:
+        raise InputError(f"the folder {folder} holds the files of a planned job", code="out_holds_a_job",
+                         subjects=tuple(plan), remedy="give the verification a folder of its own")
+    _clear(folder, VERIFICATION_FILES)
+
+
+def _clear(folder: Path, patterns: Iterable[str]) -> None:
+    """Delete what matches, and what a crash left half written of it."""
+    wanted = [p for pattern in patterns for p in (pattern, f"{pattern}.part")]
+    for path in sorted({p for pattern in wanted for p in folder.glob(pattern)}):
         try:
-            (folder / name).unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
         except OSError as error:
-            raise InputError(f"{folder / name} of an earlier job cannot be deleted: {error.strerror}",
+            raise InputError(f"{path} of an earlier job cannot be deleted: {error.strerror}",
                              code="out_not_writable", remedy="give another --out") from None
 
 

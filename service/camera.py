@@ -45,3 +45,8 @@ class Camera:
         """(..., 3) float64 in mm to pixels right, pixels down, pixels towards the viewer."""
         q = (np.asarray(points, dtype=np.float64) - self.centre) @ self.basis.T * self.scale
         return q * [1.0, -1.0, 1.0] + [0.5 * self.size[0], 0.5 * self.size[1], 0.0]
+
+    def places(self, screen: F64) -> F64:
+        """(..., 3) float64 pixels, as ``screen`` gives them, back to mm."""
+        q = (np.asarray(screen, dtype=np.float64) - [0.5 * self.size[0], 0.5 * self.size[1], 0.0]) * [1.0, -1.0, 1.0]
+        return q / self.scale @ self.basis + self.centre

@@ -17,28 +17,33 @@ from typing import Any
 import numpy as np
 
 from geometry.errors import SetupError
+from geometry.sampling import SurfaceSamples
 from output.linuxcnc import write_linuxcnc
 from output.model import StockBox, Workplan
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
+from service.artifacts import clear_results
 from service.convert import check_plannable, check_spindle_tool, machine_kinematics, rotary_limits, tool_bodies
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
 from service.scoring import Score, score
-from service.sides import Side, file_name, in_first_frame, in_setup_frame, joined_proofs
+from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
+from service.sides import Side, file_name, in_first_frame, in_setup_frame, in_view_frame, joined_proofs, program_name
 from service.version import VERSION
 from toolpath.family import Target
 from toolpath.plan import CutData, Plan, PlanSettings, plan_job
 from toolpath.stock import StockMap
 from toolpath.strategies.zigzag import Pattern
-from verify.model import ProofSetup, ScoredSamples
+from verify.model import Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.view import View, turned_samples
 
 Progress = Callable[[str, float], None]
+Files = dict[str, tuple[str, str, str | None, bytes]]
+"""By name: kind, dialect, access, content."""
 
 RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
@@ -49,8 +54,10 @@ ABOVE = 1.0  # mm between the height rapids may go down to and the clearance pla
 PROGRAM_NAME = "program.linuxcnc.ngc"
 
 
-def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[str, Any]:
-    """Plan and prove a job and write its files into ``out``.
+def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None) -> dict[str, Any]:
+    """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
+
+    mesh : also write the machined part as a mesh, for each access that has a program
 
     Returns
     -------
@@ -65,6 +72,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
     """
     check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
+    clear_results(out)
     ready = prepare(part_path, setup, progress)
     scored = score(ready)
     checks = scored.checks(ready)
@@ -74,29 +82,42 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress) -> dict[s
         sides.append(_side(ready, view, scored, checks, sum(len(s.made.steps) for s in sides), share))
     progress("report", 0.96)
     made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
-    proof = joined_proofs(sides)
+    proof = joined_proofs(sides, scored.samples, proof_setup(ready, ready.views[0]))
     zone, given_up = scored.without(made, ready.zones)
     report, rest = reporting.job_report(ready, made, proof, scored.samples, scored.labels, zone, given_up)
-    files: dict[str, tuple[str, str, str | None, bytes]] = {}
+    files: Files = {}
     if report["state"] == "proved":
         for s in sides:
             if s.made.steps:
-                files[file_name(s.view, "program", "linuxcnc.ngc")] = ("program", "linuxcnc", s.view.id,
-                                                                      s.program.encode())
+                files[s.program_name] = ("program", "linuxcnc", s.view.id, s.program.encode())
                 files[file_name(s.view, "job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(s.work).encode())
                 files[file_name(s.view, "job", "arm.stpnc")] = ("stepnc-arm", "", None,
                                                                 write_stepnc_arm(s.work).encode())
     files["zones.json"] = ("zones", "", None, _json(reporting.zones_document(report)))
     _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
     files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
+    _deviation(ready, ready.views[0], scored.samples, in_view_frame(ready.views[0], proof), report, out / MAP_NAME)
+    files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
+    for s in sides if mesh is not None else ():
+        if mesh is not None and s.made.steps:
+            name = file_name(s.view, "machined", "stl")
+            figures, data = machined_part(mesh, [(s.program_name, s.program)], s.view.part, tool_bodies(setup),
+                                          proof_setup(ready, s.view), lambda f: progress("mesh", 0.97 + 0.03 * f))
+            report["machined"].append({"file": name, "access": s.view.id, **figures})
+            files[name] = ("machined", "", s.view.id, data)
+    _deliver(out, report, files)
+    progress("done", 1.0)
+    return report
+
+
+def _deliver(out: Path, report: dict[str, Any], files: Files) -> None:
+    """List the files in the report and write them, the report last."""
     report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
                         "sha256": hashlib.sha256(data).hexdigest()}
                        for name, (kind, dialect, access, data) in sorted(files.items())]
     for name, (*_, data) in files.items():
         _write(out / name, data)
     _write(out / "report.json", _json(report))
-    progress("done", 1.0)
-    return report
 
 
 class _Share:
@@ -122,7 +143,7 @@ def _side(ready: Prepared, view: View, scored: Score, checks: list[Target], step
     work = workplan(ready, view, made, settings)
     program = write_linuxcnc(work) if made.steps else ""
     zone, _ = scored.without(made, ready.zones)
-    name = file_name(view, "program", "linuxcnc.ngc")
+    name = program_name(view)
     here = turned_samples(scored.samples, view.rotation @ view.first.T)
     proof = prove([(name, program)] if made.steps else [], view.part, tool_bodies(ready.setup),
                   proof_setup(ready, view), ScoredSamples(here, zone), [z.id for z in ready.zones],
@@ -146,12 +167,16 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
 
 
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
-                   access: str | None = None, spindle_tool: int = 0) -> dict[str, Any]:
+                   access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
+                   spindle_tool: int = 0) -> dict[str, Any]:
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
     frame of one access, the first where ``access`` is None; ``spindle_tool`` is the T number that stands in the
     spindle, its length offset on, before its first line, 0 for none.
+
+    out  : folder for the deviation map, the mesh and the report; none is written where it is None
+    mesh : the machined part is wanted too; it is written into ``out``
 
     Raises
     ------
@@ -168,10 +193,23 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     view = ready.view(access or known[0])
     dense = turned_samples(score(ready).samples, view.rotation @ view.first.T)
     proof = prove([("program", program_text)], view.part, tool_bodies(setup), proof_setup(ready, view),
-                  ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.65 * f),
+                  ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.5 * f),
                   spindle_tool=spindle_tool)
+    report = reporting.verification_report(ready, in_setup_frame(view, proof), dense)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        files: Files = {}
+        _deviation(ready, view, dense, proof, report, out / MAP_NAME)
+        files[MAP_NAME] = ("deviation", "", view.id, (out / MAP_NAME).read_bytes())
+        if mesh is not None:
+            figures, data = machined_part(mesh, [("program", program_text)], view.part, tool_bodies(setup),
+                                          proof_setup(ready, view), lambda f: progress("mesh", 0.8 + 0.2 * f),
+                                          spindle_tool=spindle_tool)
+            report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
+            files[MESH_NAME] = ("machined", "", view.id, data)
+        _deliver(out, report, files)
     progress("done", 1.0)
-    return reporting.verification_report(ready, in_setup_frame(view, proof), dense)
+    return report
 
 
 def cut_table(setup: Setup) -> dict[str, CutData]:
@@ -275,6 +313,14 @@ def _preview(ready: Prepared, sides: list[Side], report: dict[str, Any], stays: 
     steps = [step for side in sides for step in in_first_frame(side)]
     draw_preview(ready.views[0].part, ready.decomposition, owner, steps, stays[:: max(1, len(stays) // 20_000)], path,
                  title, facts)
+
+
+def _deviation(ready: Prepared, view: View, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],
+               path: Path) -> None:
+    """Draw the deviation map in the frame of a view; samples and findings of the proof are in that frame."""
+    order = ready.setup.labels.get("order")
+    draw_proof(view.part, samples, proof, proof_setup(ready, view), report["state"], report["coverage"] or 0.0, path,
+               f"Deviation from the part{f': {order}' if order else ''}")
 
 
 def _json(data: dict[str, Any]) -> bytes:

@@ -62,7 +62,7 @@ def compute(request, progress):
         state = "done"
     else:
         text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
-        result = chain.verify_program(part, setup, text, progress, spindle_tool=request["spindle_tool"])
+        result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"])
         name = "report.json"
         state = "unproved" if result["findings"] else "proved"
     if not (out / name).exists():

@@ -7,6 +7,7 @@ stdout; logs and progress go to stderr. Heavy imports stand inside the commands,
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,26 +20,31 @@ if TYPE_CHECKING:
 
     from schemas.setup import Setup
     from service.console import Progress
+    from service.shown import MeshWish
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="From a STEP part of walls and internal connections to a proved milling job.")
 
 Part = Annotated[Path, typer.Argument(metavar="PART.step", help="The part, a STEP file.", show_default=False)]
 SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
+MeshBox = Annotated[str | None, typer.Option(metavar="x0,y0,z0,x1,y1,z1", help="Mesh this window only, mm in the "
+                                             "coordinates of the program; small ones take steps down to 0.002.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
 
 
 @app.command()
 def plan(part: Part, setup: SetupPath,
          out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
-         as_json: AsJson = False) -> None:
+         mesh_step: Annotated[float | None, typer.Option(help="Also write machined.stl, the part as the program leaves "
+                                                              "it, with nodes so many mm apart.")] = None,
+         mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
     """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
         from service.chain import plan as plan_job
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        report = plan_job(part, given, out, progress)
+        report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box))
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
     with _errors(as_json):
@@ -65,16 +71,27 @@ def verify(part: Part, setup: SetupPath,
                                                           "first.")] = None,
            spindle_tool: Annotated[int, typer.Option(min=0, help="T number of the tool in the spindle, length offset "
                                                                  "on, before the first line; 0 for none.")] = 0,
-           as_json: AsJson = False) -> None:
-    """Prove any program, also a foreign one; prints the findings."""
+           out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for report, deviation map and "
+                                                                           "mesh; none is written without.")] = None,
+           mesh_step: Annotated[float, typer.Option(help="mm between the nodes of machined.stl; 0 leaves it "
+                                                         "out.")] = 0.2,
+           mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
+    """Prove any program, also a foreign one; the report goes to stdout, what was found in short to stderr."""
 
     def run(given: Setup, progress: Progress) -> tuple[Any, int]:
         from service.chain import verify_program
+        from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        result = verify_program(part, given, read_program(program), progress, access, spindle_tool)
+        started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
+        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool)
+        progress.close()
+        say(verification_summary(result, time.monotonic() - started))
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
+    if out is not None:
+        with _errors(as_json):
+            make_folder(out, verification=True)
     _exit(part, setup, run, as_json)
 
 
@@ -181,16 +198,35 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
                          remedy="take another seed, or fewer walls and connections") from None
 
 
-def make_folder(out: Path) -> None:
-    """Make the folder for the files, without those of an earlier job.
+def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
+    """The mesh of the machined part that is asked for; none where ``step`` is None.
 
     Raises
     ------
     InputError
-        It cannot be made or written to.
+        ``bad_mesh_step``, ``bad_mesh_box``; ``box_without_step``.
     """
     from geometry.errors import InputError
-    from service.artifacts import clear_results
+    from service.shown import MeshWish
+
+    if step is not None:
+        return MeshWish.of(step, box)
+    if box is not None:
+        raise InputError("a window of a mesh that is not asked for", code="box_without_step", measured=box,
+                         remedy="give --mesh-step too, or leave --mesh-box out")
+    return None
+
+
+def make_folder(out: Path, *, verification: bool = False) -> None:
+    """Make the folder for the files, without those of an earlier job, or of an earlier verification.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written to; ``out_holds_a_job`` as ``artifacts.clear_verification``.
+    """
+    from geometry.errors import InputError
+    from service.artifacts import clear_results, clear_verification
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -200,7 +236,7 @@ def make_folder(out: Path) -> None:
     except OSError as error:
         raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
                          remedy="give another --out") from None
-    clear_results(out)
+    (clear_verification if verification else clear_results)(out)
 
 
 def read_program(path: Path) -> str:

@@ -52,6 +52,30 @@ def print_json(data: Any) -> None:
     sys.stdout.flush()
 
 
+def verification_summary(report: dict[str, Any], seconds: float) -> str:
+    """A verification in a few lines: state, findings by kind with the first line of each, coverage, files, time.
+
+    report  : as ``service.chain.verify_program`` gives it; seconds : it took
+    """
+    count = sum(report.get("finding_counts", {}).values())
+    lines = [f"{report['state']}: {count or 'no'} finding{'' if count == 1 else 's'}"]
+    for kind, number in report.get("finding_counts", {}).items():
+        own = [f for f in report["findings"] if f["kind"] == kind]
+        first = min(own, key=lambda f: f.get("line") or sys.maxsize, default=None)
+        where = "" if first is None else f"line {first['line']}: " if first.get("line") else ""
+        lines.append(f"  {kind:<10} {number:4d}  {where}{'' if first is None else first.get('message', '')}")
+    if report.get("coverage") is not None:
+        lines.append(f"  coverage   {100 * report['coverage']:.2f} % of the judged area within the budget")
+    if report.get("gouge_max_mm"):
+        lines.append(f"  deepest    {report['gouge_max_mm']:g} mm cut into the part")
+    if made := report.get("machined"):
+        lines.append(f"  machined   {made['volume_mm3']:g} mm3 stand, nodes {made['step_mm']:g} mm apart")
+    if files := report.get("files"):
+        lines.append(f"  files      {', '.join(f['name'] for f in files)}, report.json")
+    lines.append(f"  took       {seconds:.1f} s")
+    return "\n".join(lines)
+
+
 def error_block(error: CamError) -> str:
     """An error as a person wants to read it."""
     lines = [f"error: {error.message}", f"  code      {error.code} ({type(error).__name__})"]

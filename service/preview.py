@@ -16,24 +16,32 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
-from PIL.ImageFont import FreeTypeFont
+from PIL import Image, ImageDraw
 
 from geometry.mesh import F64
-from geometry.part import EdgeKind, Part
+from geometry.part import Part
 from output.text import ascii_text, decimal
 from service.camera import Camera
+from service.lettering import (
+    GREY,
+    INK,
+    PAPER,
+    RGB,
+    WHITE,
+    bytes_of,
+    draw_pairs,
+    draw_scale,
+    draw_swatches,
+    draw_triad,
+    font,
+)
 from service.raster import F32, Canvas
+from service.scene import segments, shaded
 from toolpath.motion import Motion, Trajectory, Workingstep
 from zones.model import Decomposition
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
-RGB = tuple[float, float, float]
-
-WHITE: RGB = (1.0, 1.0, 1.0)
-PAPER: RGB = (0.965, 0.972, 0.98)
-INK: RGB = (0.10, 0.12, 0.15)
 CONNECTION: RGB = (1.0, 0.52, 0.0)
 REMAINDER: RGB = (0.88, 0.0, 0.08)
 RAPID: RGB = (0.35, 0.37, 0.42)
@@ -67,24 +75,24 @@ def draw_preview(
     width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
     shown = [s for s in steps if s.operation == "finishing"] or list(steps)
     camera = _camera(part, decomposition, shown, (2 * width, 2 * height))
-    left = _draw_part(part, _face_colours(part, decomposition), camera)
+    left = shaded(part, _face_colours(part, decomposition), camera)
     _draw_hidden_connections(left, part, decomposition, camera)
-    pale = _draw_part(part, _pale_colours(part, decomposition, zone_of_face), camera)
+    pale = shaded(part, _pale_colours(part, decomposition, zone_of_face), camera)
     tools = _tool_colours(steps)
     _draw_paths(pale, camera, shown, tools)
     if remainder_points is not None and len(remainder_points):
         pale.dots(camera.screen(remainder_points), REMAINDER, width=5, alpha=0.9, hidden=0.35, bias=0.15 * camera.scale)
 
-    sheet = Image.new("RGB", SIZE, _bytes(WHITE))
+    sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
     for canvas, x in ((left, 0), (pale, width + GUTTER)):
         sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
     pen = ImageDraw.Draw(sheet)
-    pen.text((20, 14), ascii_text(title), font=_font(26), fill=_bytes(INK))
+    pen.text((20, 14), ascii_text(title), font=font(26), fill=bytes_of(INK))
     _labels(pen, part, decomposition, camera)
     _captions(pen, width, shown is not steps and len(shown) != len(steps))
-    _triad(pen, camera, (54, SIZE[1] - LEGEND - 54))
+    draw_triad(pen, camera, (54, SIZE[1] - LEGEND - 54))
     for x in (width, SIZE[0]):
-        _scale_bar(pen, camera, (x - 24, SIZE[1] - LEGEND - 24))
+        draw_scale(pen, camera, (x - 24, SIZE[1] - LEGEND - 24))
     _legend(pen, decomposition, zone_of_face, steps, tools, remainder_points, facts or {})
     sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
 
@@ -123,7 +131,7 @@ def _draw_hidden_connections(canvas: Canvas, part: Part, decomposition: Decompos
     faces = {f for c in decomposition.connections for f in c.faces}
     for edge in part.edges:
         if faces & set(edge.faces) and len(edge.points) > 1:
-            canvas.strokes(_segments(camera, edge.points), CONNECTION, width=3, alpha=0.0, hidden=0.8, bias=4.0,
+            canvas.strokes(segments(camera, edge.points), CONNECTION, width=3, alpha=0.0, hidden=0.8, bias=4.0,
                            dash=7.0)
 
 
@@ -155,31 +163,6 @@ def _pale_colours(part: Part, decomposition: Decomposition, zone_of_face: Mappin
     return colours
 
 
-def _draw_part(part: Part, colours: F32, camera: Camera) -> Canvas:
-    """Shaded triangles that face the viewer, the edges of the B-rep and the silhouette."""
-    canvas = Canvas.blank(*camera.size, PAPER)
-    mesh = part.mesh
-    front = np.flatnonzero(mesh.normals @ camera.basis[2] > 0.0)
-    key = np.array([-0.35, 0.55, 0.75]) @ camera.basis  # over the viewer's left shoulder
-    fill = np.array([0.9, 0.1, 0.4]) @ camera.basis
-    n = mesh.normals[front]
-    light = 0.56 + 0.40 * np.clip(n @ (key / np.linalg.norm(key)), 0, 1) + 0.16 * np.clip(n @ fill, 0, 1)
-    ids = np.where(mesh.face_ids[front] < len(colours), mesh.face_ids[front], 0)
-    canvas.triangles(camera.screen(mesh.triangles[front]), np.clip(colours[ids] * light[:, None], 0, 1).astype("f4"),
-                     np.maximum(mesh.face_ids[front], 1))
-    canvas.outline(INK, jump=0.02 * min(camera.size))
-    for edge in part.edges:
-        if edge.kind is not EdgeKind.SMOOTH and len(edge.points) > 1:
-            canvas.strokes(_segments(camera, edge.points), INK, width=2, alpha=0.75, bias=3.0)
-    return canvas
-
-
-def _segments(camera: Camera, points: F64) -> F64:
-    """(n - 1, 2, 3) screen segments of a polyline of (n, 3) points."""
-    p = camera.screen(points)
-    return np.stack([p[:-1], p[1:]], axis=1)
-
-
 def _tool_colours(steps: Sequence[Workingstep]) -> dict[int, RGB]:
     numbers = sorted({s.tool.number for s in steps})
     return {n: TOOLS[i % len(TOOLS)] for i, n in enumerate(numbers)}
@@ -203,22 +186,6 @@ def _of_motion(camera: Camera, trajectories: Sequence[Trajectory], motions: tupl
     return camera.screen(np.concatenate(lines)) if lines else np.zeros((0, 2, 3))
 
 
-# --- words and signs -------------------------------------------------------------------------------------------
-
-
-def _font(size: int) -> FreeTypeFont:
-    """Pillow's own font: the same glyphs on every machine."""
-    font = ImageFont.load_default(size)
-    if not isinstance(font, FreeTypeFont):
-        raise RuntimeError("Pillow was built without FreeType")
-    return font
-
-
-def _bytes(colour: RGB) -> tuple[int, int, int]:
-    r, g, b = (int(round(255 * max(0.0, min(1.0, c)))) for c in colour)
-    return (r, g, b)
-
-
 def _labels(pen: ImageDraw.ImageDraw, part: Part, decomposition: Decomposition, camera: Camera) -> None:
     """Ids of walls at their upper rims and of connections at their tops, on the left picture."""
     named = [(c.id, c.faces) for c in decomposition.connections] + [(w.id, w.faces) for w in decomposition.walls]
@@ -232,41 +199,15 @@ def _labels(pen: ImageDraw.ImageDraw, part: Part, decomposition: Decomposition, 
         wall = name.startswith("W")
         at = rim[np.argmax(camera.screen(rim)[:, 1])] if wall else rim.mean(axis=0)
         x, y, _ = 0.5 * camera.screen(at)
-        pen.text((x, HEADER + y + (6 if wall else 0)), name, font=_font(17), anchor="mt" if wall else "mm",
-                 fill=_bytes(INK), stroke_width=3, stroke_fill=_bytes(WHITE))
+        pen.text((x, HEADER + y + (6 if wall else 0)), name, font=font(17), anchor="mt" if wall else "mm",
+                 fill=bytes_of(INK), stroke_width=3, stroke_fill=bytes_of(WHITE))
 
 
 def _captions(pen: ImageDraw.ImageDraw, width: int, partly: bool) -> None:
-    grey = _bytes((0.35, 0.38, 0.43))
-    pen.text((20, HEADER + 12), "Walls and connections", font=_font(17), fill=grey)
+    grey = bytes_of(GREY)
+    pen.text((20, HEADER + 12), "Walls and connections", font=font(17), fill=grey)
     text = "Finishing paths and remainder" + (" (roughing not drawn)" if partly else "")
-    pen.text((width + GUTTER + 20, HEADER + 12), text, font=_font(17), fill=grey)
-
-
-def _triad(pen: ImageDraw.ImageDraw, camera: Camera, origin: tuple[float, float]) -> None:
-    for axis, (name, colour) in enumerate((("X", (0.80, 0.10, 0.10)), ("Y", (0.05, 0.55, 0.10)),
-                                           ("Z", (0.10, 0.25, 0.80)))):
-        dx, dy = 36.0 * camera.basis[0, axis], -36.0 * camera.basis[1, axis]
-        pen.line([origin, (origin[0] + dx, origin[1] + dy)], fill=_bytes(colour), width=3)
-        pen.text((origin[0] + 1.32 * dx, origin[1] + 1.32 * dy), name, font=_font(15), anchor="mm", fill=_bytes(colour))
-
-
-def scale_length(scale: float, width: float = 200.0) -> float:
-    """The longest of 1, 2, 5 x 10^k mm that is at most ``width`` pixels at ``scale`` pixels per mm."""
-    longest = width / scale
-    ten = 10.0 ** math.floor(math.log10(longest))
-    return max(k * ten for k in (1.0, 2.0, 5.0) if k * ten <= longest * (1 + 1e-12))
-
-
-def _scale_bar(pen: ImageDraw.ImageDraw, camera: Camera, end: tuple[float, float]) -> None:
-    pixels = 0.5 * camera.scale  # of a mm in the halved picture
-    length = scale_length(pixels)
-    x0, x1, y = end[0] - length * pixels, end[0], end[1]
-    ink = _bytes(INK)
-    pen.line([(x0, y), (x1, y)], fill=ink, width=2)
-    for x in (x0, x1):
-        pen.line([(x, y - 5), (x, y + 5)], fill=ink, width=2)
-    pen.text((0.5 * (x0 + x1), y - 6), f"{decimal(length)} mm", font=_font(15), anchor="mb", fill=ink)
+    pen.text((width + GUTTER + 20, HEADER + 12), text, font=font(17), fill=grey)
 
 
 def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None,
@@ -278,13 +219,13 @@ def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face
     counts = {"walls": len(decomposition.walls), "connections": len(decomposition.connections),
               "channels": len(decomposition.channels), "zones": len(zones), "steps": len(steps)}
     pairs = [(k, str(v)) for k, v in counts.items()] + [(k, str(v)) for k, v in facts.items()]
-    _pairs(pen, pairs, 20, top)
+    draw_pairs(pen, pairs, 20, top)
     surfaces: list[tuple[str, RGB | None]] = [(w.id, wall_colour(i)) for i, w in enumerate(decomposition.walls[:12])]
     if len(decomposition.walls) > 12:
         surfaces.append((f"and {len(decomposition.walls) - 12} more walls", None))
     surfaces += [("connection", CONNECTION), ("floor", ROLES["floor"]), ("fillet", ROLES["fillet"]),
                  ("base", ROLES["base"])]
-    _swatches(pen, surfaces, 610, top, columns=4, step=140)
+    draw_swatches(pen, surfaces, 610, top, columns=4, step=140)
     lines: list[tuple[str, RGB | None]] = []
     for number, colour in tools.items():
         body = next(s.tool for s in steps if s.tool.number == number)
@@ -295,21 +236,4 @@ def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face
         lines.append(("no tool reaches", REMAINDER))
     if zone_of_face is not None:
         lines.append(("face without zone", (0.70, 0.71, 0.73)))
-    _swatches(pen, lines, 1180, top, columns=3, step=190)
-
-
-def _pairs(pen: ImageDraw.ImageDraw, pairs: Sequence[tuple[str, str]], x: int, y: int) -> None:
-    grey = _bytes((0.35, 0.38, 0.43))
-    for i, (key, value) in enumerate(pairs[:10]):
-        left, line = x + 285 * (i // 5), y + 21 * (i % 5)
-        pen.text((left, line), ascii_text(key), font=_font(15), fill=grey)
-        pen.text((left + 150, line), ascii_text(value), font=_font(15), fill=_bytes(INK))
-
-
-def _swatches(pen: ImageDraw.ImageDraw, entries: Sequence[tuple[str, RGB | None]], x: int, y: int, *, columns: int,
-              step: int) -> None:
-    for i, (name, colour) in enumerate(entries[:5 * columns]):
-        left, line = x + step * (i // 5), y + 21 * (i % 5)
-        if colour is not None:
-            pen.rectangle([left, line + 2, left + 22, line + 14], fill=_bytes(colour), outline=_bytes((0.5, 0.5, 0.5)))
-        pen.text((left + 30, line), ascii_text(name), font=_font(15), fill=_bytes(INK))
+    draw_swatches(pen, lines, 1180, top, columns=3, step=190)

@@ -185,7 +185,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
-        "tools": _tools(ready, proof), "files": [], "version": VERSION,
+        "tools": _tools(ready, proof), "deviation": deviation(proof), "machined": [], "files": [], "version": VERSION,
     }
     return report, rest
 
@@ -271,6 +271,14 @@ def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
     return out
 
 
+def deviation(proof: Proof) -> list[dict[str, Any]]:
+    """The figures of a proof by face, in the order of the faces."""
+    return [{"face": f"F{n}", "area_mm2": r(f.area, 3),
+             "residual_mm": {"p50": r(f.left_p50, 5), "p99": r(f.left_p99, 5), "max": r(f.left_max, 5)},
+             "gouge_mm": r(f.gouge, 5), "uncut_mm2": r(f.uncut, 3), "coverage": r(f.coverage, 6)}
+            for n, f in sorted(proof.faces.items())]
+
+
 def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) -> dict[str, Any]:
     """The answer to ``zonemill verify``."""
     total = float(dense.area.sum())
@@ -287,4 +295,5 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
             "machining_time_s": r(proof.machining_time, 1), "cutting_length_mm": r(proof.cutting_length, 1),
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
                       "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes)},
+            "deviation": deviation(proof), "machined": None, "files": [],
             "part": _shape(ready)["part"], "version": VERSION}

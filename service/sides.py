@@ -8,11 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geometry.mesh import F64
+from geometry.sampling import SurfaceSamples
 from output.model import Workplan
 from toolpath.motion import Workingstep
 from toolpath.plan import Plan
 from verify.findings import ordered
-from verify.model import Proof
+from verify.model import Proof, ProofSetup
+from verify.scoring import face_proofs
 from zones.view import View
 
 
@@ -26,26 +29,48 @@ class Side:
     program: str
     proof: Proof
 
+    @property
+    def program_name(self) -> str:
+        """File name of the program."""
+        return program_name(self.view)
+
 
 def file_name(view: View, stem: str, end: str) -> str:
     """'job.stpnc' for the first access, 'job.A2.stpnc' for a further one."""
     return f"{stem}.{end}" if view.is_first else f"{stem}.{view.id}.{end}"
 
 
+def program_name(view: View) -> str:
+    """File name of the program of an access."""
+    return file_name(view, "program", "linuxcnc.ngc")
+
+
 def in_setup_frame(view: View, proof: Proof) -> Proof:
     """The proof with the places of its findings in the setup frame."""
-    if np.array_equal(view.rotation, np.eye(3)):
+    return _turned(proof, view.rotation)
+
+
+def in_view_frame(view: View, proof: Proof) -> Proof:
+    """A proof whose places are in the setup frame with them in the frame of the view."""
+    return _turned(proof, view.rotation.T)
+
+
+def _turned(proof: Proof, turn: F64) -> Proof:
+    """The proof with the places of its findings times ``turn`` (3, 3)."""
+    if np.array_equal(turn, np.eye(3)):
         return proof
     return replace(proof, findings=tuple(
-        f if f.point is None else replace(f, point=tuple(view.back(np.array(f.point)).tolist()))
-        for f in proof.findings))
+        f if f.point is None else replace(f, point=tuple((np.array(f.point) @ turn).tolist())) for f in proof.findings))
 
 
-def joined_proofs(sides: Sequence[Side]) -> Proof:
+def joined_proofs(sides: Sequence[Side], samples: SurfaceSamples, setup: ProofSetup) -> Proof:
     """One proof of a job of several programs; places of findings in the setup frame.
 
     A sample is proved when some program leaves it inside the budget and none gouges it: what stands on it after
-    the others is for that program to take off. Residuals are those of the program that leaves least.
+    the others is for that program to take off. Residuals are those of the program that leaves least, and figures by
+    face are made of them.
+
+    samples : of the proofs, in any frame; setup : of any of the proofs, for the budget, which is the same in all
     """
     proofs = [in_setup_frame(s.view, s.proof) for s in sides]
     if len(sides) == 1:
@@ -53,6 +78,7 @@ def joined_proofs(sides: Sequence[Side]) -> Proof:
     residual = np.stack([p.residual for p in proofs])
     best = residual.argmin(axis=0)
     rows = np.arange(residual.shape[1])
+    program = np.where(np.stack([p.program for p in proofs])[best, rows] >= 0, best, -1).astype(np.int32)
     proved = np.any([p.proved for p in proofs], axis=0) & (np.stack([p.proved for p in proofs])[best, rows])
     counts: Counter[str] = Counter()
     minutes: Counter[int] = Counter()
@@ -65,7 +91,8 @@ def joined_proofs(sides: Sequence[Side]) -> Proof:
     top, _ = ordered([f for p in proofs for f in p.findings])
     return replace(
         proofs[0], findings=top, counts=dict(sorted(counts.items())), residual=residual[best, rows],
-        line=np.stack([p.line for p in proofs])[best, rows], program=best.astype(np.int32), proved=proved, zones=zones,
+        line=np.stack([p.line for p in proofs])[best, rows], program=program, proved=proved, zones=zones,
+        faces=face_proofs(samples, residual[best, rows], program >= 0, proved, setup),
         gouge_max=max(p.gouge_max for p in proofs), machining_time=sum(p.machining_time for p in proofs),
         cutting_length=sum(p.cutting_length for p in proofs), minutes=dict(minutes),
         error_bound=max(p.error_bound for p in proofs), line_spacing=max(p.line_spacing for p in proofs),
@@ -81,4 +108,4 @@ def in_first_frame(side: Side) -> list[Workingstep]:
             for s in side.made.steps]
 
 
-__all__ = ["Side", "file_name", "in_first_frame", "in_setup_frame", "joined_proofs"]
+__all__ = ["Side", "file_name", "in_first_frame", "in_setup_frame", "in_view_frame", "joined_proofs", "program_name"]

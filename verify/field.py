@@ -62,7 +62,7 @@ class Field:
 
 
 def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 | None = None,
-                threads: int = 2) -> Field:
+                threads: int = 2, progress: Progress | None = None) -> Field:
     """The stock before the first cut.
 
     mesh : of the part, mm; step : mm between nodes, wider where that would take over 24 million
@@ -74,7 +74,7 @@ def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 
     origin = 0.5 * (lower + upper) - 0.5 * step * (counts - 1)
     values = np.empty(tuple(counts.tolist()), np.float32)
     if setup.stock_kind == StockKind.PART_OFFSET:
-        _grown(values, origin, step, mesh, setup.margin + setup.uncertainty, threads)
+        _grown(values, origin, step, mesh, setup.margin + setup.uncertainty, threads, progress)
     else:
         _simple(values, origin, step, mesh.bounds, setup)
     return Field(origin, step, values)
@@ -96,7 +96,8 @@ def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetu
         values[s] = np.clip(np.minimum(side, high), -step, step)
 
 
-def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int) -> None:
+def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
+           progress: Progress | None) -> None:
     """The part grown by ``reach`` all round: the surface of nodes near it is looked up, the rest is inside or not."""
     inside = np.zeros(values.shape, np.bool_)
     cuts = np.linspace(0, len(values), 4 * max(threads, 1) + 1).astype(int)
@@ -104,7 +105,8 @@ def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: flo
     def job(a: int, b: int) -> Callable[[], object]:
         return lambda: cross_columns(inside, a, b, origin, step, mesh.vertices, mesh.faces)
 
-    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads)
+    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads,
+              None if progress is None else lambda f: progress(0.2 * f))
     tree = TriangleTree(mesh)
     half = 0.5 * math.sqrt(3.0) * 3.0 * step
 
@@ -112,7 +114,8 @@ def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: flo
         at = origin + [i * step, 0.0, 0.0]
         return lambda: _grown_slab(values[i:i + 4], inside[i:i + 4], at, step, tree, reach, half)
 
-    run_tiles([slab(i) for i in range(0, len(values), 4)], threads)
+    run_tiles([slab(i) for i in range(0, len(values), 4)], threads,
+              None if progress is None else lambda f: progress(0.2 + 0.8 * f))
 
 
 def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float, tree: TriangleTree, reach: float,

@@ -12,6 +12,7 @@ from geometry.mesh import F64, I32, TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples, sample_surface
+from verify.progress import Report, silent
 
 GUARD_DENSITY = 25.0
 GUARD_MOST = 1_000_000
@@ -19,6 +20,7 @@ GUARD_SEED = 20_011
 EDGE_SPACING = 0.1
 SHARP = math.radians(20.0)
 DEPTH_STEPS = 64
+DEPTH_BATCH = 2048  # rays between two reports
 
 
 def guard_samples(mesh: TriangleMesh, density: float = GUARD_DENSITY) -> SurfaceSamples:
@@ -65,11 +67,12 @@ def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64
     return p[row] + f[:, None] * (q - p)[row], middle[row], mesh.face_ids[a[row]]
 
 
-def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
+def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, report: Report = silent) -> F64:
     """How far the removed stretch of each inward ray gets from the surface.
 
     points, normals : (n, 3) float64, mm and outward unit
     along           : (n,) float64, mm removed along the inward normal, > 0
+    report          : called with the share done, 0 to 1; what it raises ends the work
 
     Returns (n,) float64, mm: the largest distance to the mesh on the stretch, up to where the ray leaves the part.
 
@@ -79,9 +82,15 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F
     gouge is how deep it goes under the surface. Read at 64 places: at most along / 128 too small. A ray that
     leaves the part within 1e-4 mm counts 0.
     """
-    n = len(points)
-    if n == 0:
-        return np.zeros(0)
+    out = np.zeros(len(points))
+    for i in range(0, len(points), DEPTH_BATCH):
+        rows = slice(i, i + DEPTH_BATCH)
+        out[rows] = _depths(tree, points[rows], normals[rows], along[rows])
+        report(min((i + DEPTH_BATCH) / len(points), 1.0))
+    return out
+
+
+def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     through, hit = first_hits(tree, points, -normals, t_min=1e-4)
     # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
@@ -89,4 +98,4 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F
     share = np.arange(1, DEPTH_STEPS + 1) / DEPTH_STEPS
     where = points[:, None, :] - (stretch[:, None] * share)[:, :, None] * normals[:, None, :]
     out, _, _ = nearest(tree, where.reshape(-1, 3))
-    return np.minimum(out.reshape(n, DEPTH_STEPS).max(axis=1), along)
+    return np.minimum(out.reshape(len(points), DEPTH_STEPS).max(axis=1), along)

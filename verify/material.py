@@ -15,6 +15,7 @@ from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
 from verify.fitness import top_of_all
 from verify.model import ProofSetup
+from verify.progress import Stages
 from verify.removal import Moves
 from verify.stock import StockPass, blank, run_bodies, run_stock
 
@@ -40,26 +41,23 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
 
     Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``).
     """
-    def share(low: float, wide: float) -> Callable[[float], None]:
-        return lambda f: progress(low + wide * f)
-
-    given, origin = moves, None
+    stages, given, origin = Stages(progress), moves, None
     if setup.dogleg:
         clear = top_of_all(mesh.bounds, setup) + setup.clearance_rapid
         radius = np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
         moves, origin = spread(moves, slides, radius, clear)
     if moves.axes is None:
-        lines = blank(mesh, setup, threads=threads)
-        run = run_stock(lines, moves, tools, setup, threads=threads, progress=share(0.0, 0.6))
-        met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=share(0.6, 0.4))
+        lines = blank(mesh, setup, threads=threads, progress=stages.span(0.0, 0.1))
+        run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.1, 0.6))
+        met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 1.0))
         spacing = lines.step
     else:
-        field = stock_field(mesh, setup, setup.line_spacing, threads=threads)
-        run = run_field(field, moves, tools, setup, threads=threads, progress=share(0.0, 0.7))
+        field = stock_field(mesh, setup, setup.line_spacing, threads=threads, progress=stages.span(0.0, 0.15))
+        run = run_field(field, moves, tools, setup, threads=threads, progress=stages.span(0.15, 0.7))
         held = fixture_points(setup.fixtures, float(mesh.bounds[0, 2]))
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
-                                progress=share(0.7, 0.3))
+                                progress=stages.span(0.7, 1.0))
         spacing = field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
 
@@ -82,10 +80,12 @@ def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup:
     """The stock after all feed moves, as fine as asked.
 
     step : mm between nodes, wider where that would take over 24 million of them
-    box  : (2, 3) float64, mm, the piece of space looked at; all of the stock where None
+    box  : (2, 3) float64, mm, the piece of space looked at, a few steps wider; all of the stock where None
+    progress : called with 0..1, never less than before; an exception from it ends the work at once
     """
-    field = stock_field(mesh, setup, step, box=box, threads=threads)
-    run_field(field, moves.only(moves.feed), tools, setup, bare=True, threads=threads, progress=progress)
+    stages = Stages(progress)
+    field = stock_field(mesh, setup, step, box=box, threads=threads, progress=stages.span(0.0, 0.2))
+    run_field(field, moves.only(moves.feed), tools, setup, bare=True, threads=threads, progress=stages.span(0.2, 1.0))
     return field
 
 

@@ -138,6 +138,28 @@ class ZoneProof:
     coverage: float
 
 
+@dataclass(frozen=True)
+class FaceProof:
+    """The proof of the scored samples of one face.
+
+    number : of the face (``F12`` is 12); area : mm² of its samples
+    left_p50, left_p99, left_max : mm of stock over the allowance, cut deeper counts 0; not above ``Proof.reach``
+    gouge  : mm, deepest cut into the part at a sample
+    uncut  : mm² that no feed move ever reached and that stand higher than the budget allows
+    proved_area : mm² within the budget; coverage : its share, 0..1
+    """
+
+    number: int
+    area: float
+    left_p50: float
+    left_p99: float
+    left_max: float
+    gouge: float
+    uncut: float
+    proved_area: float
+    coverage: float
+
+
 @dataclass(frozen=True, eq=False)
 class Proof:
     """The answer.
@@ -146,6 +168,7 @@ class Proof:
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
     line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
     proved   : (n,) bool, inside the budget
+    zones    : by zone id; faces : by face number, of every face with scored samples
     machining_time : s, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
     minutes  : minutes in cut by tool number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
@@ -158,6 +181,7 @@ class Proof:
     program: I32
     proved: Any
     zones: Mapping[str, ZoneProof]
+    faces: Mapping[int, FaceProof]
     gouge_max: float
     machining_time: float
     cutting_length: float
@@ -176,7 +200,8 @@ class Proof:
         """Plain data for a report; lengths in mm, time in s and minutes."""
         return {
             "findings": [f.as_dict() for f in self.findings], "finding_counts": dict(self.counts),
-            "zones": {k: asdict(v) for k, v in self.zones.items()}, "gouge_max_mm": self.gouge_max,
+            "zones": {k: asdict(v) for k, v in self.zones.items()},
+            "faces": {f"F{k}": asdict(v) for k, v in self.faces.items()}, "gouge_max_mm": self.gouge_max,
             "machining_time_s": self.machining_time, "cutting_length_mm": self.cutting_length,
             "tools": {str(k): v for k, v in self.minutes.items()}, "error_bound_mm": self.error_bound,
             "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),

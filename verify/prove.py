@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.bvh import TriangleTree
 from geometry.errors import VerificationError
@@ -21,21 +20,20 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
+from verify.fitness import limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
-from verify.joining import joined, slides_of
 from verify.material import contacts
-from verify.model import Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
-from verify.reader import Program, read_program
+from verify.model import FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
+from verify.progress import Report, Stages
+from verify.reader import Program
 from verify.removal import BOW, Moves, residual_on_normals
 from verify.repeats import repeat_findings
+from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
+from verify.sequence import check_numbers, moves_of, read_all, slides_of
 from verify.stock import StockPass, stock_on_normals
 
-RAY_ERROR = 1e-6
 LEAST_REACH = 1.0
-BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
-BLEND_SHARE = 0.1
-Report = Callable[[float], None]
+READ, CUT, MET = 0.12, 0.5, 0.97  # shares of the work done when the programs are read, residuals and contacts known
 
 
 def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -48,7 +46,8 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     setup    : ProofSetup
     scored   : ScoredSamples; zones may all be 0, then only gouges, contacts and limits are looked for
     zone_ids : names of the zones 1, 2, ... of ``scored.zone``
-    progress : called with 0..1; an exception from it ends the proof
+    progress : called with 0..1, never less than before, ten times a second or more often; an exception from it ends
+               the proof at once
     threads  : 2 where None, at most the cores; the answer has the same bytes for any number
     spindle_tool : T number in the spindle, its length offset on, before the first line of each program; 0 for none
 
@@ -71,18 +70,13 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     """
     _check(tools, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
-    tell = progress or (lambda _share: None)
-    read = [read_program(text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
-                         blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-                         gauge_length=setup.gauge_length, spindle_tool=spindle_tool)
-            for name, text in programs]
+    stages = Stages(progress)
+    read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
     top = top_of_all(part.mesh.bounds, setup)
-    read = [from_above(p, top + setup.clearance_rapid) for p in read]
-    moves, source = joined(read, tools)
-    tell(0.1)
-    cuts = _cuts(part, tools, setup, scored, moves, source, threads, lambda f: tell(0.1 + 0.5 * f))
+    moves, source = moves_of(read, tools)
+    cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup,
-                   slides_of(read, tools, setup), threads, lambda f: tell(0.6 + 0.4 * f))
+                   slides_of(read, tools, setup), threads, stages.span(CUT, MET))
     run = met.run
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
@@ -91,15 +85,12 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
+    stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, met.spacing, tuple(notes))
 
 
 def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
-    numbers = [t.number for t in tools]
-    if len(set(numbers)) != len(numbers):
-        raise VerificationError("two tools share a T number", code="tool_number_twice",
-                                subjects=tuple(t.id for t in tools if numbers.count(t.number) > 1),
-                                remedy="give every tool its own number")
+    check_numbers(tools)
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
         raise VerificationError("samples and zones do not fit each other", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))
@@ -120,7 +111,9 @@ class _Cuts:
 def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, moves: Moves,
           source: Source, threads: int, tell: Report) -> _Cuts:
     s, guard = scored.samples, guard_samples(part.mesh)
+    tell(0.05)
     edge, bisector, edge_face = convex_edges(part.mesh)
+    tell(0.1)
     thin = guard.subset(sparse_faces(part.mesh, s)[guard.triangle])
     points = np.concatenate([s.points, thin.points, edge])
     normals = np.concatenate([s.normals, thin.normals, bisector])
@@ -128,10 +121,12 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     area = np.concatenate([s.area, thin.area, np.zeros(len(edge))])
     reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
-    residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads, progress=tell)
+    residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
+                                          progress=lambda f: tell(0.1 + 0.8 * f))
     deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))
     if len(deep):
-        residual[deep] = -gouge_depths(TriangleTree(part.mesh), points[deep], normals[deep], -residual[deep])
+        residual[deep] = -gouge_depths(TriangleTree(part.mesh), points[deep], normals[deep], -residual[deep],
+                                       lambda f: tell(0.9 + 0.1 * f))
     deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
     out = _Cuts()
     out.residual, out.mover = residual[:len(s)], mover[:len(s)]
@@ -159,33 +154,11 @@ def _idle_findings(read: Sequence[Program], run: StockPass, moves: Moves, source
     return out
 
 
-def _proved(residual: F64, setup: ProofSetup) -> NDArray[np.bool_]:
-    left = residual - setup.stock_allowance
-    return np.asarray((left >= -setup.gouge_tolerance - RAY_ERROR) & (left <= setup.scallop_height + RAY_ERROR))
-
-
 def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
-    bad = np.flatnonzero((scored.zone > 0) & ~_proved(residual, setup))
+    bad = np.flatnonzero((scored.zone > 0) & ~proved_samples(residual, setup))
     s = scored.samples
     return residual_findings(s.points[bad], scored.zone[bad], s.face[bad], residual[bad] - setup.stock_allowance,
                              s.area[bad], zone_ids, setup.scallop_height)
-
-
-def _zones(scored: ScoredSamples, residual: F64, proved: NDArray[np.bool_], setup: ProofSetup,
-           zone_ids: Sequence[str]) -> dict[str, ZoneProof]:
-    out = {}
-    for k, name in enumerate(zone_ids, 1):
-        own = np.flatnonzero(scored.zone == k)
-        if len(own) == 0:
-            out[name] = ZoneProof(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            continue
-        scallop = np.maximum(residual[own] - setup.stock_allowance, 0.0)
-        p50, p99 = np.percentile(scallop, [50, 99])
-        area = scored.samples.area[own]
-        good = float(area[proved[own]].sum())
-        out[name] = ZoneProof(float(p50), float(p99), float(scallop.max()), max(float(-residual[own].min()), 0.0),
-                              float(area.sum()), good, good / float(area.sum()))
-    return out
 
 
 def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[Program], moves: Moves,
@@ -199,14 +172,15 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
     known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, bool)
     minutes = took[known][run.cut]
     used = source.tool[run.cut]
-    proved = _proved(cuts.residual, setup)
+    proved = proved_samples(cuts.residual, setup)
     top, counts = ordered(findings)
     mover = cuts.mover
     has = mover >= 0
     line, program = np.zeros(len(mover), np.int32), np.full(len(mover), -1, np.int32)
     line[has], program[has] = source.line[mover[has]], source.program[mover[has]]
     return Proof(top, counts, cuts.residual, line, program, proved,
-                 _zones(scored, cuts.residual, proved, setup, zone_ids), cuts.gouge_max, seconds,
+                 zone_proofs(scored, cuts.residual, proved, setup, zone_ids),
+                 face_proofs(scored.samples, cuts.residual, has, proved, setup), cuts.gouge_max, seconds,
                  float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
                  error_bound(read), cuts.reach, spacing, notes)
 
@@ -217,4 +191,4 @@ def error_bound(read: Sequence[Program]) -> float:
     return RAY_ERROR + CHORD + max((p.blend for p in read), default=0.0) + turning
 
 
-__all__ = ["Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]
+__all__ = ["FaceProof", "Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

@@ -15,7 +15,7 @@ the path; rotary axes stand at 0; what it takes for granted so is told (``Progra
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -26,19 +26,22 @@ from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
 from verify.motion import Motion
 from verify.program import NAN, Program, Remark
+from verify.progress import Report, silent
 from verify.served import served
 from verify.words import STRAIGHT, Block, BlockError, parse_block, used_letters
 
 BLEND_LIMIT = 0.01
+TOLD = 4096  # lines between two reports of how far the reading is
 
 
 class Reader(Motion):
     """One reading of one program; use ``read_program``."""
 
-    def read(self, text: str) -> Program:
-        """Moves and remarks of ``text``; raises as ``read_program`` says."""
+    def read(self, text: str, report: Report = silent) -> Program:
+        """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
         log, lines = self.log, text.split("\n")
-        percents = self._scan(Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1))
+        blocks = Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1)
+        percents = self._scan(_told(blocks, len(lines), report))
         self.stop("end of the program")
         if not self.s.ended and percents < 2 and not log.errors:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
@@ -150,9 +153,18 @@ class Reader(Motion):
             self.log.remark("unused", f"no code of this block takes {', '.join(idle)}", self.log.line)
 
 
+def _told(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> Iterator[tuple[int, str]]:
+    """The blocks as they are; every so many of them the share of the lines reached is reported."""
+    for count, block in enumerate(blocks, 1):
+        if count % TOLD == 0:
+            report(block[0] / lines)
+        yield block
+
+
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
-                 gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0) -> Program:
+                 gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
+                 report: Report = silent) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -163,6 +175,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     gauge_length : mm by T number, spindle face to tip; a machine whose head tilts needs them in programs without
                   tool centre point control
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
+    report      : called with the share read, 0 to 1, every 4096 lines; what it raises ends the reading
 
     Returns
     -------
@@ -185,7 +198,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         raise ProgramError(f"{name}: T{spindle_tool}, named as the tool in the spindle, is not in the tool table",
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="name a tool of the table as spindle_tool")
-    return Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool).read(text)
+    reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
+    return reader.read(text, report)
 
 
 __all__ = ["FEED", "RAPID", "Program", "Reader", "Remark", "read_program"]

@@ -9,8 +9,9 @@ leans is the same in its own frame; one that turns is so on short pieces of the 
 
 from __future__ import annotations
 
+import queue
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,7 @@ from verify.toolaxes import ToolAxes
 Progress = Callable[[float], None]
 MAX_CELLS = 4_000_000
 TILES = 12
+PULSE = 0.1
 BOW = 5e-4
 """mm, how far a turning tool may be from where the pieces of its moves take it to be."""
 
@@ -110,21 +112,29 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
 def run_tiles(jobs: Sequence[Callable[[], object]], threads: int, progress: Progress | None = None) -> list[object]:
     """Run independent jobs on ``threads`` threads and return their results in order.
 
-    progress receives the share done after each job; an exception it raises (a cancelled job) ends the run.
+    progress receives the share done after each job, and again every ``PULSE`` s while one takes longer. An exception
+    it raises (a cancelled job) ends the run at once: jobs that wait are dropped, those that run are not waited for.
     """
-    results: list[object] = []
-    with ThreadPoolExecutor(max(1, threads)) as pool:
-        pending = [pool.submit(job) for job in jobs]
-        try:
-            for done, future in enumerate(pending, 1):
-                results.append(future.result())
-                if progress is not None:
-                    progress(done / len(pending))
-        except BaseException:
-            for future in pending:
-                future.cancel()
-            raise
-    return results
+    ended: queue.SimpleQueue[Future[object]] = queue.SimpleQueue()
+    pool = ThreadPoolExecutor(max(1, threads))
+    pending = [pool.submit(job) for job in jobs]
+    for future in pending:
+        future.add_done_callback(ended.put)
+    try:
+        done = 0
+        while done < len(pending):
+            try:
+                ended.get(timeout=PULSE).result()
+                done += 1
+            except queue.Empty:
+                pass
+            if progress is not None:
+                progress(done / len(pending))
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+    return [future.result() for future in pending]
 
 
 def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, tools: Sequence[ToolBody],

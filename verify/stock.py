@@ -145,7 +145,7 @@ def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, 
     return np.clip(out.min(axis=1), 0.0, reach)
 
 
-def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2) -> StockField:
+def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2, progress: Progress | None = None) -> StockField:
     """The stock before the first cut, never below the part.
 
     Exact on every line: an offset blank is the union of spheres on the surface, by facets, edges and corners.
@@ -168,11 +168,12 @@ def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2) -> StockFi
         cx, cy, _, radius, _ = blank_cylinder(mesh.bounds, setup)
         height[np.hypot(x[:, None] - cx, y[None, :] - cy) <= radius] = box[1, 2]
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
-    _raise(height, origin, step, mesh, reach, threads)
+    _raise(height, origin, step, mesh, reach, threads, progress)
     return StockField(origin, step, height, fixed)
 
 
-def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int) -> None:
+def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
+           progress: Progress | None) -> None:
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges = np.unique(edges, axis=0)
     by_height = np.argsort(-mesh.triangles[:, :, 2].max(axis=1), kind="stable")
@@ -182,7 +183,7 @@ def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: flo
         return lambda: raise_offset(height, i0, i1, origin, step, mesh.vertices, faces, edges, reach)
 
     cuts = np.linspace(0, len(height), 4 * max(threads, 1) + 1).astype(int)
-    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads)
+    run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads, progress)
 
 
 def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:

@@ -29,15 +29,17 @@ class FakeChain(types.ModuleType):
             raise self.answer
         return self.answer
 
-    def plan(self, part_path, setup, out, progress):
+    def plan(self, part_path, setup, out, progress, mesh=None):
+        self.mesh = mesh
         return self._say(progress)
 
     def zones_only(self, part_path, setup, progress):
         return self._say(progress)
 
-    def verify_program(self, part_path, setup, program_text, progress, access=None, spindle_tool=0):
+    def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
+                       spindle_tool=0):
         assert program_text.strip()
-        self.spindle_tool = spindle_tool
+        self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
         return self._say(progress)
 
 

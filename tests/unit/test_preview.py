@@ -7,7 +7,8 @@ from PIL import Image
 from geometry.mesh import TriangleMesh
 from geometry.part import EdgeInfo, EdgeKind, FaceInfo, Part
 from service.camera import Camera
-from service.preview import CONNECTION, REMAINDER, SIZE, TOOLS, draw_preview, scale_length, wall_colour
+from service.lettering import scale_length
+from service.preview import CONNECTION, REMAINDER, SIZE, TOOLS, draw_preview, wall_colour
 from service.raster import Canvas
 from tests.synthetic_plan import BALL, line, step
 from toolpath.motion import Motion

@@ -1,4 +1,4 @@
-"""The moves of all programs of a proof, one after the other."""
+"""Programs one after the other: read, started from above, and as one list of moves."""
 
 from __future__ import annotations
 
@@ -7,18 +7,57 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import VerificationError
 from geometry.mesh import F64
+from geometry.part import Part
 from geometry.toolbody import ToolBody
-from verify.cycles import FEED
 from verify.findings import Source
+from verify.fitness import from_above, top_of_all
 from verify.model import ProofSetup
-from verify.program import Program
+from verify.progress import Report, Stages
+from verify.reader import FEED, Program, read_program
 from verify.removal import Moves
 from verify.toolaxes import ToolAxes
 
+BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
+BLEND_SHARE = 0.1
 
-def joined(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
-    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them."""
+
+def check_numbers(tools: Sequence[ToolBody]) -> None:
+    """Refuse two tools of one T number (VerificationError, code tool_number_twice)."""
+    numbers = [t.number for t in tools]
+    if len(set(numbers)) != len(numbers):
+        raise VerificationError("two tools share a T number", code="tool_number_twice",
+                                subjects=tuple(t.id for t in tools if numbers.count(t.number) > 1),
+                                remedy="give every tool its own number")
+
+
+def read_all(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+             spindle_tool: int, report: Report) -> list[Program]:
+    """Read programs in the order they run; a first descent that lacks only its height comes from above everything.
+
+    programs, spindle_tool : as ``verify.prove.prove`` takes them, and errors as it raises them
+    report   : called with the share read, 0 to 1
+    """
+    stages, total, done = Stages(report), max(sum(len(text) for _, text in programs), 1), 0
+    above = top_of_all(part.mesh.bounds, setup) + setup.clearance_rapid
+    read = []
+    for name, text in programs:
+        program = read_program(
+            text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
+            blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
+            gauge_length=setup.gauge_length, spindle_tool=spindle_tool,
+            report=stages.span(done / total, (done + len(text)) / total))
+        read.append(from_above(program, above))
+        done += len(text)
+    return read
+
+
+def moves_of(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
+    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them.
+
+    tools : of the moves; ``Moves.tool`` is the place in it
+    """
     row = {t.number: i for i, t in enumerate(tools)}
     number = np.concatenate([p.tool for p in read]) if read else np.zeros(0, np.int32)
     known = _known(read, tools) if read else np.zeros(0, np.bool_)
@@ -39,7 +78,7 @@ def joined(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, S
 
 
 def slides_of(read: Sequence[Program], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
-    """(m, 3, 3) directions of the linear axes, move by move, as ``joined`` takes them; None where no table turns."""
+    """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them; None where no table turns."""
     if setup.kinematics is None or not setup.dogleg or all(p.poses is None for p in read):
         return None
     turn = np.concatenate([np.zeros((len(p), 2)) if p.poses is None else p.poses.start_turn for p in read])

@@ -1,0 +1,195 @@
+"""deviation.png: the part coloured by what the proof measured on it.
+
+Two views of the part. Red is cut too deep, green within the budget, blue stands too high, hatched grey was never
+reached by a cut, pale was not to be judged. Every pixel has the class of the nearest sample of its face; samples
+outside the budget are dotted over that, so that none is lost between pixels. Rings mark the deepest gouges and the
+place where most is left. No clock, no random number: the same input gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from geometry.keyed import KeyedPoints
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.sampling import SurfaceSamples
+from output.text import ascii_text, decimal
+from service.camera import Camera
+from service.lettering import (
+    GREY,
+    INK,
+    RGB,
+    WHITE,
+    bytes_of,
+    draw_pairs,
+    draw_scale,
+    draw_triad,
+    font,
+)
+from service.raster import Canvas
+from service.scene import add_edges, lit
+from service.sights import choose_views, seen
+
+SIZE = (1760, 960)
+HEADER, LEGEND, GUTTER = 56, 132, 8
+STEPS = (3.0, 10.0)  # times the budget at which a class ends
+GREEN, UNCUT = 3, 7  # classes; 0 to 2 are gouges, the deepest first, 4 to 6 stand too high, the highest last
+COLOURS: tuple[RGB, ...] = ((0.45, 0.0, 0.10), (0.86, 0.06, 0.06), (1.0, 0.52, 0.32), (0.60, 0.83, 0.56),
+                            (0.55, 0.78, 1.0), (0.18, 0.48, 0.95), (0.06, 0.14, 0.58), (0.66, 0.66, 0.68))
+PALE: RGB = (0.93, 0.92, 0.89)
+HATCH: RGB = (0.36, 0.36, 0.40)
+MOST_RINGS = 5
+INT8 = NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What the proof measured at the samples.
+
+    samples : SurfaceSamples, n of them, in the frame of the part
+    excess  : (n,) float64, mm over the allowance, negative where cut too deep
+    reached : (n,) bool, whether a feed move took something off there
+    scallop, gouge : mm, the budget: -gouge <= excess <= scallop
+    """
+
+    samples: SurfaceSamples
+    excess: F64
+    reached: NDArray[np.bool_]
+    scallop: float
+    gouge: float
+
+    @property
+    def classes(self) -> INT8:
+        """(n,) int8: row of ``COLOURS`` of every sample."""
+        out = np.searchsorted(self.limits, self.excess, side="left").astype(np.int8)
+        out[~self.reached & (out > GREEN)] = UNCUT
+        return out
+
+    @property
+    def limits(self) -> F64:
+        """(6,) float64, mm: excess at which the classes 0 to 6 end, the last excepted."""
+        low, high = self.gouge + 1e-6, self.scallop + 1e-6  # the proof forgives as much
+        return np.array([-STEPS[1] * low, -STEPS[0] * low, -low, high, STEPS[0] * high, STEPS[1] * high])
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place with a ring and words beside it; point in mm, frame of the part."""
+
+    point: tuple[float, float, float]
+    text: str
+    colour: RGB
+
+
+def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_path: str | Path, title: str,
+                   facts: Mapping[str, str]) -> None:
+    """Draw the deviations into a PNG of 1760 x 960 pixels.
+
+    part     : Part, mm; measured : Measured in its frame
+    marks    : gravest first; five are drawn
+    out_path : file to write
+    title    : one line of text
+    facts    : up to ten pairs for the legend, for example {'coverage': '97.2 %'}
+    """
+    width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
+    classes = measured.classes
+    cameras = choose_views(part.mesh, measured.samples, classes != GREEN, (2 * width, 2 * height))
+    sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
+    pen = ImageDraw.Draw(sheet)
+    free = list(marks[:MOST_RINGS])
+    for k, camera in enumerate(cameras):
+        x = k * (width + GUTTER)
+        canvas = _painted(part, measured, classes, camera)
+        sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
+        inside = [m for m in free if seen(canvas, camera, np.array([m.point]))[0]]
+        free = [m for m in free if m not in inside]
+        for mark in inside if k == 0 else [*inside, *free]:
+            _ring(pen, camera, mark, x, width, hidden=mark in free)
+        draw_triad(pen, camera, (x + 54, SIZE[1] - LEGEND - 54))
+        draw_scale(pen, camera, (x + width - 24, SIZE[1] - LEGEND - 24))
+    pen.text((20, 14), ascii_text(title), font=font(26), fill=bytes_of(INK))
+    for k, caption in enumerate(("What the program leaves on the part", "The same from another side")):
+        pen.text((20 + k * (width + GUTTER), HEADER + 12), caption, font=font(17), fill=bytes_of(GREY))
+    top = SIZE[1] - LEGEND + 12
+    draw_pairs(pen, list(facts.items()), 20, top, wide=330, indent=130)
+    _scale(pen, measured, 720, top)
+    _signs(pen, 1490, top)
+    sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
+
+
+def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> Canvas:
+    """One view: light, classes, dots of what is outside the budget, edges."""
+    canvas = lit(part.mesh, np.ones((len(part.faces) + 1, 3), np.float32), camera)
+    shown = _class_of_pixels(canvas, camera, measured.samples, classes)
+    table = np.array([*COLOURS, PALE], np.float32)  # -1, not judged, is the last
+    solid = canvas.owner > 0
+    canvas.colour[solid] *= table[shown[solid]]
+    y, x = np.nonzero(shown == UNCUT)
+    stripe = (x + y) % 14 < 4
+    canvas.colour[y[stripe], x[stripe]] = HATCH
+    for k in (4, 5, 6, 2, 1, 0):
+        canvas.dots(camera.screen(measured.samples.points[classes == k]), COLOURS[k], bias=0.05 * camera.scale)
+    add_edges(canvas, part, camera)
+    return canvas
+
+
+def _class_of_pixels(canvas: Canvas, camera: Camera, samples: SurfaceSamples, classes: INT8) -> INT8:
+    """(h, w): class of the nearest sample of the face seen, -1 where the face has none or nothing is seen."""
+    out = np.full(canvas.owner.shape, -1, np.int8)
+    y, x = np.nonzero(np.isin(canvas.owner, samples.face) & (canvas.owner > 0))
+    places = camera.places(np.column_stack([x + 0.5, y + 0.5, canvas.depth[y, x]]))
+    row = KeyedPoints(samples.face.astype(np.int64), samples.points).nearest(canvas.owner[y, x].astype(np.int64),
+                                                                             places)[:, 0]
+    out[y, x] = np.where(row >= 0, classes[row], -1)
+    return out
+
+
+# --- words and signs -------------------------------------------------------------------------------------------
+
+
+def _ring(pen: ImageDraw.ImageDraw, camera: Camera, mark: Mark, left: int, width: int, *, hidden: bool) -> None:
+    x, y, _ = 0.5 * camera.screen(np.array(mark.point))
+    x, y = left + float(x), HEADER + float(y)
+    for radius, colour, line in ((15, WHITE, 5), (14, INK, 2)):
+        pen.ellipse([x - radius, y - radius, x + radius, y + radius], outline=bytes_of(colour), width=line)
+    text = mark.text + (" (behind)" if hidden else "")
+    right = x < left + 0.6 * width
+    pen.text((x + 20 if right else x - 20, y - 14), ascii_text(text), font=font(16), anchor="lm" if right else "rm",
+             fill=bytes_of(mark.colour), stroke_width=3, stroke_fill=bytes_of(WHITE))
+
+
+def _scale(pen: ImageDraw.ImageDraw, measured: Measured, x: int, y: int) -> None:
+    """The seven classes as a strip with their limits in mm and the budget between two marks."""
+    box, ink = 98, bytes_of(INK)
+    for k, colour in enumerate(COLOURS[:UNCUT]):
+        pen.rectangle([x + k * box, y + 22, x + (k + 1) * box, y + 46], fill=bytes_of(colour), outline=ink)
+    for k, limit in enumerate(measured.limits, 1):
+        tall = k in (GREEN, GREEN + 1)
+        at = x + k * box
+        pen.line([(at, y + (14 if tall else 42)), (at, y + 52)], fill=ink, width=3 if tall else 1)
+        pen.text((at, y + 55), f"{'+' if limit > 0 else '-'}{decimal(round(abs(float(limit)), 4))}", font=font(14),
+                 anchor="mt", fill=ink)
+    middle = x + (GREEN + 0.5) * box
+    pen.text((middle, y + 10), "allowed", font=font(15), anchor="mm", fill=ink)
+    pen.text((x + 1.5 * box, y + 10), "cut too deep", font=font(15), anchor="mm", fill=bytes_of(COLOURS[1]))
+    pen.text((x + 5.5 * box, y + 10), "stock left", font=font(15), anchor="mm", fill=bytes_of(COLOURS[5]))
+    pen.text((middle, y + 86), "mm along the surface normal, 0 = the surface asked for", font=font(15), anchor="mm",
+             fill=bytes_of(GREY))
+
+
+def _signs(pen: ImageDraw.ImageDraw, x: int, y: int) -> None:
+    grey = bytes_of((0.5, 0.5, 0.5))
+    pen.rectangle([x, y + 2, x + 22, y + 14], fill=bytes_of(COLOURS[UNCUT]), outline=grey)
+    for k in (1, 8, 15):
+        pen.line([(x + k, y + 14), (x + min(k + 12, 22), y + 2)], fill=bytes_of(HATCH), width=2)
+    pen.rectangle([x, y + 23, x + 22, y + 35], fill=bytes_of(PALE), outline=grey)
+    pen.ellipse([x + 3, y + 42, x + 19, y + 58], outline=bytes_of(INK), width=2)
+    for k, text in enumerate(("never reached by a cut", "not to be judged", "deepest gouge, most left")):
+        pen.text((x + 30, y + 21 * k), text, font=font(15), fill=bytes_of(INK))

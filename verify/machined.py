@@ -1,0 +1,110 @@
+"""The machined part as a field of distances, from program texts: how it looks, and how much of it there is."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from geometry.errors import InputError
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.toolbody import ToolBody
+from verify.arcs import CHORD
+from verify.field import Field
+from verify.material import machined
+from verify.model import ProofSetup
+from verify.progress import Stages
+from verify.removal import BOW
+from verify.sequence import check_numbers, moves_of, read_all
+from verify.stock import stock_bounds
+
+LEAST_STEP = 0.002
+MOST_STEP = 5.0
+READ = 0.1  # share of the work done when the programs are read
+
+
+def machined_stock(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+                   step: float, *, box: F64 | None = None, spindle_tool: int = 0, threads: int | None = None,
+                   progress: Callable[[float], None] | None = None) -> Field:
+    """What stands when all programs have run, one after the other, on one blank.
+
+    programs, part, tools, setup, spindle_tool : as ``verify.prove.prove`` takes them, mm, setup frame
+    step     : mm between nodes, 0.002 to 5; wider where that would take over 24 million of them (``Field.step`` says)
+    box      : (2, 3) float64, mm, a window: what stands in it and nothing else; all of the stock where None
+    threads  : 2 where None, at most the cores; the answer has the same bytes for any number
+    progress : called with 0..1, never less than before; an exception from it ends the work at once
+
+    Returns
+    -------
+    Field
+        ``surface()`` is closed, along the borders of the window too.
+
+    Raises
+    ------
+    InputError
+        ``bad_mesh_step``; ``bad_mesh_box``: corners that are not finite, without extent, or off the stock.
+    ProgramError, VerificationError
+        As ``verify.prove.prove``.
+
+    Notes
+    -----
+    Feed moves alone cut, and take off what the cutting part sweeps whatever else of the tool is in the way: a program
+    that is not proved is shown as it would cut if it could. The errors are those of ``surface_error``.
+    """
+    check_step(step)
+    check_numbers(tools)
+    if box is not None:
+        box = _window(box, stock_bounds(part.mesh.bounds, setup))
+    stages = Stages(progress)
+    moves, _ = moves_of(read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ)), tools)
+    field = machined(part.mesh, moves, tools, setup, step, box=box,
+                     threads=threads or min(2, os.cpu_count() or 1), progress=stages.span(READ, 1.0))
+    return field if box is None else clipped(field, box)
+
+
+def surface_error(step: float, turning: bool = True) -> float:
+    """How far a corner of ``Field.surface`` may be from what the tools leave, mm.
+
+    step : mm between nodes; turning : whether tools turn while they move, which is followed in pieces
+
+    A corner lies in a cell of the grid that holds a piece of the true surface, so within the diagonal of that cell; on
+    smooth surfaces it is nearer by far (docs/theory/proof.md). What is thinner than a cell may be missing.
+    """
+    return math.sqrt(3.0) * step + CHORD + (BOW if turning else 0.0)
+
+
+def check_step(step: float) -> None:
+    """Refuse a distance of nodes, mm, that is no number from 0.002 to 5 (InputError, bad_mesh_step)."""
+    if not LEAST_STEP <= step <= MOST_STEP:
+        raise InputError(f"nodes of the machined part {step:g} mm apart", code="bad_mesh_step", measured=step,
+                         limit=[LEAST_STEP, MOST_STEP], remedy=f"give {LEAST_STEP:g} to {MOST_STEP:g} mm")
+
+
+def clipped(field: Field, box: F64) -> Field:
+    """The field with nothing standing outside a window.
+
+    box : (2, 3) float64, mm
+    """
+    x, y, z = (np.minimum(at - box[0, c], box[1, c] - at) for c, n in enumerate(field.values.shape)
+               for at in (field.origin[c] + field.step * np.arange(n),))
+    values = np.minimum(field.values, x.astype(np.float32)[:, None, None])
+    np.minimum(values, y.astype(np.float32)[None, :, None], out=values)
+    np.minimum(values, z.astype(np.float32)[None, None, :], out=values)
+    return Field(field.origin, field.step, np.maximum(values, np.float32(-field.step)))
+
+
+def _window(box: F64, stock: F64) -> F64:
+    """The window cut down to the stock and one mm round it, which changes nothing that stands."""
+    box = np.asarray(box, dtype=np.float64)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] >= box[1]).any():
+        raise InputError("the window of the machined part is no box", code="bad_mesh_box", measured=box.tolist(),
+                         remedy="give x0,y0,z0,x1,y1,z1 in mm, the lower corner first")
+    out = np.array([np.maximum(box[0], stock[0] - 1.0), np.minimum(box[1], stock[1] + 1.0)])
+    if (out[0] >= out[1]).any():
+        raise InputError("the window of the machined part lies off the stock", code="bad_mesh_box",
+                         measured=box.tolist(), limit=np.round(stock, 4).tolist(),
+                         remedy="give a box that meets the stock, whose corners are the limit")
+    return out

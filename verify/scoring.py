@@ -1,0 +1,78 @@
+"""What samples are proved, and the figures of that by zone and by face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.sampling import SurfaceSamples
+from verify.model import FaceProof, ProofSetup, ScoredSamples, ZoneProof
+
+RAY_ERROR = 1e-6
+BOOL = NDArray[np.bool_]
+
+
+def proved_samples(residual: F64, setup: ProofSetup) -> BOOL:
+    """(n,) bool: which of (n,) residuals, mm, lie within the budget of the setup."""
+    left = residual - setup.stock_allowance
+    return np.asarray((left >= -setup.gouge_tolerance - RAY_ERROR) & (left <= setup.scallop_height + RAY_ERROR))
+
+
+def zone_proofs(scored: ScoredSamples, residual: F64, proved: BOOL, setup: ProofSetup,
+                zone_ids: Sequence[str]) -> dict[str, ZoneProof]:
+    """The figures of every zone over the samples it answers for.
+
+    residual : (n,) float64, mm left on the samples; proved : (n,) bool
+    """
+    out = {}
+    for k, name in enumerate(zone_ids, 1):
+        own = np.flatnonzero(scored.zone == k)
+        if len(own) == 0:
+            out[name] = ZoneProof(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            continue
+        left = _left(residual[own], setup.stock_allowance)
+        area = scored.samples.area[own]
+        total, good = float(area.sum()), float(area[proved[own]].sum())
+        out[name] = ZoneProof(*left, _deepest(residual[own]), total, good, good / total)
+    return out
+
+
+def face_proofs(samples: SurfaceSamples, residual: F64, reached: BOOL, proved: BOOL,
+                setup: ProofSetup) -> dict[int, FaceProof]:
+    """The figures of every face that has samples, by face number.
+
+    samples  : SurfaceSamples, n of them
+    residual : (n,) float64, mm left on the normal, not above the reach of the proof
+    reached  : (n,) bool, whether any feed move took something off the normal of the sample
+    proved   : (n,) bool
+
+    Notes
+    -----
+    Uncut is what no feed move reached and stands higher than the budget allows: a face that the blank leaves as it
+    should be is not cut and not uncut.
+    """
+    uncut = ~reached & (residual - setup.stock_allowance > setup.scallop_height + RAY_ERROR)
+    order = np.argsort(samples.face, kind="stable")
+    numbers, first = np.unique(samples.face[order], return_index=True)
+    out = {}
+    for number, own in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+        area = samples.area[own]
+        total, good = float(area.sum()), float(area[proved[own]].sum())
+        out[number] = FaceProof(number, total, *_left(residual[own], setup.stock_allowance), _deepest(residual[own]),
+                                float(area[uncut[own]].sum()), good, good / total if total > 0 else 0.0)
+    return out
+
+
+def _left(residual: F64, allowance: float) -> tuple[float, float, float]:
+    """Median, 99th percentile and most of what stands over the allowance, mm; what is cut deeper counts 0."""
+    left = np.maximum(residual - allowance, 0.0)
+    p50, p99 = np.percentile(left, [50, 99])
+    return float(p50), float(p99), float(left.max())
+
+
+def _deepest(residual: F64) -> float:
+    """Deepest cut into the part, mm."""
+    return max(float(-residual.min()), 0.0)
