@@ -41,6 +41,13 @@ class PlannedZone(ZoneFacts):
     coverage: Share | None = None
 
 
+class Engaged(ReportModel):
+    """How much of the front half of a cutter is in stock, deg: at most, and on 99 % of its way in stock."""
+
+    max: float | None = None
+    p99: float | None = None
+
+
 class ToolUse(ReportModel):
     """How a tool is used by the plan."""
 
@@ -48,6 +55,7 @@ class ToolUse(ReportModel):
     minutes_in_cut: float | None = None
     slenderness: float | None = None
     deflection_mm: float | None = None
+    engagement_deg: Engaged | None = None
 
 
 class LeftOver(ReportModel):

@@ -70,6 +70,9 @@ class Tool(WireModel):
                     "stickout_mm + the holder's lengths.")] = None
     max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: no limit of "
                                                                        "the tool's own.")] = None
+    max_engagement_deg: Annotated[Number | None, Field(
+        gt=0, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
+                                  "deeper than a twentieth of its radius; 180 is a slot. null: not limited.")] = None
     life_min: Annotated[Number | None, Field(gt=0, le=1e6, description="Life in cut, min; null: not given.")] = None
     holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
                                                                             "no holder is checked.")] = []

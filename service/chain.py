@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -295,6 +296,8 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
         gauge_length={body.number: t.gauge_length_mm or 0.0 for t, body in zip(s.tools, tool_bodies(s), strict=True)},
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
+        max_engaged={body.number: math.radians(t.max_engagement_deg)
+                     for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
         kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),

@@ -264,9 +264,12 @@ def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
     out = []
     for f in ready.views[0].fields.values():
         t = f.tool
+        engaged = proof.engaged.get(t.number)
         slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
         out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),
                     "slenderness": r(slender, 2), "deflection_mm": None,
+                    "engagement_deg": None if engaged is None else
+                    {"max": r(math.degrees(engaged.most), 2), "p99": r(math.degrees(engaged.p99), 2)},
                     "neck_clearance_mm": r(t.neck_clearance(ready.setup.clearance_mm.neck))})
     return out
 

@@ -14,7 +14,7 @@ from output.model import Workplan
 from toolpath.motion import Workingstep
 from toolpath.plan import Plan
 from verify.findings import ordered
-from verify.model import Proof, ProofSetup
+from verify.model import Engagement, Proof, ProofSetup
 from verify.scoring import face_proofs
 from zones.view import View
 
@@ -82,7 +82,11 @@ def joined_proofs(sides: Sequence[Side], samples: SurfaceSamples, setup: ProofSe
     proved = np.any([p.proved for p in proofs], axis=0) & (np.stack([p.proved for p in proofs])[best, rows])
     counts: Counter[str] = Counter()
     minutes: Counter[int] = Counter()
-    zones = {}
+    zones, engaged = {}, dict(proofs[0].engaged)
+    for p in proofs[1:]:
+        for tool, e in p.engaged.items():
+            was = engaged.get(tool, e)
+            engaged[tool] = Engagement(max(was.most, e.most), max(was.p99, e.p99))
     for side in sides:
         counts.update(side.proof.counts)
         minutes.update(side.proof.minutes)
@@ -94,7 +98,7 @@ def joined_proofs(sides: Sequence[Side], samples: SurfaceSamples, setup: ProofSe
         line=np.stack([p.line for p in proofs])[best, rows], program=program, proved=proved, zones=zones,
         faces=face_proofs(samples, residual[best, rows], program >= 0, proved, setup),
         gouge_max=max(p.gouge_max for p in proofs), machining_time=sum(p.machining_time for p in proofs),
-        cutting_length=sum(p.cutting_length for p in proofs), minutes=dict(minutes),
+        cutting_length=sum(p.cutting_length for p in proofs), minutes=dict(minutes), engaged=engaged,
         error_bound=max(p.error_bound for p in proofs), line_spacing=max(p.line_spacing for p in proofs),
         notes=tuple(f"{s.view.id}: {note}" for s in sides for note in s.proof.notes))
 

@@ -8,7 +8,6 @@ what stands between nodes is seen unless it is thinner than their distance. Resi
 from __future__ import annotations
 
 import math
-import queue
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -24,7 +23,17 @@ from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stock import EVENTS, Bodies, StockPass, blank_cylinder, descents, end_radii, gather, stock_bounds
+from verify.stock import (
+    EVENTS,
+    Bodies,
+    StockPass,
+    blank_cylinder,
+    descents,
+    end_radii,
+    gather,
+    stock_bounds,
+    tables_for,
+)
 from verify.toolaxes import ToolAxes
 
 F32 = NDArray[np.float32]
@@ -151,10 +160,7 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     axes = moves.axes or ToolAxes.upright(len(moves))
     reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
-    spare: queue.SimpleQueue[NDArray[np.int64]] = queue.SimpleQueue()
-    sums = [np.zeros((len(moves), 2), np.int64) for _ in range(max(1, threads))]
-    for table in sums:
-        spare.put(table)
+    sums, spare = tables_for(threads, (len(moves), 3))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
@@ -167,10 +173,10 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
         return work
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
-    taken = np.sum(sums, axis=0)
+    taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce([t[:, 2] for t in sums])
     dug = taken[:, 1] / VOLUME_UNITS / (np.pi * ends[moves.tool] ** 2)
     plunges = _plunges(moves, dug, earned, setup.plunge_skin * 2.0 * cutters[:, 0])
-    return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, taken[:, 0] / VOLUME_UNITS)
+    return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)
 
 
 def _plunges(moves: Moves, dug: F64, earned: F64, skins: F64) -> F64:

@@ -65,14 +65,16 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
 def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, count: int) -> StockPass:
     """The pass in terms of the ``count`` moves given, where some were spread out."""
     if origin is None:
-        return StockPass(events, run.lost + lost, run.cut, run.taken)
+        return StockPass(events, run.lost + lost, run.cut, run.engaged, run.taken)
     events = events.copy()
     events[:, 0] = origin[events[:, 0].astype(np.int64)]
     cut, taken = np.zeros(count, np.bool_), np.zeros(count)
     cut[origin[run.cut]] = True
+    engaged = np.zeros(count, np.int64)
+    np.bitwise_or.at(engaged, origin, run.engaged)
     if run.taken is not None:
         np.add.at(taken, origin, run.taken)
-    return StockPass(events, run.lost + lost, cut, None if run.taken is None else taken)
+    return StockPass(events, run.lost + lost, cut, engaged, None if run.taken is None else taken)
 
 
 def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,

@@ -28,6 +28,7 @@ class FindingKind(StrEnum):
     RAPID = "rapid"
     PLUNGE = "plunge"
     RUBBING = "rubbing"
+    ENGAGEMENT = "engagement"
     LIMIT = "limit"
     PROGRAM = "program"
     RESIDUAL = "residual"
@@ -51,6 +52,7 @@ class ProofSetup:
     dogleg        : whether a rapid moves each axis at its own speed, so that its way is not a straight line
     max_feed      : mm/min of any feed move, or None
     max_rpm       : 1/min by T number; a tool left out is not limited
+    max_engaged   : rad by T number, most of the front half of a cutter that may be in stock; left out: not limited
     work_offset   : the only one whose coordinates are those of the setup frame
     line_spacing  : mm between the vertical lines of the stock model
     kinematics    : rotary axes of the machine, or None on one of three axes
@@ -80,6 +82,7 @@ class ProofSetup:
     work_offset: str = "G54"
     max_feed: float | None = None
     max_rpm: Mapping[int, float] = field(default_factory=dict)
+    max_engaged: Mapping[int, float] = field(default_factory=dict)
     line_spacing: float = 0.15
     kinematics: Kinematics | None = None
     rotary_limits: F64 | None = None
@@ -123,6 +126,14 @@ class Finding:
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None}
+
+
+@dataclass(frozen=True)
+class Engagement:
+    """How much of the front half of a cutter is in stock, rad: at most, and on 99 % of its way in stock at most."""
+
+    most: float
+    p99: float
 
 
 @dataclass(frozen=True)
@@ -170,7 +181,7 @@ class Proof:
     proved   : (n,) bool, inside the budget
     zones    : by zone id; faces : by face number, of every face with scored samples
     machining_time : s, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
-    minutes  : minutes in cut by tool number
+    minutes  : minutes in cut by tool number; engaged : how much of each cutter was in stock, by tool number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
     """
 
@@ -186,6 +197,7 @@ class Proof:
     machining_time: float
     cutting_length: float
     minutes: Mapping[int, float]
+    engaged: Mapping[int, Engagement]
     error_bound: float
     reach: float
     line_spacing: float
@@ -203,6 +215,7 @@ class Proof:
             "zones": {k: asdict(v) for k, v in self.zones.items()},
             "faces": {f"F{k}": asdict(v) for k, v in self.faces.items()}, "gouge_max_mm": self.gouge_max,
             "machining_time_s": self.machining_time, "cutting_length_mm": self.cutting_length,
-            "tools": {str(k): v for k, v in self.minutes.items()}, "error_bound_mm": self.error_bound,
+            "tools": {str(k): v for k, v in self.minutes.items()},
+            "engaged_rad": {str(k): asdict(v) for k, v in self.engaged.items()}, "error_bound_mm": self.error_bound,
             "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),
         }

@@ -13,6 +13,7 @@ from geometry.mesh import F64, I32
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
+from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
     Source,
     contact_findings,
@@ -23,7 +24,7 @@ from verify.findings import (
 from verify.fitness import limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
 from verify.material import contacts
-from verify.model import FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
+from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
 from verify.reader import Program
 from verify.removal import BOW, Moves, residual_on_normals
@@ -79,14 +80,17 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
                    slides_of(read, tools, setup), threads, stages.span(CUT, MET))
     run = met.run
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
                 *_idle_findings(read, run, moves, source), *repeat_findings(moves, run.cut, source),
+                *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
     stages.tell(1.0)
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, met.spacing, tuple(notes))
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
+                  met.spacing, tuple(notes))
 
 
 def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -162,8 +166,8 @@ def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids
 
 
 def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[Program], moves: Moves,
-           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str], spacing: float,
-           notes: tuple[str, ...]) -> Proof:
+           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
+           engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...]) -> Proof:
     length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
     fed = np.concatenate([p.minutes for p in read]) if read else length
     took = np.where(np.isnan(fed), length / setup.rapid_feed, fed)
@@ -182,7 +186,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[
                  zone_proofs(scored, cuts.residual, proved, setup, zone_ids),
                  face_proofs(scored.samples, cuts.residual, has, proved, setup), cuts.gouge_max, seconds,
                  float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
-                 error_bound(read), cuts.reach, spacing, notes)
+                 engaged, error_bound(read), cuts.reach, spacing, notes)
 
 
 def error_bound(read: Sequence[Program]) -> float:

@@ -22,6 +22,7 @@ itself, so the spacing only matters for stock that is not part.
 from __future__ import annotations
 
 import math
+import queue
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,7 @@ from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
 MAX_LINES = 6_000_000
 BLOCK = 32
 EVENTS = 4096
+Spare = queue.SimpleQueue[NDArray[np.int64]]
 NEVER = -1e30
 ANOTHER_TOOL = 1e6  # mm
 
@@ -216,12 +218,14 @@ class StockPass:
 
     events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
     cut    : (m,) bool, moves that took stock
+    engaged : (m,) int64, sectors of the cutter that met stock (``kernels.engaged``)
     taken  : (m,) float64, mm³ by move, or None where that is not known
     """
 
     events: F64
     lost: int
     cut: NDArray[np.bool_]
+    engaged: NDArray[np.int64]
     taken: F64 | None = None
 
 
@@ -242,20 +246,22 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
     (steep, earned), cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
     skins = setup.plunge_skin * 2.0 * cutters[:, 0]
     nx, ny = field.height.shape
+    tables, spare = tables_for(threads, (len(moves),))
 
     def job(i: int, j: int) -> Callable[[], object]:
         def work() -> object:
-            events = np.empty((EVENTS, 7))
+            events, engaged = np.empty((EVENTS, 7)), spare.get()
             n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
                            field.fixed, moves.start, moves.end, moves.feed, steep, earned, moves.tool, cutters,
                            end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
-                           setup.gouge_tolerance, cut, events)
+                           setup.gouge_tolerance, cut, engaged, events)
+            spare.put(engaged)
             return events[:min(n, EVENTS)].copy(), n
         return work
 
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
     events, lost = gather(run_tiles([job(*b) for b in blocks], threads, progress))
-    return StockPass(events, lost, cut.astype(bool))
+    return StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables))
 
 
 def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
@@ -289,3 +295,14 @@ def gather(results: list[object]) -> tuple[F64, int]:
     lost = sum(p[1] - len(p[0]) for p in parts)
     order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
     return events[order], int(lost)
+
+
+def tables_for(threads: int, shape: tuple[int, ...]) -> tuple[list[NDArray[np.int64]], Spare]:
+    """A table of int64 zeros for each thread, and all of them in a queue that jobs take one from and put it back.
+
+    Put together by an operation that knows no order, they say the same whichever thread did what.
+    """
+    tables, spare = [np.zeros(shape, np.int64) for _ in range(max(1, threads))], Spare()
+    for table in tables:
+        spare.put(table)
+    return tables, spare

@@ -22,6 +22,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
+from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.heights import contact, overlap
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
@@ -76,10 +77,13 @@ def _box(p, z0, z1, wide):
 
 @njit(**KERNEL)
 def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, totals):
-    """Lower the nodes of one brick by piece p; adds to totals (volume, volume by the end); returns the new top."""
+    """Lower the nodes of one brick by piece p; adds to totals (volume, volume by the end, 1 where stock was touched).
+
+    Returns the new top and the sectors of the cutter that met stock.
+    """
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
     a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
-    top = -1e30
+    top, sectors = -1e30, np.int64(0)
     for i in range(i0, min(i0 + 4, tile[1])):
         for j in range(j0, min(j0 + 4, tile[3])):
             for k in range(k0, min(k0 + 4, tile[5])):
@@ -92,17 +96,21 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                         gone = (share(v, h) - share(d, h)) * h * h * h
                         if v > 0.0:
                             totals[2] = 1.0
+                            plan = math.sqrt(dx * dx + dy * dy)
+                            if d <= 0.0 and plan > 0.0 and qz - 0.5 * dz > LEAST_DEPTH * cutter[0]:
+                                sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h)
                         totals[0] += gone
                         if steep and (qx - 0.5 * dx) ** 2 + (qy - 0.5 * dy) ** 2 < end_radius * end_radius:
                             totals[1] += gone
                         v = d
                 top = max(top, v)
-    return top
+    return top, sectors
 
 
 @njit(**KERNEL)
 def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, totals):
-    """Lower the nodes of a tile by a cutting part on piece p."""
+    """Lower the nodes of a tile by a cutting part on piece p; returns the sectors of it that met stock."""
+    sectors = np.int64(0)
     box = _box(p, 0.0, cutter[2], cutter[0] + band)
     nx, ny, nz = tops.shape
     a0, a1 = _bricks(box[0] - band, box[3] + band, origin[0], h, tile[0], nx)
@@ -120,8 +128,10 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, total
                 qx, qy, qz, dx, dy, dz = view(p, x, y, origin[2] + (tile[4] + 4 * bk + 1.5) * h)
                 if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter[0], cutter[1], cutter[2]) - half >= top:
                     continue
-                tops[bi, bj, bk] = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep,
-                                              end_radius, totals)
+                tops[bi, bj, bk], met = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep,
+                                                   end_radius, totals)
+                sectors |= met
+    return sectors
 
 
 @njit(**KERNEL)
@@ -203,8 +213,9 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
     field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
-    taken : (m, 2) int64, 1e-9 mm³, added to: what each move takes, and what the end of a steep one does; whole numbers,
-            so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went
+    taken : (m, 3) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
+            so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went;
+            third the sectors of the cutter that met stock, put together bit by bit
 
     Returns the number of events found, which may exceed the table.
     """
@@ -230,10 +241,11 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         totals[:] = 0.0
+        sectors = np.int64(0)
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             if feed:
-                _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
+                sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
             else:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
             for b in range(body_first[k], body_first[k + 1]):
@@ -244,6 +256,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
+            taken[m, 2] |= sectors
             cuts += 1
             if cuts % 64 == 0:
                 changing = _solid(tops, band, solid)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
+from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.heights import INF, _cells, contact, lowest
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
@@ -49,15 +50,17 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 @njit(cache=True, nogil=True)
 def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
-    """Lower the lines under one feed move; returns whether any stock went."""
+    """Lower the lines under one feed move; returns whether any stock went, and the sectors of the cutter that met it.
+    """
     i0, i1, j0, j1 = box
     radius, corner, length = cutter
-    cut = False
+    cut, engaged = False, np.int64(0)
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
     flat, plan2 = radius - corner, d[0] * d[0] + d[1] * d[1]
     along = 1.0 / plan2 if plan2 > 0.0 else 0.0
+    plan = math.sqrt(plan2)
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
@@ -82,6 +85,10 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
                 continue
             height[i, j] = low
             cut = cut or gone > 1e-6
+            if gone > LEAST_DEPTH * radius and plan > 0.0:
+                over = low + gone - a[2] - s * d[2]
+                engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan, over, radius, corner,
+                                       step)
             if not steep:
                 continue
             if lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, 0.0, 0.0)[0] < INF:
@@ -90,7 +97,7 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
                 if dug[i - i0, j - j0] > skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
-    return cut
+    return cut, engaged
 
 
 @njit(cache=True, nogil=True)
@@ -144,12 +151,13 @@ def _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best):
 
 @njit(cache=True, nogil=True)
 def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds, steep, earned, tool, cutters,
-               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, events):
+               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, engaged, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
 
     steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
     rapid_grow : mm around everything in a rapid, none in a straight lift
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
+    engaged : (m,) int64, sectors of the cutter that met stock, added to
 
     Returns the number of events found, which may exceed the table.
     """
@@ -178,9 +186,11 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds,
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            if _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m], earned[m],
-                      since, dug, best):
+            went, sectors = _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
+                                   earned[m], since, dug, best)
+            if went:
                 cut[m] = 1
+                engaged[m] |= sectors
                 lowered += 1
                 if lowered % REFRESH == 0:
                     top = _top(height, fixed, i0, i1, j0, j1)

@@ -1,0 +1,63 @@
+"""How much of a cutter is in stock: angle of its front, by tool, and where that is above a limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from verify.findings import Source, chains, worst_of
+from verify.kernels.engaged import SECTORS, window_angles
+from verify.model import Engagement, Finding, FindingKind
+from verify.removal import Moves
+
+WINDOW = 0.5
+"""Share of the tool radius: way over which sectors are put together, as short moves meet few places of the stock."""
+RESOLUTION = 2 * math.pi / SECTORS
+"""rad: sectors at both ends of an engaged arc are counted whole."""
+
+
+def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
+    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``."""
+    length = np.linalg.norm(moves.end - moves.start, axis=1)
+    window = WINDOW * np.array([t.radius for t in tools])
+    return np.asarray(window_angles(bits, length, moves.tool, moves.feed, window))
+
+
+def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int, Engagement]:
+    """Largest engaged angle of each tool that met stock, and what 99 % of its way in stock stays under, by T number."""
+    length, out = np.linalg.norm(moves.end - moves.start, axis=1), {}
+    for k, tool in enumerate(tools):
+        own = np.flatnonzero((moves.tool == k) & (angle > 0.0))
+        if len(own) == 0:
+            continue
+        order = own[np.argsort(angle[own], kind="stable")]
+        way = np.cumsum(length[order])
+        out[tool.number] = Engagement(float(angle[order[-1]]),
+                                      float(angle[order[int(np.searchsorted(way, 0.99 * way[-1]))]]))
+    return out
+
+
+def engagement_findings(angle: F64, moves: Moves, source: Source, limits: Mapping[int, float]) -> list[Finding]:
+    """Where the engaged angle is above the limit of the tool, rad by T number; by neighbouring lines.
+
+    Angles are known to ``RESOLUTION``, so a finding needs more than the limit and that.
+    """
+    limit = np.array([limits.get(int(t), math.inf) for t in source.tool.tolist()])
+    bad = np.flatnonzero(angle > limit + RESOLUTION)
+    out = []
+    groups = chains(source.program[bad], source.line[bad], moves.end[bad], source.tool[bad])
+    for rows in worst_of(groups, angle[bad]):
+        m = int(bad[rows[0]])
+        lines = source.line[bad[rows]]
+        x, y, z = (round(float(v), 6) for v in moves.end[m])
+        span = "" if lines.min() == lines.max() else f", lines {lines.min()} to {lines.max()}"
+        out.append(Finding(FindingKind.ENGAGEMENT, source.names[source.program[m]], int(source.line[m]), None, None,
+                           (x, y, z), float(math.degrees(angle[m] - limit[m])), float(math.degrees(limit[m])),
+                           f"T{source.tool[m]}: {math.degrees(angle[m]):.0f} deg of the cutter are in stock (limit "
+                           f"{math.degrees(limit[m]):.0f} deg){span}", len(rows)))
+    return out
