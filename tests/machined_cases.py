@@ -36,7 +36,7 @@ class Machined:
     """A blank, the moves through it, and what is left, exactly.
 
     volume : mm³ left; cut : (n, 3) mm to (n,) mm, how far points are from what the tool takes, exact outside it
-    curved : mm, the greater curvature integrated over what is cut
+    curved : mm, the sum of both curvatures integrated over what is cut
     sloping : mm² of planes that do not lie along the grid; edges : mm of edges of what is left
     strays : mm, how far the path itself is from the one that the formula is about
     whole  : (n, 3) mm to (n,) mm, distance into the blank
@@ -129,7 +129,7 @@ def closed_slot() -> Machined:
     gone = 2 * half * (0.5 * math.pi * r**2 + 2 * r * (d - r)) + math.pi * r**2 * (2 * r / 3 + d - r)
     return Machined("slot with round ends", mill(2 * r, r), path([[-half, 0, 4], [-half, 0, -d], [half, 0, -d]]),
                     block(), LEFT - gone, lambda p: rounded_bottom(beside(p, half), p[:, 2] + d, 0.0, r),
-                    2 * math.pi * (half + d), SIDES + 4 * half + 2 * math.pi * r)
+                    2 * math.pi * (half + d + r), SIDES + 4 * half + 2 * math.pi * r)
 
 
 def rounded_bottom(rho: F64, h: F64, flat: float, corner: float) -> F64:
@@ -195,7 +195,7 @@ def bull_slot() -> Machined:
     a = r - q
     gone = (2 * half * (2 * r * (d - q) + 2 * a * q + 0.5 * math.pi * q**2) + math.pi * r**2 * (d - q)
             + math.pi * a**2 * q + 0.5 * math.pi**2 * q**2 * a + 2 * math.pi * q**3 / 3)
-    curved = 2 * half * math.pi + 2 * math.pi * (d - q) + math.pi**2 * r
+    curved = 2 * math.pi * (half + d - q) + math.pi**2 * r + 2 * math.pi * q
     return Machined("bull-nose slot", mill(2 * r, q), path([[-half, 0, 4], [-half, 0, -d], [half, 0, -d]]), block(),
                     LEFT - gone, lambda p: rounded_bottom(beside(p, half), p[:, 2] + d, a, q), curved,
                     SIDES + 4 * half + 2 * math.pi * r)
@@ -207,7 +207,7 @@ def plunge() -> Machined:
     return Machined("ball plunge", mill(2 * r, r), path([[*at, 5], [*at, -d]]), block(),
                     LEFT - math.pi * r**2 * (2 * r / 3 + d - r),
                     lambda p: rounded_bottom(np.hypot(*(p[:, :2] - at).T), p[:, 2] + d, 0.0, r),
-                    2 * math.pi * d, SIDES + 2 * math.pi * r)
+                    2 * math.pi * (d + r), SIDES + 2 * math.pi * r)
 
 
 def pivot() -> Machined:
@@ -220,7 +220,7 @@ def pivot() -> Machined:
     rim = math.sqrt(r * r - lift * lift)
     return Machined("turning about a ball", mill(2 * r, r), path(centre - r * axes, axes), block(),
                     LEFT - math.pi * d**2 * (3 * r - d) / 3, lambda p: np.linalg.norm(p - centre, axis=1) - r,
-                    2 * math.pi * d, SIDES + 2 * math.pi * rim, strays=r * (1 - math.cos(math.radians(0.25))))
+                    4 * math.pi * d, SIDES + 2 * math.pi * rim, strays=r * (1 - math.cos(math.radians(0.25))))
 
 
 def cone() -> Machined:

@@ -139,7 +139,7 @@ def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float
     values[:] = np.where(inside | (wide <= reach - step - half)[None], step, -step)
     row = np.nonzero(np.broadcast_to((wide <= far) & (wide > reach - step - half), values.shape))
     gap = nearest(tree, np.stack(row, -1) * step + origin, far + half)[0]
-    values[row] = np.where(inside[row], np.minimum(gap + reach, step), np.maximum(reach - gap, -step))
+    values[row] = np.clip(np.where(inside[row], reach + gap, reach - gap), -step, step)
 
 
 def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
