@@ -45,7 +45,9 @@ COLOURS: tuple[RGB, ...] = ((0.45, 0.0, 0.10), (0.86, 0.06, 0.06), (1.0, 0.52, 0
                             (0.55, 0.78, 1.0), (0.18, 0.48, 0.95), (0.06, 0.14, 0.58), (0.66, 0.66, 0.68))
 PALE: RGB = (0.93, 0.92, 0.89)
 HATCH: RGB = (0.36, 0.36, 0.40)
-MOST_RINGS = 5
+MOST_RINGS, RING = 5, 14  # and their radius, pixels
+MOST_TRIED = 200  # of equal places for a ring
+Box = tuple[float, float, float, float]
 INT8 = NDArray[np.int8]
 
 
@@ -79,11 +81,14 @@ class Measured:
         return np.array([-STEPS[1] * low, -STEPS[0] * low, -low, high, STEPS[0] * high, STEPS[1] * high])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mark:
-    """A place with a ring and words beside it; point in mm, frame of the part."""
+    """A place with a ring and words beside it.
 
-    point: tuple[float, float, float]
+    places : (k, 3) float64, mm, frame of the part, one or more that are as good: one that is seen gets the ring
+    """
+
+    places: F64
     text: str
     colour: RGB
 
@@ -108,10 +113,12 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
         x = k * (width + GUTTER)
         canvas = _painted(part, measured, classes, camera)
         sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
-        inside = [m for m in free if seen(canvas, camera, np.array([m.point]))[0]]
-        free = [m for m in free if m not in inside]
-        for mark in inside if k == 0 else [*inside, *free]:
-            _ring(pen, camera, mark, x, width, hidden=mark in free)
+        taken: list[Box] = []
+        for mark in list(free):
+            visible = mark.places[seen(canvas, camera, mark.places)]
+            if len(visible) or k == 1:
+                free.remove(mark)
+                _ring(pen, camera, mark, visible, x, width, taken)
         draw_triad(pen, camera, (x + 54, SIZE[1] - LEGEND - 54))
         draw_scale(pen, camera, (x + width - 24, SIZE[1] - LEGEND - 24))
     pen.text((20, 14), ascii_text(title), font=font(26), fill=bytes_of(INK))
@@ -130,6 +137,8 @@ def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> C
     shown = _class_of_pixels(canvas, camera, measured.samples, classes)
     table = np.array([*COLOURS, PALE], np.float32)  # -1, not judged, is the last
     solid = canvas.owner > 0
+    aside = solid & (shown < 0)
+    canvas.colour[aside] = 0.5 + 0.5 * canvas.colour[aside]  # less shade, so that it stays pale
     canvas.colour[solid] *= table[shown[solid]]
     y, x = np.nonzero(shown == UNCUT)
     stripe = (x + y) % 14 < 4
@@ -154,15 +163,38 @@ def _class_of_pixels(canvas: Canvas, camera: Camera, samples: SurfaceSamples, cl
 # --- words and signs -------------------------------------------------------------------------------------------
 
 
-def _ring(pen: ImageDraw.ImageDraw, camera: Camera, mark: Mark, left: int, width: int, *, hidden: bool) -> None:
-    x, y, _ = 0.5 * camera.screen(np.array(mark.point))
-    x, y = left + float(x), HEADER + float(y)
-    for radius, colour, line in ((15, WHITE, 5), (14, INK, 2)):
+def _ring(pen: ImageDraw.ImageDraw, camera: Camera, mark: Mark, visible: F64, left: int, width: int,
+          taken: list[Box]) -> None:
+    """A ring round a place and its words where no others stand; nothing where graver rings are at all places."""
+    places = visible if len(visible) else mark.places[:1]
+    spots = [(left + x - RING, HEADER + y - RING, left + x + RING, HEADER + y + RING)
+             for x, y, _ in (0.5 * camera.screen(places[::-(-len(places) // MOST_TRIED)])).tolist()]
+    apart = [spot for spot in spots if not any(_meet(spot, ring) for ring in taken[::2])]
+    if not apart:
+        return
+    here = next((spot for spot in apart if not any(_meet(spot, words) for words in taken[1::2])), apart[0])
+    x, y = here[0] + RING, here[1] + RING
+    for radius, colour, line in ((RING + 1, WHITE, 5), (RING, INK, 2)):
         pen.ellipse([x - radius, y - radius, x + radius, y + radius], outline=bytes_of(colour), width=line)
-    text = mark.text + (" (behind)" if hidden else "")
-    right = x < left + 0.6 * width
-    pen.text((x + 20 if right else x - 20, y - 14), ascii_text(text), font=font(16), anchor="lm" if right else "rm",
-             fill=bytes_of(mark.colour), stroke_width=3, stroke_fill=bytes_of(WHITE))
+    text = ascii_text(mark.text + ("" if len(visible) else " (behind)"))
+    for at, anchor in _beside(x, y, x < left + 0.6 * width):
+        box = pen.textbbox(at, text, font=font(16), anchor=anchor, stroke_width=3)
+        if not any(_meet(box, other) for other in taken):
+            break
+    pen.text(at, text, font=font(16), anchor=anchor, fill=bytes_of(mark.colour), stroke_width=3,
+             stroke_fill=bytes_of(WHITE))
+    taken += [here, box]
+
+
+def _beside(x: float, y: float, right: bool) -> list[tuple[tuple[float, float], str]]:
+    """Places for words beside a ring with their anchors, the side with more room first."""
+    sides = [(x + RING + 6, "lm"), (x - RING - 6, "rm")]
+    return [((at, y + down), anchor) for down in (0, -26, 26, -52, 52)
+            for at, anchor in (sides if right else sides[::-1])]
+
+
+def _meet(a: Box, b: Box) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _scale(pen: ImageDraw.ImageDraw, measured: Measured, x: int, y: int) -> None:
@@ -191,5 +223,5 @@ def _signs(pen: ImageDraw.ImageDraw, x: int, y: int) -> None:
         pen.line([(x + k, y + 14), (x + min(k + 12, 22), y + 2)], fill=bytes_of(HATCH), width=2)
     pen.rectangle([x, y + 23, x + 22, y + 35], fill=bytes_of(PALE), outline=grey)
     pen.ellipse([x + 3, y + 42, x + 19, y + 58], outline=bytes_of(INK), width=2)
-    for k, text in enumerate(("never reached by a cut", "not to be judged", "deepest gouge, most left")):
+    for k, text in enumerate(("never reached by a cut", "not to be judged", "deepest gouges, most left")):
         pen.text((x + 30, y + 21 * k), text, font=font(15), fill=bytes_of(INK))

@@ -87,16 +87,17 @@ def draw_proof(part: Part, samples: SurfaceSamples, proof: Proof, setup: ProofSe
     measured = Measured(samples, excess, proof.program >= 0, setup.scallop_height, setup.gouge_tolerance)
     gouges = sorted((f for f in proof.findings if f.kind == FindingKind.GOUGE and f.point is not None),
                     key=lambda f: -f.depth)
-    marks = [Mark(f.point, f"{f.depth:.3g} mm too deep{_at(f)}", COLOURS[1])
+    marks = [Mark(np.array([f.point]), f"{f.depth:.3g} mm too deep{_at(f)}", COLOURS[1])
              for f in gouges[:MOST_GOUGES] if f.point is not None]
     most, left = _most_left(samples, excess, proof, setup)
     if most is not None:
         marks.append(most)
     uncut = sum(f.uncut for f in proof.faces.values())
+    deepest = f"{gouges[0].depth:.3g} mm{_at(gouges[0])}" if gouges else \
+        f"none; {proof.gouge_max:.2g} mm is within tolerance"
     facts = {"state": f"{state}, {sum(proof.counts.values())} findings of the proof",
              "coverage": f"{100 * coverage:.2f} % within the budget",
-             "deepest gouge": f"{gouges[0].depth:.3g} mm{_at(gouges[0])}" if gouges else "none",
-             "most left": left, "never reached": f"{uncut:.1f} mm2 above the budget"}
+             "deepest gouge": deepest, "most left": left, "never reached": f"{uncut:.1f} mm2 above the budget"}
     draw_deviation(part, measured, marks, path, title, facts)
 
 
@@ -113,5 +114,5 @@ def _most_left(samples: SurfaceSamples, excess: F64, proof: Proof, setup: ProofS
     text = f"{max(float(excess[row]), 0.0):.3g} mm {capped}left"
     if excess[row] <= setup.scallop_height + 1e-6:
         return None, f"{text}, F{samples.face[row]}"
-    x, y, z = samples.points[row].tolist()
-    return Mark((x, y, z), f"{text}, F{samples.face[row]}", COLOURS[5]), f"{text}, F{samples.face[row]}"
+    equal = np.flatnonzero((excess >= excess[row] - 1e-9) & (samples.face == samples.face[row]))
+    return Mark(samples.points[equal], f"{text}, F{samples.face[row]}", COLOURS[5]), f"{text}, F{samples.face[row]}"
