@@ -21,7 +21,7 @@ BLANK = ProofSetup(StockKind.BOX, stock_box=np.array([[-20.0, -15, -10], [20, 15
 
 
 def side_cut(width, depth=2.0, tool=TOOL, cut=0.25, lean=0.0):
-    """Angles of moves that take ``width`` off the side Y- of the block, by lines or, where the tool leans, by the field."""
+    """Angles of moves that take ``width`` off a side of the block, by lines or, where the tool leans, by the field."""
     y = -15.0 - tool.radius + width
     x = np.arange(-24.0, 24.0, cut)
     points = np.column_stack([x, np.full(len(x), y), np.full(len(x), 0.5 - depth)])
