@@ -82,8 +82,7 @@ class MachinedPart(ReportModel):
     """machined.stl: the stock as all programs leave it, in the coordinates of the program."""
 
     file: str
-    access: Annotated[str, Field(description="Access direction of the programs; their coordinates are those of the "
-                                             "mesh.")]
+    access: Annotated[str, Field(description="Access direction whose coordinates the mesh has; of several the first.")]
     volume_mm3: Annotated[float, Field(description="What stands, in the window where one was asked for.")]
     step_mm: Annotated[float, Field(description="Distance of the nodes; wider than asked for where that would take "
                                                 "over 24 million.")]
@@ -117,10 +116,9 @@ class Report(Zones):
     reach_coverage: Annotated[Share | None, Field(description="The same / the area some tool can reach.")] = None
     machining_time_s: float | None = None
     tools: list[ToolUse]
-    deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number; of several accesses "
-                                                                "the least residual of a place counts.")] = []
-    machined: Annotated[list[MachinedPart], Field(description="Meshes of the machined part, one for each access, where "
-                                                              "they were asked for.")] = []
+    deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number, as all programs "
+                                                                "leave it.")] = []
+    machined: Annotated[MachinedPart | None, Field(description="The machined part, where it was asked for.")] = None
     files: list[ReportFile]
     version: str
 

@@ -30,9 +30,9 @@ from service.convert import check_plannable, check_spindle_tool, machine_kinemat
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
-from service.scoring import Score, score
+from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
-from service.sides import Side, file_name, in_first_frame, in_setup_frame, in_view_frame, joined_proofs, program_name
+from service.sides import Side, file_name, in_first_frame, in_setup_frame, nc_program
 from service.version import VERSION
 from toolpath.family import Target
 from toolpath.plan import CutData, Plan, PlanSettings, plan_job
@@ -52,13 +52,13 @@ STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
-PROGRAM_NAME = "program.linuxcnc.ngc"
+PREPARED, PLANNED, PROVED = 0.28, 0.75, 0.96  # shares of the work done
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
-    mesh : also write the machined part as a mesh, for each access that has a program
+    mesh : also write the machined part as a mesh, in the frame of the first access
 
     Returns
     -------
@@ -80,12 +80,17 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     sides: list[Side] = []
     for k, view in enumerate(ready.views):
         share = _Share(progress, k, len(ready.views))
-        sides.append(_side(ready, view, scored, checks, sum(len(s.made.steps) for s in sides), share))
-    progress("report", 0.96)
+        sides.append(_side(ready, view, checks, sum(len(s.made.steps) for s in sides), share))
     made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
-    proof = joined_proofs(sides, scored.samples, proof_setup(ready, ready.views[0]))
     zone, given_up = scored.without(made, ready.zones)
-    report, rest = reporting.job_report(ready, made, proof, scored.samples, scored.labels, zone, given_up)
+    first = ready.views[0]
+    programs = [nc_program(s, _access(ready, s.view).work_offset) for s in sides if s.made.steps]
+    proof = prove(programs, first.part, tool_bodies(setup), proof_setup(ready, first),
+                  ScoredSamples(scored.samples, zone), [z.id for z in ready.zones],
+                  lambda f: progress("prove", PLANNED + (PROVED - PLANNED) * f))
+    report, rest = reporting.job_report(ready, made, in_setup_frame(first, proof), scored.samples, scored.labels, zone,
+                                        given_up)
+    progress("report", PROVED)
     files: Files = {}
     if report["state"] == "proved":
         for s in sides:
@@ -97,15 +102,13 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     files["zones.json"] = ("zones", "", None, _json(reporting.zones_document(report)))
     _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
     files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
-    _deviation(ready, ready.views[0], scored.samples, in_view_frame(ready.views[0], proof), report, out / MAP_NAME)
+    _deviation(ready, first, scored.samples, proof, report, out / MAP_NAME)
     files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
-    for s in sides if mesh is not None else ():
-        if mesh is not None and s.made.steps:
-            name = file_name(s.view, "machined", "stl")
-            figures, data = machined_part(mesh, [(s.program_name, s.program)], s.view.part, tool_bodies(setup),
-                                          proof_setup(ready, s.view), lambda f: progress("mesh", 0.97 + 0.03 * f))
-            report["machined"].append({"file": name, "access": s.view.id, **figures})
-            files[name] = ("machined", "", s.view.id, data)
+    if mesh is not None and programs:
+        figures, data = machined_part(mesh, programs, first.part, tool_bodies(setup), proof_setup(ready, first),
+                                      lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
+        report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
+        files[MESH_NAME] = ("machined", "", None, data)
     _deliver(out, report, files)
     progress("done", 1.0)
     return report
@@ -122,34 +125,28 @@ def _deliver(out: Path, report: dict[str, Any], files: Files) -> None:
 
 
 class _Share:
-    """Progress of planning and proving one access of several: 0.28 to 0.95 shared out evenly."""
+    """Progress of planning one access of several: what there is to plan shared out evenly."""
 
     def __init__(self, progress: Progress, k: int, count: int) -> None:
-        self.progress, self.low, self.width = progress, 0.28 + 0.67 * k / count, 0.67 / count
+        width = (PLANNED - PREPARED) / count
+        self.progress, self.low, self.width = progress, PREPARED + width * k, width
 
     def tell(self, stage: str, share: float) -> None:
         """Report a share, 0 to 1, of this access."""
         self.progress(stage, self.low + self.width * share)
 
 
-def _side(ready: Prepared, view: View, scored: Score, checks: list[Target], steps: int, share: _Share) -> Side:
-    """Plan, write and prove the zones of one access. Each starts from the whole blank."""
+def _side(ready: Prepared, view: View, checks: list[Target], steps: int, share: _Share) -> Side:
+    """Plan and write the zones of one access, from the whole blank; the proof has what the accesses before leave."""
     stock = planning_stock(ready, view)
     settings = plan_settings(ready, view, stock)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                    lambda f: share.tell("plan", 0.55 * f), first_step=steps + 1)
-    share.tell("write", 0.56)
+                    lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1)
+    share.tell("write", 0.99)
     work = workplan(ready, view, made, settings)
-    program = write_linuxcnc(work) if made.steps else ""
-    zone, _ = scored.without(made, ready.zones)
-    name = program_name(view)
-    here = turned_samples(scored.samples, view.rotation @ view.first.T)
-    proof = prove([(name, program)] if made.steps else [], view.part, tool_bodies(ready.setup),
-                  proof_setup(ready, view), ScoredSamples(here, zone), [z.id for z in ready.zones],
-                  lambda f: share.tell("prove", 0.58 + 0.4 * f))
-    return Side(view, made, work, program, proof)
+    return Side(view, made, work, write_linuxcnc(work) if made.steps else "")
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, Any]:

@@ -185,7 +185,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
-        "tools": _tools(ready, proof), "deviation": deviation(proof), "machined": [], "files": [], "version": VERSION,
+        "tools": _tools(ready, proof), "deviation": deviation(proof), "machined": None, "files": [], "version": VERSION,
     }
     return report, rest
 

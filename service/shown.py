@@ -19,6 +19,7 @@ from service.deviation import COLOURS, Mark, Measured, draw_deviation
 from verify.machined import check_step, machined_stock, surface_error
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 from verify.progress import Report
+from verify.sequence import Given
 
 MESH_NAME, MAP_NAME = "machined.stl", "deviation.png"
 MOST_GOUGES = 4
@@ -56,7 +57,7 @@ class MeshWish:
         return cls(step, np.array(numbers).reshape(2, 3))
 
 
-def machined_part(wish: MeshWish, programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody],
+def machined_part(wish: MeshWish, programs: Sequence[Given], part: Part, tools: Sequence[ToolBody],
                   setup: ProofSetup, progress: Report, *, spindle_tool: int = 0) -> tuple[dict[str, Any], bytes]:
     """The machined part as figures for the report, file and access left out, and as a binary STL file.
 

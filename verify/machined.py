@@ -18,7 +18,7 @@ from verify.material import machined
 from verify.model import ProofSetup
 from verify.progress import Stages
 from verify.removal import BOW
-from verify.sequence import check_numbers, moves_of, read_all
+from verify.sequence import Given, check_numbers, moves_of, read_all
 from verify.stock import stock_bounds
 
 LEAST_STEP = 0.002
@@ -26,7 +26,7 @@ MOST_STEP = 5.0
 READ = 0.1  # share of the work done when the programs are read
 
 
-def machined_stock(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def machined_stock(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                    step: float, *, box: F64 | None = None, spindle_tool: int = 0, threads: int | None = None,
                    progress: Callable[[float], None] | None = None) -> Field:
     """What stands when all programs have run, one after the other, on one blank.

@@ -90,6 +90,21 @@ class ProofSetup:
 
 
 @dataclass(frozen=True, eq=False)
+class NcProgram:
+    """One program of a proof.
+
+    name, text  : of the program
+    turn        : (3, 3) float64, from the frame of the proof to that of the program (another side up); None: the same
+    work_offset : the one that is the zero of its frame; None: that of the setup
+    """
+
+    name: str
+    text: str
+    turn: F64 | None = None
+    work_offset: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class ScoredSamples:
     """The samples that coverage is counted on.
 

@@ -21,7 +21,6 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.fitness import limit_findings, notes_on, top_of_all, way_findings
 from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
 from verify.material import contacts
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
@@ -30,19 +29,19 @@ from verify.reader import Program
 from verify.removal import BOW, Moves, residual_on_normals
 from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
-from verify.sequence import check_numbers, moves_of, read_all, slides_of
+from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.stock import StockPass, stock_on_normals
 
 LEAST_REACH = 1.0
 READ, CUT, MET = 0.12, 0.5, 0.97  # shares of the work done when the programs are read, residuals and contacts known
 
 
-def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
           scored: ScoredSamples, zone_ids: Sequence[str], progress: Report | None = None, *,
           threads: int | None = None, spindle_tool: int = 0) -> Proof:
     """Prove finished NC programs against the part.
 
-    programs : (name, text) in the order they run, stock carried over
+    programs : NcProgram, or (name, text), in the order they run, stock carried over
     part     : Part in the setup frame, mm; tools : by T number
     setup    : ProofSetup
     scored   : ScoredSamples; zones may all be 0, then only gouges, contacts and limits are looked for
@@ -61,19 +60,18 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     ProgramError
         A program cannot be read; the subjects name the lines.
     VerificationError
-        Two tools share a number, a cutting part is impossible, samples and zones do not fit each other, or a program
-        leaves rotary zero.
+        Two tools share a number, a cutting part is impossible, or samples and zones do not fit each other.
 
     Notes
     -----
     A sample is proved where -gouge_tolerance <= residual - stock_allowance <= scallop_height. Residuals are
-    exact on the normal of each sample (error_bound); stock that is not part is seen on vertical lines.
+    exact on the normal of each sample (error_bound); stock that is not part is seen on vertical lines, or on a grid
+    where tools lean or programs run with another side up.
     """
     _check(tools, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
     stages = Stages(progress)
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
-    top = top_of_all(part.mesh.bounds, setup)
     moves, source = moves_of(read, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup,
@@ -82,12 +80,12 @@ def prove(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolB
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(read), *limit_findings(read, setup), *way_findings(read, top, setup),
+                *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
                 *_idle_findings(read, run, moves, source), *repeat_findings(moves, run.cut, source),
                 *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
-    notes.extend(note for p in read for note in notes_on(p, float(part.mesh.bounds[0, 2]), setup))
+    notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
                   met.spacing, tuple(notes))
@@ -141,19 +139,19 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     return out
 
 
-def _program_findings(read: Sequence[Program]) -> list[Finding]:
-    return [Finding(FindingKind.PROGRAM, p.name, r.line, None, None, None, 0.0, 0.0, r.message)
-            for p in read for r in p.remarks]
+def _program_findings(read: Sequence[Reading]) -> list[Finding]:
+    return [Finding(FindingKind.PROGRAM, p.program.name, r.line, None, None, None, 0.0, 0.0, r.message)
+            for p in read for r in p.program.remarks]
 
 
-def _idle_findings(read: Sequence[Program], run: StockPass, moves: Moves, source: Source) -> list[Finding]:
+def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source: Source) -> list[Finding]:
     """A program whose feed moves never meet the stock: another zero, or inch for mm."""
     out = []
     for number, p in enumerate(read):
         own = (source.program == number) & moves.feed
         if own.any() and not run.cut[own].any():
             m = int(np.flatnonzero(own)[0])
-            out.append(Finding(FindingKind.PROGRAM, p.name, int(source.line[m]), None, None, None, 0.0, 0.0,
+            out.append(Finding(FindingKind.PROGRAM, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
                                "no feed move meets the stock: is the unit, the zero or the tool another one?"))
     return out
 
@@ -165,9 +163,10 @@ def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids
                              s.area[bad], zone_ids, setup.scallop_height)
 
 
-def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, read: Sequence[Program], moves: Moves,
+def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[Reading], moves: Moves,
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...]) -> Proof:
+    read = [r.program for r in readings]
     length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
     fed = np.concatenate([p.minutes for p in read]) if read else length
     took = np.where(np.isnan(fed), length / setup.rapid_feed, fed)

@@ -1,8 +1,9 @@
-"""Programs one after the other: read, started from above, and as one list of moves."""
+"""Programs one after the other, each in its own frame: read, started from above, and as one list of moves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +13,49 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.findings import Source
-from verify.fitness import from_above, top_of_all
-from verify.model import ProofSetup
+from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
+from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.progress import Report, Stages
 from verify.reader import FEED, Program, read_program
 from verify.removal import Moves
+from verify.stock import stock_bounds
 from verify.toolaxes import ToolAxes
 
 BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
 BLEND_SHARE = 0.1
+Given = NcProgram | tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One program and what it is held against, all in its own frame.
+
+    program : as read; turn : (3, 3) float64 from the frame of the proof to that of the program, None: the same
+    setup   : of the proof, blank and fixtures as boxes round them where the frame is turned
+    bounds  : (2, 3) float64, mm, of the part; top : mm, what part, blank and fixtures do not exceed
+    """
+
+    program: Program
+    turn: F64 | None
+    setup: ProofSetup
+    bounds: F64
+    top: float
+
+    def findings(self) -> list[Finding]:
+        """Limits of the machine and ways that cannot be simulated, places in the frame of the proof."""
+        found = [*limit_findings([self.program], self.setup), *way_findings([self.program], self.top, self.setup)]
+        if self.turn is None:
+            return found
+        return [f if f.point is None else replace(f, point=tuple((np.array(f.point) @ self.turn).tolist()))
+                for f in found]
+
+    def notes(self) -> list[str]:
+        """What is no finding and should be known."""
+        return list(notes_on(self.program, float(self.bounds[0, 2]), self.setup))
+
+    def here(self, vectors: F64) -> F64:
+        """Places or directions (..., 3) of the program in the frame of the proof."""
+        return vectors if self.turn is None else np.asarray(vectors @ self.turn)
 
 
 def check_numbers(tools: Sequence[ToolBody]) -> None:
@@ -32,66 +67,96 @@ def check_numbers(tools: Sequence[ToolBody]) -> None:
                                 remedy="give every tool its own number")
 
 
-def read_all(programs: Sequence[tuple[str, str]], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-             spindle_tool: int, report: Report) -> list[Program]:
+def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+             spindle_tool: int, report: Report) -> list[Reading]:
     """Read programs in the order they run; a first descent that lacks only its height comes from above everything.
 
     programs, spindle_tool : as ``verify.prove.prove`` takes them, and errors as it raises them
     report   : called with the share read, 0 to 1
     """
-    stages, total, done = Stages(report), max(sum(len(text) for _, text in programs), 1), 0
-    above = top_of_all(part.mesh.bounds, setup) + setup.clearance_rapid
+    given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
+    stages, total, done = Stages(report), max(sum(len(p.text) for p in given), 1), 0
     read = []
-    for name, text in programs:
+    for nc in given:
+        own, bounds = _own(nc, part, setup)
+        top = top_of_all(bounds, own)
         program = read_program(
-            text, name=name, tools=frozenset(t.number for t in tools), work_offset=setup.work_offset,
+            nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
             blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
             gauge_length=setup.gauge_length, spindle_tool=spindle_tool,
-            report=stages.span(done / total, (done + len(text)) / total))
-        read.append(from_above(program, above))
-        done += len(text)
+            report=stages.span(done / total, (done + len(nc.text)) / total))
+        read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds, top))
+        done += len(nc.text)
     return read
 
 
-def moves_of(read: Sequence[Program], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
+def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]:
+    """Setup and bounds of the part, (2, 3) mm, as one program sees them."""
+    offset = nc.work_offset or setup.work_offset
+    if nc.turn is None:
+        return replace(setup, work_offset=offset), part.mesh.bounds
+    there = part.mesh.vertices @ nc.turn.T
+    own = replace(setup, work_offset=offset, stock_kind=StockKind.BOX, stock_cylinder=None,
+                  stock_box=_box_round(stock_bounds(part.mesh.bounds, setup), nc.turn),
+                  fixtures=tuple(_box_round(f, nc.turn) for f in setup.fixtures))
+    return own, np.stack([there.min(axis=0), there.max(axis=0)])
+
+
+def _box_round(box: F64, turn: F64) -> F64:
+    """(2, 3) box round a box turned by (3, 3)."""
+    corners = np.stack(np.meshgrid(*np.asarray(box, dtype=np.float64).T, indexing="ij"), -1).reshape(-1, 3) @ turn.T
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+def moves_of(read: Sequence[Reading], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
     """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them.
 
     tools : of the moves; ``Moves.tool`` is the place in it
     """
+    programs = [r.program for r in read]
     row = {t.number: i for i, t in enumerate(tools)}
-    number = np.concatenate([p.tool for p in read]) if read else np.zeros(0, np.int32)
-    known = _known(read, tools) if read else np.zeros(0, np.bool_)
-    start = np.concatenate([p.start for p in read])[known] if read else np.zeros((0, 3))
-    end = np.concatenate([p.end for p in read])[known] if read else np.zeros((0, 3))
-    kind = np.concatenate([p.kind for p in read])[known] if read else np.zeros(0, np.int8)
-    line = np.concatenate([p.line for p in read])[known] if read else np.zeros(0, np.int32)
-    program = np.repeat(np.arange(len(read), dtype=np.int32), [len(p) for p in read])[known]
-    number = number[known]
-    tool = np.array([row[int(n)] for n in np.unique(number)], np.int32)[np.searchsorted(np.unique(number), number)] \
-        if len(number) else np.zeros(0, np.int32)
+    known = _known(read, tools)
+    number = np.concatenate([np.zeros(0, np.int32), *(p.tool for p in programs)])[known]
+    kind = np.concatenate([np.zeros(0, np.int8), *(p.kind for p in programs)])[known]
+    line = np.concatenate([np.zeros(0, np.int32), *(p.line for p in programs)])[known]
+    start = np.concatenate([np.zeros((0, 3)), *(r.here(r.program.start) for r in read)])[known]
+    end = np.concatenate([np.zeros((0, 3)), *(r.here(r.program.end) for r in read)])[known]
+    which = np.repeat(np.arange(len(read), dtype=np.int32), [len(p) for p in programs])[known]
+    numbers, place = np.unique(number, return_inverse=True)
+    tool = np.array([row[int(n)] for n in numbers], np.int32)[place.reshape(-1)]
     axes = None
-    if any(p.poses is not None for p in read):
-        axes = ToolAxes.between(np.concatenate([_axes(p, True) for p in read])[known],
-                                np.concatenate([_axes(p, False) for p in read])[known])
-    moves = Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool, axes)
-    return moves, Source(tuple(p.name for p in read), program, line, number)
+    if any(r.turn is not None or r.program.poses is not None for r in read):
+        axes = ToolAxes.between(np.concatenate([_axes(r, True) for r in read])[known],
+                                np.concatenate([_axes(r, False) for r in read])[known])
+    return (Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool, axes),
+            Source(tuple(p.name for p in programs), which, line, number))
 
 
-def slides_of(read: Sequence[Program], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
-    """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them; None where no table turns."""
-    if setup.kinematics is None or not setup.dogleg or all(p.poses is None for p in read):
+def slides_of(read: Sequence[Reading], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
+    """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them.
+
+    None where they lie along the frame throughout, or no rapid asks for them.
+    """
+    if not setup.dogleg or all(r.turn is None and r.program.poses is None for r in read):
         return None
-    turn = np.concatenate([np.zeros((len(p), 2)) if p.poses is None else p.poses.start_turn for p in read])
-    return setup.kinematics.slides(turn[_known(read, tools)])
+    out = []
+    for r in read:
+        rows = np.tile(np.eye(3), (len(r.program), 1, 1))
+        if setup.kinematics is not None and r.program.poses is not None:
+            rows = setup.kinematics.slides(r.program.poses.start_turn)
+        out.append(r.here(rows))
+    return np.concatenate(out)[_known(read, tools)]
 
 
-def _known(read: Sequence[Program], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+def _known(read: Sequence[Reading], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
     """(m,) bool: moves with a tool of the table in the spindle."""
-    return np.isin(np.concatenate([p.tool for p in read]), [t.number for t in tools])
+    number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
+    return np.isin(number, [t.number for t in tools])
 
 
-def _axes(p: Program, at_start: bool) -> F64:
-    """(m, 3) tool axes of a program at the start or the end of its moves."""
+def _axes(r: Reading, at_start: bool) -> F64:
+    """(m, 3) tool axes of a program at the start or the end of its moves, in the frame of the proof."""
+    p = r.program
     if p.poses is None:
-        return np.tile([0.0, 0.0, 1.0], (len(p), 1))
-    return p.poses.start_axis if at_start else p.poses.end_axis
+        return r.here(np.tile([0.0, 0.0, 1.0], (len(p), 1)))
+    return r.here(p.poses.start_axis if at_start else p.poses.end_axis)
