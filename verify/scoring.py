@@ -58,7 +58,9 @@ def face_proofs(samples: SurfaceSamples, residual: F64, reached: BOOL, proved: B
     order = np.argsort(samples.face, kind="stable")
     numbers, first = np.unique(samples.face[order], return_index=True)
     out = {}
-    for number, own in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+    ends = [*first[1:].tolist(), len(order)]
+    for number, a, b in zip(numbers.tolist(), first.tolist(), ends[:len(first)], strict=True):
+        own = order[a:b]
         area = samples.area[own]
         total, good = float(area.sum()), float(area[proved[own]].sum())
         out[number] = FaceProof(number, total, *_left(residual[own], setup.stock_allowance), _deepest(residual[own]),

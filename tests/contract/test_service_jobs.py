@@ -28,7 +28,8 @@ def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish
     assert set(client.get(job["links"]["zones"]).json()) == {"part", "walls", "connections", "channels", "zones",
                                                             "remainder"}
     files = client.get(job["links"]["files"]).json()
-    assert [f["name"] for f in files["items"]] == ["job.stpnc", "program.linuxcnc.ngc", "report.json", "zones.json"]
+    assert [f["name"] for f in files["items"]] == ["deviation.png", "job.stpnc", "program.linuxcnc.ngc", "report.json",
+                                                   "zones.json"]
     assert files["withheld"] is None
     for item in files["items"]:
         got = client.get(item["href"])
@@ -64,12 +65,33 @@ def test_programs_of_an_unproved_job_are_withheld_with_the_finding(client, post,
     job = finish(client, post(client, "gouge").json())
     assert job["state"] == "unproved"
     files = client.get(job["links"]["files"]).json()
-    assert [f["name"] for f in files["items"]] == ["report.json", "zones.json"]
+    assert [f["name"] for f in files["items"]] == ["deviation.png", "report.json", "zones.json"]
     assert "gouge" in files["withheld"]
-    for name in ("program.linuxcnc.ngc", "job.stpnc"):
+    # those that are there, and those that are not: which of them were written is nobody's business
+    for name in ("program.linuxcnc.ngc", "program.A2.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "job.A2.stpnc"):
+        for headers in ({}, {"If-None-Match": "*"}, {"Range": "bytes=0-9"}):
+            answer = client.get(f"{job['links']['files']}/{name}", headers=headers)
+            assert answer.status_code == 409 and answer.json()["code"] == "program_withheld"
+            assert answer.headers["content-type"].startswith("application/problem+json")
+            assert answer.json()["measured"][0]["kind"] == "gouge" and "gouge" in answer.json()["detail"]
+        assert client.head(f"{job['links']['files']}/{name}").status_code == 409
+    assert client.get(job["links"]["report"]).json()["findings"][0]["kind"] == "gouge"
+
+
+def test_no_name_leads_round_the_withholding(client, post, finish):
+    job = finish(client, post(client, "gouge").json())
+    for name in ("state", "..%2Fprogram.linuxcnc.ngc", "%2e%2e%2fstate", "PROGRAM.linuxcnc.ngc",
+                 "program.linuxcnc.ngc%00.png", "program%2Elinuxcnc%2Engc", "./program.linuxcnc.ngc"):
         answer = client.get(f"{job['links']['files']}/{name}")
-        assert answer.status_code == 409 and answer.json()["code"] == "program_withheld"
-        assert answer.json()["measured"][0]["kind"] == "gouge"
+        assert answer.status_code in (404, 409) and b"G21" not in answer.content, name
+
+
+def test_the_deviation_map_is_a_file_of_plans_and_verifications(client, post, finish):
+    for job in (finish(client, post(client, "gouge").json()),
+                finish(client, post(client, path="/v1/verifications", program=b"(GOUGE)\nM2\n").json())):
+        assert "deviation.png" in [f["name"] for f in client.get(job["links"]["files"]).json()["items"]]
+        answer = client.get(f"{job['links']['files']}/deviation.png")
+        assert answer.status_code == 200 and answer.headers["content-type"] == "image/png"
 
 
 def test_zones_and_verifications_are_jobs_too(client, post, finish):

@@ -178,3 +178,39 @@ def test_family_writes_three_files_a_part_and_lists_them(drawn, tmp_path):
 def test_family_says_what_it_cannot_draw(drawn, tmp_path, args, code):
     got = call("family", *args, "--out", tmp_path / "parts")
     assert got.exit_code == 2 and code in got.stderr and got.stdout == ""
+
+
+def test_what_a_verification_found_is_said_in_words():
+    from service.console import verification_summary
+
+    findings = [{"kind": "gouge", "line": 40, "message": "T1 cuts 0.2 mm"},
+                {"kind": "gouge", "line": 12, "message": "T1 cuts 0.1 mm"},
+                {"kind": "coverage", "line": 0, "message": "coverage 0.5 is below"}]
+    text = verification_summary({
+        "state": "unproved", "findings": findings, "finding_counts": {"coverage": 1, "gouge": 7}, "coverage": 0.5,
+        "gouge_max_mm": 0.2, "machined": {"volume_mm3": 12.5, "step_mm": 0.2}, "files": [{"name": "deviation.png"}]},
+        3.21)
+    assert text.splitlines() == [
+        "unproved: 8 findings", "  coverage      1  coverage 0.5 is below",
+        "  gouge         7  line 12: T1 cuts 0.1 mm",
+        "  coverage   50.00 % of the judged area within the budget", "  deepest    0.2 mm cut into the part",
+        "  machined   12.5 mm3 stand, nodes 0.2 mm apart", "  files      deviation.png, report.json",
+        "  took       3.2 s"]
+    assert verification_summary({"state": "proved", "findings": []}, 1.0).startswith("proved: no findings\n")
+
+
+def test_a_mesh_is_made_when_it_is_asked_for(chain, files):
+    plan = ("plan", files / "p.step", "--setup", files / "s.json", "--out", files / "out")
+    assert call(*plan).exit_code == 0 and chain.mesh is None
+    assert call(*plan, "--mesh-step", "0.1").exit_code == 0 and chain.mesh.step == 0.1 and chain.mesh.box is None
+    got = call(*plan, "--mesh-box", "0,0,0,1,1,1")
+    assert got.exit_code == 2 and "box_without_step" in got.stderr
+    verify = ("verify", files / "p.step", "--setup", files / "s.json", "--program", files / "x.ngc")
+    assert call(*verify).exit_code == 0 and chain.out is None and chain.mesh is None
+    assert call(*verify, "--out", files / "v", "--mesh-box", "0,0,0,1,1,1").exit_code == 0
+    assert chain.out == files / "v" and chain.mesh.step == 0.2 and chain.mesh.box.tolist() == [[0, 0, 0], [1, 1, 1]]
+
+
+def test_stdout_of_a_verification_is_the_report_alone(chain, files):
+    got = call("verify", files / "p.step", "--setup", files / "s.json", "--program", files / "x.ngc")
+    assert json.loads(got.stdout) == chain.answer and "proved: no findings" in got.stderr

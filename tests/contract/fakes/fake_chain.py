@@ -49,6 +49,7 @@ def plan(part_path, setup, out, progress):
     # also where it should not be: the service itself must withhold it
     (out / "program.linuxcnc.ngc").write_text("%\nG21\nM2\n%\n")
     (out / "job.stpnc").write_text("ISO-10303-21;\n")
+    (out / "deviation.png").write_bytes(b"\x89PNG of the fake")
     report = _report(setup, state, findings)
     (out / "zones.json").write_text(__import__("json").dumps(
         {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}))
