@@ -253,6 +253,7 @@ class _Finish:
         self.step: str | None = None
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
+        self.walked: set[bytes] = set()
 
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingstep of the zone; none where no pass is walked."""
@@ -306,12 +307,19 @@ class _Finish:
         for line in lines:
             if name not in DRAGGED:
                 line = _turned(line, settings)
-            before = len(linker.trajectories)
+            key = (np.round(line.points, 5) + 0.0).tobytes()
+            if key in self.walked:  # what it left, it leaves again
+                continue
+            before, last = len(linker.trajectories), 0
             for layer in zigzag.skimmed(line, self.stock, tool, skin, slope):
+                last = len(linker.trajectories)
                 linker.add(layer, thin)
-            for t in linker.trajectories[before:]:
-                if t.motion is Motion.CUT:
-                    self.residual.cut(t.points, tool)
+            cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
+            for points in cuts:
+                self.residual.cut(points, tool)
+            whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
+            if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
+                self.walked.add(key)
 
 
 def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
