@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from geometry.stl import read_stl
-from schemas.report import Verification
+from schemas.report import Report, Verification
 from service.cli import app
 from tests.step_files import write_step
 
@@ -109,3 +109,20 @@ def test_the_folder_of_a_plan_is_left_alone(part, tmp_path):
     got = verify(part, tmp_path, SLOT.format(z=2), "--out", str(out))
     assert got.exit_code == 2 and "out_holds_a_job" in got.stderr
     assert (out / "program.linuxcnc.ngc").read_text() == "%\n%\n"
+
+
+def test_a_planned_job_has_a_mesh_when_it_is_asked_for(part, tmp_path):
+    (tmp_path / "setup.json").write_text(json.dumps(SETUP))
+    got = CliRunner().invoke(app, ["plan", str(part), "--setup", str(tmp_path / "setup.json"), "--out",
+                                   str(tmp_path / "out"), "--mesh-step", "0.2"])
+    report = json.loads(got.stdout)
+    Report.model_validate(report)
+    (made,) = report["machined"]
+    assert got.exit_code == 0 and (made["file"], made["access"]) == ("machined.stl", "A1")
+    mesh = read_stl(tmp_path / "out" / "machined.stl")
+    # the part is 16 x 12 x 4 mm less a step of 8 x 12 x 2; nothing machines its underside
+    assert mesh.volume == pytest.approx(16 * 12 * 4 - 8 * 12 * 2 + 16 * 12 * 0.5, rel=0.06)
+    assert made["file"] in {f["name"] for f in report["files"]}
+    top = mesh.vertices[(mesh.vertices[:, 0] > 9) & (mesh.vertices[:, 0] < 15) & (mesh.vertices[:, 2] > 3.0)
+                        & (np.abs(mesh.vertices[:, 1] - 6) < 5)]
+    assert np.abs(top[:, 2] - 4.0).max() < 0.06

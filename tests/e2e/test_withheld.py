@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
+from schemas.report import Report
 from service import chain
 from service.app import create_app
 from service.cli import app
@@ -80,6 +81,9 @@ def test_over_http_the_answer_is_the_finding(part, tmp_path, monkeypatch):
         assert job["state"] == "unproved", job
         report = client.get(job["links"]["report"]).json()
         found = the_gouge(report["findings"])
+        Report.model_validate(report)
+        assert max(d["gouge_mm"] for d in report["deviation"]) == pytest.approx(0.5, abs=0.01)
+        assert report["machined"] == []
         listed = client.get(job["links"]["files"]).json()
         names = {f["name"] for f in listed["items"]}
         assert names == {"report.json", "zones.json", "preview.png", "deviation.png"} and "gouge" in listed["withheld"]
