@@ -117,29 +117,35 @@ def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: flo
     run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads,
               None if progress is None else lambda f: progress(0.2 * f))
     tree = TriangleTree(mesh)
-    half = 0.5 * math.sqrt(3.0) * 3.0 * step
 
     def slab(i: int) -> Callable[[], object]:
         at = origin + [i * step, 0.0, 0.0]
-        return lambda: _grown_slab(values[i:i + 4], inside[i:i + 4], at, step, tree, reach, half)
+        return lambda: _grown_slab(values[i:i + 4], inside[i:i + 4], at, step, tree, reach)
 
     run_tiles([slab(i) for i in range(0, len(values), 4)], threads,
               None if progress is None else lambda f: progress(0.2 + 0.8 * f))
 
 
-def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float, tree: TriangleTree, reach: float,
-                half: float) -> None:
-    """Four layers of nodes: bricks of 4 are wholly stock, wholly not, or looked up node by node."""
-    _, ny, nz = values.shape
-    j, k = np.arange(0, ny, 4), np.arange(0, nz, 4)
-    centre = np.stack(np.meshgrid([1.5], j + 1.5, k + 1.5, indexing="ij"), -1).reshape(-1, 3) * step + origin
-    far = reach + step + half
-    away = nearest(tree, centre, far)[0].reshape(len(j), len(k))
-    wide = np.repeat(np.repeat(away, 4, axis=0), 4, axis=1)[:ny, :nz]
-    values[:] = np.where(inside | (wide <= reach - step - half)[None], step, -step)
-    row = np.nonzero(np.broadcast_to((wide <= far) & (wide > reach - step - half), values.shape))
-    gap = nearest(tree, np.stack(row, -1) * step + origin, far + half)[0]
-    values[row] = np.clip(np.where(inside[row], reach + gap, reach - gap), -step, step)
+def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float, tree: TriangleTree,
+                reach: float) -> None:
+    """Four layers of nodes: bricks of 4, then of 2, are wholly stock, wholly not, or looked up node by node."""
+    # where the margin is a step or more, whatever is inside the part is a step from the air
+    unsure = ~inside if reach >= step else np.ones_like(inside)
+    values[:] = step
+    for size in (4, 2):
+        half = 0.5 * math.sqrt(3.0) * (size - 1) * step
+        asked = np.logical_or.reduceat(unsure, np.arange(0, unsure.shape[0], size), axis=0)
+        for axis in (1, 2):
+            asked = np.logical_or.reduceat(asked, np.arange(0, unsure.shape[axis], size), axis=axis)
+        gap = np.full(asked.shape, reach)
+        centres = (np.argwhere(asked) * size + 0.5 * (size - 1)) * step + origin
+        gap[asked] = nearest(tree, centres, reach + step + half)[0]
+        for axis, count in enumerate(unsure.shape):
+            gap = np.repeat(gap, size, axis=axis).take(np.arange(count), axis=axis)
+        values[unsure & ~inside & (gap > reach + step + half)] = -step
+        unsure &= (gap <= reach + step + half) & (gap >= reach - step - half)
+    gap = nearest(tree, np.argwhere(unsure) * step + origin, reach + step)[0]
+    values[unsure] = np.clip(np.where(inside[unsure], reach + gap, reach - gap), -step, step)
 
 
 def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
