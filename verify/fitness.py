@@ -22,8 +22,13 @@ RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from de
 
 def top_of_all(bounds: F64, setup: ProofSetup) -> float:
     """Height that neither part (bounds (2, 3), mm), stock nor fixtures exceed before the first cut, mm."""
-    return max(float(bounds[1, 2]), float(stock_bounds(bounds, setup)[1, 2]), *(float(f[1, 2]) for f in setup.fixtures),
-               -np.inf)
+    return _top_along(np.array([0.0, 0.0, 1.0]), bounds, setup)
+
+
+def _top_along(axis: F64, bounds: F64, setup: ProofSetup) -> float:
+    """How far along a direction (3,) the boxes round part, blank and fixtures reach, mm."""
+    boxes = [bounds, stock_bounds(bounds, setup), *(np.asarray(f, dtype=np.float64) for f in setup.fixtures)]
+    return max(float(np.where(axis > 0, b[1] * axis, b[0] * axis).sum()) for b in boxes)
 
 
 def from_above(program: Program, height: float) -> Program:
@@ -40,12 +45,13 @@ def from_above(program: Program, height: float) -> Program:
     return replace(program, start=start, minutes=minutes)
 
 
-def way_findings(read: Sequence[Program], top: float, setup: ProofSetup) -> list[Finding]:
+def way_findings(p: Program, bounds: F64, setup: ProofSetup) -> list[Finding]:
     """Ways that cannot be simulated and are not clear above everything, and stops below it.
 
-    top : mm, as ``top_of_all``
+    bounds : (2, 3) mm, of the part
     """
-    return [found for p in read for found in (*_blind(p, top, setup), *_doglegs(p, top, setup), *_low_stops(p, top))]
+    top = top_of_all(bounds, setup)
+    return [*_blind(p, top, setup), *_doglegs(p, top, setup), *_low_stops(p, bounds, setup)]
 
 
 def _blind(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
@@ -79,12 +85,17 @@ def _doglegs(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
                        len(bad))
 
 
-def _low_stops(p: Program, top: float) -> Iterator[Finding]:
+def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
+    """Stops at which part, blank or fixtures reach higher along the tool than its tip."""
     for stop in p.stops:
-        if stop.z < top - 1e-6:
-            yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - stop.z, top,
-                          f"{stop.what} with T{stop.tool} at Z{stop.z:.3f}, below the top of stock and fixtures "
-                          f"(Z{top:.3f}): lift the tool first")
+        axis = np.array(stop.axis)
+        top = _top_along(axis, bounds, setup)
+        at = float(np.where(axis != 0.0, np.array(stop.tip) * axis, 0.0).sum())
+        if at < top - 1e-6:
+            along = f"Z{at:.3f}, below the top of stock and fixtures (Z{top:.3f})" if stop.axis[2] == 1.0 else \
+                f"{at:.3f} mm along its axis, to which stock and fixtures reach {top:.3f} mm"
+            yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - at, top,
+                          f"{stop.what} with T{stop.tool} at {along}: lift the tool first")
 
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:

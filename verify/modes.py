@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
+import numpy as np
+
 from verify.kinematics import Kinematics
 from verify.log import Log
 from verify.program import NAN, Stop
@@ -126,11 +128,14 @@ class Modes(Rotary):
         self.assumed = tuple(words)
 
     def stop(self, what: str) -> None:
-        """Note the height at which the program stops, if it is known."""
+        """Note where the program stops, if its height, or off the axis Z its place, is known."""
         s = self.s
-        z = self._tip()[2]
-        if not math.isnan(z) and s.tool > 0:
-            self.log.stops.append(Stop(self.log.line, what, s.tool, z))
+        x, y, z = self._tip()
+        up = (0.0, 0.0, 1.0)
+        if s.tilted and self.machine is not None:
+            up = tuple(self.machine.axis(np.radians([s.turn]))[0].tolist())
+        if s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z):
+            self.log.stops.append(Stop(self.log.line, what, s.tool, (x, y, z), up))
 
     def _motion(self, g: float) -> None:
         """A cycle begun anew keeps nothing of the one before."""

@@ -23,12 +23,16 @@ class Remark:
 
 @dataclass(frozen=True)
 class Stop:
-    """Where the program stops to change the tool, or ends: line, what it is, tool in the spindle and its height, mm."""
+    """Where the program stops to change the tool, or ends: line, what it is, tool in the spindle, its tip and its axis.
+
+    tip, axis : (3,) mm and unit, tip to spindle, setup frame; X and Y of the tip may be nan where the axis is +Z
+    """
 
     line: int
     what: str
     tool: int
-    z: float
+    tip: tuple[float, float, float]
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,18 +32,17 @@ class Reading:
 
     program : as read; turn : (3, 3) float64 from the frame of the proof to that of the program, None: the same
     setup   : of the proof, blank and fixtures as boxes round them where the frame is turned
-    bounds  : (2, 3) float64, mm, of the part; top : mm, what part, blank and fixtures do not exceed
+    bounds  : (2, 3) float64, mm, of the part
     """
 
     program: Program
     turn: F64 | None
     setup: ProofSetup
     bounds: F64
-    top: float
 
     def findings(self) -> list[Finding]:
         """Limits of the machine and ways that cannot be simulated, places in the frame of the proof."""
-        found = [*limit_findings([self.program], self.setup), *way_findings([self.program], self.top, self.setup)]
+        found = [*limit_findings([self.program], self.setup), *way_findings(self.program, self.bounds, self.setup)]
         if self.turn is None:
             return found
         return [f if f.point is None else replace(f, point=tuple((np.array(f.point) @ self.turn).tolist()))
@@ -85,7 +84,7 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
             blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
             gauge_length=setup.gauge_length, spindle_tool=spindle_tool,
             report=stages.span(done / total, (done + len(nc.text)) / total))
-        read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds, top))
+        read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read
 
