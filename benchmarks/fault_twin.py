@@ -96,8 +96,8 @@ class Twin:
                cutter: F64) -> tuple[dict[int, float], F64]:
         """Depths by line of points of meshes in shapes (k, 5), or in a cutter (3,) where there are none; mm."""
         upright = self.case.mode == Mode.UPRIGHT
-        points = np.vstack([thinned(cloud(m, 0.3), 0.3) for m in meshes])
-        step, depth, where = 0.4, {}, np.zeros(3)
+        points = np.vstack([thinned(cloud(m, 0.3), 0.4) for m in meshes])
+        step, depth, where = 0.6, {}, np.zeros(3)
         for near in (0.9, 0.15, 0.0):
             poses = self.way.poses(rows, step)
             best, which = touch(poses.tip, poses.axis, points, shapes, cutter, upright)
@@ -111,8 +111,9 @@ class Twin:
                     line = int(self.way.line[move])
                     depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
                 break
-            rows = np.flatnonzero(per_move > best.max() - max(0.12 * best.max(), 0.3 * near + 0.02))
-            keep = best > best.max() - 0.3 * near - 0.02
+            rough = 0.5 if near > 0.5 else 0.065
+            rows = np.flatnonzero(per_move > best.max() - max(0.12 * best.max(), rough))
+            keep = best > best.max() - rough
             seeds = np.unique(points[which[keep]].round(3), axis=0)
             worst_first = np.linalg.norm(seeds - where, axis=1).argsort()[:12]
             points = np.vstack([cloud(m, near / 9.0, seeds[worst_first], near) for m in meshes])
@@ -137,7 +138,10 @@ class Twin:
         cutter = np.array([body.radius, body.corner_radius, body.flute_length])
         poses, upright = self.way.poses(rows, 0.1), self.case.mode == Mode.UPRIGHT
         margin = body.radius + 0.3
-        low, high = poses.tip.min(axis=0) - margin, poses.tip.max(axis=0) + [margin, margin, body.flute_length]
+        low, high = poses.tip.min(axis=0) - margin, poses.tip.max(axis=0) + margin + body.flute_length
+        if upright:  # whatever stands over the end of the tool is in its way
+            low, high = np.append(low[:2] + 0.3, low[2] + margin), np.append(high[:2] - body.flute_length, high[2])
+            high[2] = self.case.blank_top
         points, step = _grid(low, high, max(0.25, float(np.cbrt(np.prod(high - low) / 400_000)))), 0.0
         most, where = -1.0, np.zeros(3)
         for fine in (0.08, 0.02, 0.0):
@@ -315,7 +319,8 @@ def touch(tips, axes, points, shapes, cutter, upright):
             h = x * ux + y * uy + z * uz
             rho = np.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
             if len(shapes) == 0:
-                d = _in_cutter(rho, h, cutter[0], cutter[1], cutter[2], upright)
+                # over a tool along Z everything stands in its way, however long the flutes are
+                d = _in_cutter(rho, h, cutter[0], cutter[1], 1e9 if upright else cutter[2], upright)
                 if d > best[m]:
                     best[m], which[m] = d, i
             for k in range(len(shapes)):
