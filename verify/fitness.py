@@ -86,7 +86,10 @@ def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
 
 
 def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it."""
+    """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it.
+
+    To blame is the end that lies further from most of the program: one word without its point is the line named.
+    """
     if setup.travel is None or len(p) == 0:
         return
     lengths = {int(t): setup.gauge_length.get(int(t), 0.0) for t in np.unique(p.tool)}
@@ -98,7 +101,9 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
             ends = " to ".join(f"{p.end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
             more = f" and tool lengths from {lengths[int(p.tool[low])]:g} to {lengths[int(p.tool[high])]:g} mm" \
                 if axis == 2 and any(lengths.values()) else ""
-            yield _finding(FindingKind.LIMIT, p, max(low, high), span - limit, limit,
+            middle = float(np.median(spindle[:, axis]))
+            far = low if middle - spindle[low, axis] > spindle[high, axis] - middle else high
+            yield _finding(FindingKind.LIMIT, p, far, span - limit, limit,
                            f"the program moves over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
                            f"travels {limit:g} mm")
 
