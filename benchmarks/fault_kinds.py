@@ -84,9 +84,12 @@ def gouge(case: Case, rng: np.random.Generator) -> Planted:
     """One point of a finishing pass 0.01 mm too deep."""
     step = _pick(rng, _finishing(case))
     assert step.normal is not None
-    bad = _edit(case, step.row, f"G1 {place_words(case.mode, step.tip - 0.01 * step.normal, step.turn)}")
-    then = _after(case, step)
-    return _gouged(bad, twin_of(bad).gouge({step.row + 1, then.row + 1 if then else 0}))
+    then, dip = _after(case, step), 0.01
+    for _ in range(2):  # what a scallop had left there comes on top
+        bad = _edit(case, step.row, f"G1 {place_words(case.mode, step.tip - dip * step.normal, step.turn)}")
+        found = twin_of(bad).gouge({step.row + 1, then.row + 1 if then else 0})
+        dip += 0.01 - found.depth
+    return _gouged(bad, found)
 
 
 def _rotary(case: Case, rng: np.random.Generator, change: Callable[[float, float], tuple[float, float]]) -> Planted:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -96,7 +97,7 @@ class Twin:
                cutter: F64) -> tuple[dict[int, float], F64]:
         """Depths by line of points of meshes in shapes (k, 5), or in a cutter (3,) where there are none; mm."""
         upright = self.case.mode == Mode.UPRIGHT
-        points = np.vstack([thinned(cloud(m, 0.3), 0.4) for m in meshes])
+        points = np.vstack([coarse_cloud(m) for m in meshes])
         step, depth, where = 0.6, {}, np.zeros(3)
         for near in (0.9, 0.15, 0.0):
             poses = self.way.poses(rows, step)
@@ -106,16 +107,15 @@ class Twin:
             per_move = np.zeros(len(self.way.line))
             np.maximum.at(per_move, poses.move, best)
             where = points[which[np.argmax(best)]]
-            if near == 0.0:
-                for move in rows.tolist():
-                    line = int(self.way.line[move])
-                    depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
-                break
+            for move in rows.tolist():
+                line = int(self.way.line[move])
+                depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
             rough = 0.5 if near > 0.5 else 0.065
-            rows = np.flatnonzero(per_move > best.max() - max(0.12 * best.max(), rough))
-            keep = best > best.max() - rough
-            seeds = np.unique(points[which[keep]].round(3), axis=0)
-            worst_first = np.linalg.norm(seeds - where, axis=1).argsort()[:12]
+            rows = rows[per_move[rows] > best.max() - max(0.12 * best.max(), rough)]
+            seeds = thinned(points[which[best > best.max() - rough]], max(near, 0.1))
+            worst_first = np.linalg.norm(seeds - where, axis=1).argsort()[:20]
+            if near == 0.0:
+                break
             points = np.vstack([cloud(m, near / 9.0, seeds[worst_first], near) for m in meshes])
             step = 0.1 if near > 0.5 else 0.02
         return depth, where
@@ -198,6 +198,12 @@ def cloud(mesh: TriangleMesh, spacing: float, near: F64 | None = None, reach: fl
             p = p[(np.linalg.norm(p[:, None] - near, axis=2) <= reach).any(axis=1)]
         out.append(p)
     return np.vstack(out)
+
+
+@lru_cache(maxsize=16)
+def coarse_cloud(mesh: TriangleMesh) -> F64:
+    """(n, 3) mm, points of the facets about 0.4 mm apart."""
+    return thinned(cloud(mesh, 0.3), 0.4)
 
 
 def thinned(points: F64, size: float) -> F64:
