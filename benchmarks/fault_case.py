@@ -22,7 +22,7 @@ from geometry.toolbody import ToolBody
 from verify.model import ProofSetup, ScoredSamples
 
 PIVOTS = ((0.0, -3.0, -25.0), (1.0, 2.0, -10.0))  # mm: a point on the tilting axis A, one on the turning axis C
-DENSITY = 60.0  # samples a mm²
+DENSITY = 100.0  # samples a mm²
 
 
 class Mode(StrEnum):

@@ -126,7 +126,10 @@ def _gauges(p: Program, setup: ProofSetup) -> F64:
 
 
 def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it."""
+    """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it.
+
+    To blame is the end that lies further from most of the program: one word without its point is the line named.
+    """
     if setup.travel is None or len(p) == 0:
         return
     joints = joints_of(p, setup)
@@ -142,7 +145,9 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
             more = f" and tool lengths from {lengths[low]:g} to {lengths[high]:g} mm" \
                 if axis == 2 and lengths.any() else ""
             what = "the program moves" if p.poses is None else "the program moves the linear axes"
-            yield _finding(FindingKind.LIMIT, p, max(low, high), span - limit, limit,
+            middle = float(np.median(spindle[:, axis]))
+            far = low if middle - spindle[low, axis] > spindle[high, axis] - middle else high
+            yield _finding(FindingKind.LIMIT, p, far, span - limit, limit,
                            f"{what} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
                            f"travels {limit:g} mm")
 

@@ -190,7 +190,7 @@ class FaceProof:
 class Proof:
     """The answer.
 
-    findings : gravest first, at most 200; counts : how many there are of each kind, all of them
+    findings : gravest first, at most 200, the 25 gravest of each kind among them; counts : all there are of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
     line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
     proved   : (n,) bool, inside the budget

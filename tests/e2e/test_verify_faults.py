@@ -165,6 +165,15 @@ def test_inch_for_mm():
     assert proof.counts["residual"] > 0
 
 
+@pytest.mark.parametrize("word, axis", [("X-7", "X"), ("Y4.0", "Y"), ("G1 X7 Y0 Z-2.000 F400", "Z")])
+def test_a_lost_point_is_named_by_its_line(word, axis):
+    lines = program()
+    at = line_of(lines, word)
+    lines[at - 1] = {"X": "X-7000", "Y": "Y4000", "Z": "G1 X7 Y0 Z-2000 F400"}[axis]
+    found = first(run(lines, setup=replace(SETUP, travel=np.array([200.0, 200.0, 200.0]))), FindingKind.LIMIT)
+    assert found.line == at and f"in {axis}" in found.message
+
+
 def test_tool_that_is_not_in_the_table():
     lines = program()
     lines[2] = "T7 M6"

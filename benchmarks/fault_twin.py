@@ -1,0 +1,396 @@
+"""The brute-force twin of the fault table: what a program does, by dense poses and the exact solid.
+
+It runs no code of the proof.
+
+Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part or
+fixture is in a shank or holder, the shorter of the way out aside and the way down out of its lower end (aside alone
+for a neck, and for tools along Z while ``Twin.aside_only``). Cutter against stock or fixture: for tools along Z how far
+under the place the tool's end reaches, else the way out of the cutting part. Residual: what is left on a normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from benchmarks.fault_case import Case, Mode
+from benchmarks.fault_reading import Poses, Way
+from benchmarks.fault_solids import box_mesh
+from geometry.mesh import F64, TriangleMesh
+from geometry.toolbody import ToolBody
+from verify.model import ProofSetup, StockKind
+
+CLOSE = 0.45  # mm within which the coarse look may be wrong
+BODIES = ("neck", "shank", "holder")
+REACH = 1.0  # mm, no residual is told above it
+
+
+@dataclass(frozen=True)
+class Found:
+    """The worst of something: depth mm, lines (of nearly that depth), and where (3,) mm."""
+
+    depth: float
+    lines: frozenset[int]
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def worst(depth: dict[int, float], point: F64) -> Found:
+    """The deepest of depths by line, mm, with the lines that come within 10 % or 5 µm; point (3,) mm."""
+    most = max(depth.values(), default=-1.0)
+    near = most - max(0.1 * most, 0.005)
+    return Found(most, frozenset(n for n, d in depth.items() if d >= near), tuple(np.round(point, 3).tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """The twin of one case and program.
+
+    aside_only : whether tools along Z tell the way out of their bodies to the side alone
+    """
+
+    case: Case
+    way: Way
+    aside_only: bool = True
+
+    def gouge(self, lines: Collection[int] | None = None, tool: int | None = None) -> Found:
+        """The deepest gouge of the feed moves on some lines, of one tool."""
+        depth, point = {}, np.zeros(3)
+        most = -1.0
+        for body in self.case.tools:
+            if tool not in (None, body.number):
+                continue
+            rows = self.way.rows(lines, feed=True, tool=body.number)
+            if len(rows) == 0:
+                continue
+            own, at = _deepest(self.case, self.way, rows, body)
+            for line, d in own.items():
+                depth[line] = max(d, depth.get(line, -1.0))
+            if max(own.values()) > most:
+                most, point = max(own.values()), at
+        return worst(depth, point)
+
+    def body(self, part: str, number: int, lines: Collection[int] | None = None) -> Found:
+        """How deep part or fixtures come into the necks, shanks or holders of a tool in feed moves."""
+        meshes = [self.case.part.mesh, *(box_mesh(f[0], f[1]) for f in self.case.setup.fixtures)]
+        body = next(t for t in self.case.tools if t.number == number)
+        rows = self.way.rows(lines, feed=True, tool=number)
+        radial = part == "neck" or (self.aside_only and self.case.mode == Mode.UPRIGHT)
+        shapes = np.array([[*row, radial] for name, *row in frusta(body) if name == part], float).reshape(-1, 5)
+        depth, point = self._touch(meshes, rows, shapes, np.zeros(3))
+        return worst(depth, point)
+
+    def cutter_on_fixtures(self, number: int) -> Found:
+        """How deep fixtures come into the cutting part of a tool in feed moves."""
+        body = next(t for t in self.case.tools if t.number == number)
+        rows = self.way.rows(feed=True, tool=number)
+        meshes = [box_mesh(f[0], f[1]) for f in self.case.setup.fixtures]
+        cutter = np.array([body.radius, body.corner_radius, body.flute_length])
+        depth, point = self._touch(meshes, rows, np.zeros((0, 5)), cutter)
+        return worst(depth, point)
+
+    def _touch(self, meshes: list[TriangleMesh], rows: NDArray[np.int64], shapes: F64,
+               cutter: F64) -> tuple[dict[int, float], F64]:
+        """Depths by line of points of meshes in shapes (k, 5), or in a cutter (3,) where there are none; mm."""
+        upright = self.case.mode == Mode.UPRIGHT
+        points = np.vstack([coarse_cloud(m) for m in meshes])
+        step, depth, where = 0.6, {}, np.zeros(3)
+        for near in (0.9, 0.15, 0.0):
+            poses = self.way.poses(rows, step)
+            best, which = touch(poses.tip, poses.axis, points, shapes, cutter, upright)
+            if best.max(initial=0.0) <= 0.0:
+                return {}, where
+            per_move = np.zeros(len(self.way.line))
+            np.maximum.at(per_move, poses.move, best)
+            where = points[which[np.argmax(best)]]
+            for move in rows.tolist():
+                line = int(self.way.line[move])
+                depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
+            rough = 0.5 if near > 0.5 else 0.065
+            rows = rows[per_move[rows] > best.max() - max(0.12 * best.max(), rough)]
+            seeds = thinned(points[which[best > best.max() - rough]], max(near, 0.1))
+            worst_first = np.linalg.norm(seeds - where, axis=1).argsort()[:20]
+            if near == 0.0:
+                break
+            points = np.vstack([cloud(m, near / 9.0, seeds[worst_first], near) for m in meshes])
+            step = 0.1 if near > 0.5 else 0.02
+        return depth, where
+
+    def standing(self, points: F64, before: int) -> NDArray[np.bool_]:
+        """(n,) bool: which places (n, 3), mm, are stock when line ``before`` begins."""
+        left = in_blank(points, self.case.setup)
+        for body in self.case.tools:
+            rows = self.way.rows(range(before), feed=True, tool=body.number)
+            if len(rows) and left.any():
+                poses = self.way.poses(rows, 0.1)
+                cutter = np.array([body.radius, body.corner_radius, body.flute_length])
+                left &= ~swept(points, left, poses.tip, poses.axis, cutter)
+        return left
+
+    def rapid(self, line: int) -> Found:
+        """How deep the cutting part goes into stock in the rapid on a line."""
+        rows = self.way.rows([line], feed=False)
+        body = next(t for t in self.case.tools if t.number == self.way.tool[rows[0]])
+        cutter = np.array([body.radius, body.corner_radius, body.flute_length])
+        poses, upright = self.way.poses(rows, 0.1), self.case.mode == Mode.UPRIGHT
+        margin = body.radius + 0.3
+        low, high = poses.tip.min(axis=0) - margin, poses.tip.max(axis=0) + margin + body.flute_length
+        if upright:  # whatever stands over the end of the tool is in its way
+            low, high = np.append(low[:2] + 0.3, low[2] + margin), np.append(high[:2] - body.flute_length, high[2])
+            high[2] = self.case.blank_top
+        points, step = _grid(low, high, max(0.25, float(np.cbrt(np.prod(high - low) / 400_000)))), 0.0
+        most, where = -1.0, np.zeros(3)
+        for fine in (0.08, 0.02, 0.0):
+            points = points[self.standing(points, line)]
+            best, which = touch(poses.tip, poses.axis, points, np.zeros((0, 5)), cutter, upright)
+            if best.max(initial=0.0) <= 0.0:
+                break
+            most, where = float(best.max()), points[which[np.argmax(best)]]
+            step = 3.5 * fine
+            if fine:
+                points = _grid(where - step, where + step, fine / 2)
+                poses = self.way.poses(rows, 0.03)
+        return Found(most, frozenset([line]), tuple(np.round(where, 3).tolist()))
+
+    def left(self, points: F64, normals: F64) -> F64:
+        """(n,) mm left after all feed moves on normals (n, 3) of places (n, 3), mm, cut off at ``REACH``."""
+        out = _way_out(points, normals, self.case.setup)
+        for body in self.case.tools:
+            rows = self.way.rows(feed=True, tool=body.number)
+            if len(rows):
+                poses = self.way.poses(rows, 0.06)
+                cutter = np.array([body.radius, body.corner_radius, body.flute_length])
+                remain(points, normals, out, poses.tip, poses.axis, cutter)
+        return out
+
+
+def frusta(tool: ToolBody) -> list[tuple[str, float, float, float, float]]:
+    """Name, lower and upper height over the tip and both radii of what is above the flutes, mm."""
+    neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
+    out = [("neck", tool.flute_length, max(tool.neck_length, tool.flute_length), neck, neck),
+           ("shank", tool.neck_length, tool.stickout, shank, shank)]
+    z = tool.stickout
+    for part in tool.holder:
+        out.append(("holder", z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top))
+        z += part.length
+    return [row for row in out if row[2] > row[1]]
+
+
+def cloud(mesh: TriangleMesh, spacing: float, near: F64 | None = None, reach: float = 0.0) -> F64:
+    """(n, 3) mm, points of the facets with corners and edges, ``spacing`` apart; only within ``reach`` of (k, 3)."""
+    tri = mesh.triangles
+    if near is not None:
+        low, high = tri.min(axis=1) - reach, tri.max(axis=1) + reach
+        tri = tri[((near[:, None] >= low) & (near[:, None] <= high)).all(axis=2).any(axis=0)]
+    out = [np.zeros((0, 3))]
+    for a, b, c in tri:
+        n, m = (max(1, int(np.ceil(np.linalg.norm(e) / spacing))) for e in (b - a, c - a))
+        u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m)
+        keep = u + v <= 1.0 + 1e-9
+        p = a + u[keep][:, None] * (b - a) + v[keep][:, None] * (c - a)
+        k = max(1, int(np.ceil(np.linalg.norm(c - b) / spacing)))
+        p = np.vstack([p, b + (np.arange(k + 1) / k)[:, None] * (c - b)])
+        if near is not None:
+            p = p[(np.linalg.norm(p[:, None] - near, axis=2) <= reach).any(axis=1)]
+        out.append(p)
+    return np.vstack(out)
+
+
+@lru_cache(maxsize=16)
+def coarse_cloud(mesh: TriangleMesh) -> F64:
+    """(n, 3) mm, points of the facets about 0.4 mm apart."""
+    return thinned(cloud(mesh, 0.3), 0.4)
+
+
+def thinned(points: F64, size: float) -> F64:
+    """One of the points (n, 3), mm, of each cell of ``size`` mm."""
+    _, first = np.unique(np.floor(points / size).astype(np.int64), axis=0, return_index=True)
+    return points[first]
+
+
+def in_blank(points: F64, setup: ProofSetup) -> NDArray[np.bool_]:
+    """(n,) bool: which places (n, 3), mm, lie in the blank."""
+    if setup.stock_kind == StockKind.CYLINDER and setup.stock_cylinder is not None:
+        x, y, z, radius, height = setup.stock_cylinder
+        return (np.hypot(points[:, 0] - x, points[:, 1] - y) < radius) & (points[:, 2] > z) & (
+            points[:, 2] < z + height)
+    box = np.asarray(setup.stock_box)
+    return np.asarray(((points > box[0]) & (points < box[1])).all(axis=1))
+
+
+def _way_out(points: F64, normals: F64, setup: ProofSetup) -> F64:
+    """(n,) mm along normals (n, 3) to the outside of the blank, by halving; not above ``REACH``."""
+    low, high = np.zeros(len(points)), np.full(len(points), REACH)
+    inside = in_blank(points + REACH * normals, setup)
+    for _ in range(40):
+        mid = 0.5 * (low + high)
+        still = in_blank(points + mid[:, None] * normals, setup)
+        low, high = np.where(still, mid, low), np.where(still, high, mid)
+    return np.where(inside, REACH, low)
+
+
+def _grid(low: F64, high: F64, step: float) -> F64:
+    """(n, 3) mm, a lattice with both ends."""
+    sides = [np.linspace(a, b, max(2, int(np.ceil((b - a) / step)) + 1))
+             for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    return np.stack(np.meshgrid(*sides, indexing="ij"), -1).reshape(-1, 3)
+
+
+def _profile(u: F64, body: ToolBody) -> tuple[F64, F64]:
+    """Distance from the axis and height of a place 0..1 along the outline of a cutting part: end, corner, flank."""
+    a, r = body.radius - body.corner_radius, body.corner_radius
+    bend = np.clip(3 * u - 1, 0, 1) * 0.5 * np.pi
+    rho = a * np.clip(3 * u, 0, 1) + r * np.sin(bend)
+    return rho, r * (1 - np.cos(bend)) + (body.flute_length - r) * np.clip(3 * u - 2, 0, 1)
+
+
+def _places(poses: Poses, q: F64, body: ToolBody) -> F64:
+    """(n, 3) mm, places of cutting parts by q (n, 3): along the outline, round the axis in rad, inwards 0..1."""
+    rho, h = _profile(q[:, 0], body)
+    least = np.where(np.abs(poses.axis[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    e1 = np.cross(poses.axis, least)
+    e1 /= np.linalg.norm(e1, axis=1)[:, None]
+    e2 = np.cross(poses.axis, e1)
+    rho = (rho * q[:, 2])[:, None]
+    return poses.tip + rho * (np.cos(q[:, 1:2]) * e1 + np.sin(q[:, 1:2]) * e2) + h[:, None] * poses.axis
+
+
+def _deepest(case: Case, way: Way, rows: NDArray[np.int64], body: ToolBody) -> tuple[dict[int, float], F64]:
+    """Deepest place in the part by line for moves (k,) indices: a coarse look at all, then a random climb, mm."""
+    rng = np.random.default_rng(7)
+    look = np.array([[u, f, s] for u in np.linspace(0, 1, 10) for f in np.linspace(0, 2 * np.pi, 13)[:-1]
+                     for s in (1.0, 0.4)])
+    row, t = way.spread(rows, 0.6)
+    score, pick = np.empty(len(row)), np.empty(len(row), int)
+    for k in range(0, len(row), 2000):
+        many = way.at(np.repeat(row[k:k + 2000], len(look)), np.repeat(t[k:k + 2000], len(look)))
+        d = case.solid.depth(_places(many, np.tile(look, (len(many.move) // len(look), 1)), body))
+        d = d.reshape(-1, len(look))
+        score[k:k + 2000], pick[k:k + 2000] = d.max(axis=1), d.argmax(axis=1)
+    chosen = np.flatnonzero(score > score.max() - CLOSE)
+    if len(chosen) > 6000:  # as deep as any stand closest; the rest are only as deep as their neighbours
+        chosen = np.sort(chosen[np.argsort(-score[chosen], kind="stable")[:6000]])
+    x = np.column_stack([t[chosen], look[pick[chosen]]])
+    value = score[chosen]
+    for wide, turns, most in ((0.2, 40, 6000), (0.03, 60, 1500), (0.004, 60, 400), (0.0008, 40, 400)):
+        keep = np.sort(np.argsort(-value, kind="stable")[:most])
+        chosen, x, value = chosen[keep], x[keep], value[keep]
+        for _ in range(turns):
+            y = x + rng.normal(size=x.shape) * wide * [1.0, 0.5, 3.0, 0.5] * (rng.random(x.shape) < 0.6)
+            y[:, [0, 1, 3]] = np.clip(y[:, [0, 1, 3]], 0.0, 1.0)
+            d = case.solid.depth(_places(way.at(row[chosen], y[:, 0]), y[:, 1:], body))
+            better = d > value
+            x[better], value[better] = y[better], d[better]
+    depth: dict[int, float] = {}
+    for line, d in zip(way.line[row[chosen]].tolist(), value.tolist(), strict=True):
+        depth[line] = max(d, depth.get(line, -1.0))
+    k = int(np.argmax(value))
+    return depth, _places(way.at(row[chosen[k:k + 1]], x[k:k + 1, 0]), x[k:k + 1, 1:], body)[0]
+
+
+@njit(cache=True, nogil=True)
+def _in_cutter(rho, h, radius, corner, length, upright):
+    """How deep (rho, h) is in a cutting part: over its end where upright, else the shortest way out; mm."""
+    if h < 0.0 or h > length or rho > radius:
+        return -1.0
+    a = radius - corner
+    bottom = corner - np.sqrt(max(corner**2 - max(rho - a, 0.0) ** 2, 0.0))
+    if h <= bottom:
+        return -1.0
+    if upright:
+        return h - bottom
+    if h < corner and rho > a:
+        return corner - np.sqrt((rho - a) ** 2 + (corner - h) ** 2)
+    return min(radius - rho, h, length - h)
+
+
+@njit(cache=True, nogil=True)
+def touch(tips, axes, points, shapes, cutter, upright):
+    """Deepest point of (n, 3) in the shapes (k, 5), or in the cutter (3,) where k is 0, for poses (m, 3) and (m, 3).
+
+    shapes : z0, z1, r0, r1 mm, and whether only the way aside counts
+
+    Returns (m,) depth, mm, and (m,) index of the point.
+    """
+    best, which = np.zeros(len(tips)), np.zeros(len(tips), np.int64)
+    for m in range(len(tips)):
+        tx, ty, tz = tips[m]
+        ux, uy, uz = axes[m]
+        for i in range(len(points)):
+            x, y, z = points[i, 0] - tx, points[i, 1] - ty, points[i, 2] - tz
+            h = x * ux + y * uy + z * uz
+            rho = np.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
+            if len(shapes) == 0:
+                # over a tool along Z everything stands in its way, however long the flutes are
+                d = _in_cutter(rho, h, cutter[0], cutter[1], 1e9 if upright else cutter[2], upright)
+                if d > best[m]:
+                    best[m], which[m] = d, i
+            for k in range(len(shapes)):
+                z0, z1 = shapes[k, 0], shapes[k, 1]
+                if z0 < h < z1:
+                    d = shapes[k, 2] + (shapes[k, 3] - shapes[k, 2]) * (h - z0) / (z1 - z0) - rho
+                    d = d if shapes[k, 4] > 0.0 else min(d, h - z0)
+                    if d > best[m]:
+                        best[m], which[m] = d, i
+    return best, which
+
+
+@njit(cache=True, nogil=True)
+def swept(points, wanted, tips, axes, cutter):
+    """(n,) bool: which of the wanted places (n, 3) mm any cutter (3,) mm at poses (m, 3), (m, 3) takes."""
+    out = np.zeros(len(points), np.bool_)
+    far2 = cutter[0] ** 2 + cutter[2] ** 2
+    for i in range(len(points)):
+        if not wanted[i]:
+            continue
+        for m in range(len(tips)):
+            x, y, z = points[i, 0] - tips[m, 0], points[i, 1] - tips[m, 1], points[i, 2] - tips[m, 2]
+            r2 = x * x + y * y + z * z
+            if r2 > far2:
+                continue
+            h = x * axes[m, 0] + y * axes[m, 1] + z * axes[m, 2]
+            if _in_cutter(np.sqrt(max(r2 - h * h, 0.0)), h, cutter[0], cutter[1], cutter[2], True) > 0.0:
+                out[i] = True
+                break
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _taken(p, n, t, tip, axis, cutter):
+    x, y, z = p[0] + t * n[0] - tip[0], p[1] + t * n[1] - tip[1], p[2] + t * n[2] - tip[2]
+    h = x * axis[0] + y * axis[1] + z * axis[2]
+    rho = np.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
+    return _in_cutter(rho, h, cutter[0], cutter[1], cutter[2], True) > 0.0
+
+
+@njit(cache=True, nogil=True)
+def remain(points, normals, left, tips, axes, cutter):
+    """Lower ``left`` (n,) mm on normals (n, 3) of places (n, 3) mm by a cutter (3,) at poses (m, 3), (m, 3)."""
+    far = np.sqrt(cutter[0] ** 2 + cutter[2] ** 2) + REACH
+    for i in range(len(points)):
+        p, n = points[i], normals[i]
+        for m in range(len(tips)):
+            d = (p[0] - tips[m, 0]) ** 2 + (p[1] - tips[m, 1]) ** 2 + (p[2] - tips[m, 2]) ** 2
+            if left[i] <= 0.0 or d > far * far:
+                continue
+            low = -0.05
+            for k in range(1, 42):
+                t = 0.0005 if k == 1 else (k - 1) * REACH / 40.0
+                if low >= left[i]:
+                    break
+                t = min(t, left[i])
+                if _taken(p, n, t, tips[m], axes[m], cutter):
+                    high = t
+                    for _ in range(16):
+                        mid = 0.5 * (low + high)
+                        if _taken(p, n, mid, tips[m], axes[m], cutter):
+                            high = mid
+                        else:
+                            low = mid
+                    left[i] = min(left[i], high)
+                    break
+                low = t
