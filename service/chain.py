@@ -7,10 +7,7 @@ found nothing.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,6 +24,7 @@ from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.artifacts import clear_results
 from service.convert import check_plannable, check_spindle_tool, machine_kinematics, rotary_limits, tool_bodies
+from service.delivery import Files, deliver, json_bytes
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, turned_box
 from service.preview import draw_preview
@@ -43,9 +41,6 @@ from verify.prove import prove
 from zones.view import View, turned_samples
 
 Progress = Callable[[str, float], None]
-Files = dict[str, tuple[str, str, str | None, bytes]]
-"""By name: kind, dialect, access, content."""
-
 RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
 STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
@@ -99,7 +94,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
                 files[file_name(s.view, "job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(s.work).encode())
                 files[file_name(s.view, "job", "arm.stpnc")] = ("stepnc-arm", "", None,
                                                                 write_stepnc_arm(s.work).encode())
-    files["zones.json"] = ("zones", "", None, _json(reporting.zones_document(report)))
+    files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
     _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
     files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
     _deviation(ready, first, scored.samples, proof, report, out / MAP_NAME)
@@ -109,19 +104,9 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
                                       lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
         report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
         files[MESH_NAME] = ("machined", "", None, data)
-    _deliver(out, report, files)
+    deliver(out, report, files)
     progress("done", 1.0)
     return report
-
-
-def _deliver(out: Path, report: dict[str, Any], files: Files) -> None:
-    """List the files in the report and write them, the report last."""
-    report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
-                        "sha256": hashlib.sha256(data).hexdigest()}
-                       for name, (kind, dialect, access, data) in sorted(files.items())]
-    for name, (*_, data) in files.items():
-        _write(out / name, data)
-    _write(out / "report.json", _json(report))
 
 
 class _Share:
@@ -205,7 +190,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                                           spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
             files[MESH_NAME] = ("machined", "", view.id, data)
-        _deliver(out, report, files)
+        deliver(out, report, files)
     progress("done", 1.0)
     return report
 
@@ -321,17 +306,3 @@ def _deviation(ready: Prepared, view: View, samples: SurfaceSamples, proof: Proo
     order = ready.setup.labels.get("order")
     draw_proof(view.part, samples, proof, proof_setup(ready, view), report["state"], report["coverage"] or 0.0, path,
                f"Deviation from the part{f': {order}' if order else ''}")
-
-
-def _json(data: dict[str, Any]) -> bytes:
-    return (json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n").encode()
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    with open(partial, "wb") as f:
-        f.write(data)
-        f.flush()
-        os.fsync(f.fileno())
-    os.replace(partial, path)

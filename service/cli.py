@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.arguments import make_folder, mesh_wish, read_program
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from schemas.setup import Setup
     from service.console import Progress
-    from service.shown import MeshWish
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="From a STEP part of walls and internal connections to a proved milling job.")
@@ -196,68 +197,6 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
     except LayoutError as error:
         raise InputError(f"no part for recipe {recipe} and seed {seed}: {error}", code="impossible_layout",
                          remedy="take another seed, or fewer walls and connections") from None
-
-
-def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
-    """The mesh of the machined part that is asked for; none where ``step`` is None.
-
-    Raises
-    ------
-    InputError
-        ``bad_mesh_step``, ``bad_mesh_box``; ``box_without_step``.
-    """
-    from geometry.errors import InputError
-    from service.shown import MeshWish
-
-    if step is not None:
-        return MeshWish.of(step, box)
-    if box is not None:
-        raise InputError("a window of a mesh that is not asked for", code="box_without_step", measured=box,
-                         remedy="give --mesh-step too, or leave --mesh-box out")
-    return None
-
-
-def make_folder(out: Path, *, verification: bool = False) -> None:
-    """Make the folder for the files, without those of an earlier job, or of an earlier verification.
-
-    Raises
-    ------
-    InputError
-        It cannot be made or written to; ``out_holds_a_job`` as ``artifacts.clear_verification``.
-    """
-    from geometry.errors import InputError
-    from service.artifacts import clear_results, clear_verification
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / ".writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
-                         remedy="give another --out") from None
-    (clear_verification if verification else clear_results)(out)
-
-
-def read_program(path: Path) -> str:
-    """Text of a program.
-
-    Raises
-    ------
-    ProgramError
-        The file cannot be read, or is empty.
-    """
-    from geometry.errors import ProgramError
-
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
-                           code="program_unreadable", remedy="name an NC program this user may read") from None
-    if not text.strip():
-        raise ProgramError(f"the program {path.name} is empty", code="empty_program", measured=0, limit=1,
-                           remedy="name the NC program that is to be proved")
-    return text
 
 
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress], tuple[Any, int]], as_json: bool) -> None:

@@ -288,6 +288,7 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
 
 def gather(results: list[object]) -> tuple[F64, int]:
+    """Events of all tiles as (e, 7) rows sorted by move, the deeper first, and how many the tables did not hold."""
     parts = [r for r in results if isinstance(r, tuple)]
     if not parts:
         return np.zeros((0, 7)), 0

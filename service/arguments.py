@@ -1,0 +1,71 @@
+"""What the command line is given: folders, programs, windows. Heavy imports stand inside, as in ``service.cli``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from service.shown import MeshWish
+
+
+def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
+    """The mesh of the machined part that is asked for; none where ``step`` is None.
+
+    Raises
+    ------
+    InputError
+        ``bad_mesh_step``, ``bad_mesh_box``; ``box_without_step``.
+    """
+    from geometry.errors import InputError
+    from service.shown import MeshWish
+
+    if step is not None:
+        return MeshWish.of(step, box)
+    if box is not None:
+        raise InputError("a window of a mesh that is not asked for", code="box_without_step", measured=box,
+                         remedy="give --mesh-step too, or leave --mesh-box out")
+    return None
+
+
+def make_folder(out: Path, *, verification: bool = False) -> None:
+    """Make the folder for the files, without those of an earlier job, or of an earlier verification.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written to; ``out_holds_a_job`` as ``artifacts.clear_verification``.
+    """
+    from geometry.errors import InputError
+    from service.artifacts import clear_results, clear_verification
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
+                         remedy="give another --out") from None
+    (clear_verification if verification else clear_results)(out)
+
+
+def read_program(path: Path) -> str:
+    """Text of a program.
+
+    Raises
+    ------
+    ProgramError
+        The file cannot be read, or is empty.
+    """
+    from geometry.errors import ProgramError
+
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
+                           code="program_unreadable", remedy="name an NC program this user may read") from None
+    if not text.strip():
+        raise ProgramError(f"the program {path.name} is empty", code="empty_program", measured=0, limit=1,
+                           remedy="name the NC program that is to be proved")
+    return text

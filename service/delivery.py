@@ -1,0 +1,37 @@
+"""The files of a job: what they are, and written so that each is there whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+Files = dict[str, tuple[str, str, str | None, bytes]]
+"""By name: kind, dialect, access, content."""
+
+
+def deliver(out: Path, report: dict[str, Any], files: Files) -> None:
+    """List the files in the report, under ``files``, and write them into a folder, the report last."""
+    report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
+                        "sha256": hashlib.sha256(data).hexdigest()}
+                       for name, (kind, dialect, access, data) in sorted(files.items())]
+    for name, (*_, data) in files.items():
+        write_whole(out / name, data)
+    write_whole(out / "report.json", json_bytes(report))
+
+
+def json_bytes(data: dict[str, Any]) -> bytes:
+    """Plain data as the files hold it."""
+    return (json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    with open(partial, "wb") as f:
+        f.write(data)
+        f.flush()
+        os.fsync(f.fileno())
+    os.replace(partial, path)
