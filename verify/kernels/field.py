@@ -90,6 +90,10 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                 v = field[i, j, k]
                 if v > -band:
                     qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
+                    # the search that a flat or a bull nose asks for pays only where the node may be lowered
+                    if a > 1e-12 and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, a + r, r, length) >= v:
+                        top = max(top, v)
+                        continue
                     d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length), -band)
                     if d < v - LEAST_CUT:
                         field[i, j, k] = d

@@ -36,12 +36,10 @@ def gap(x, y, z, dx, dy, dz, plan2, radius, corner, length):
     low = min(0.0, dz)
     if z >= low + corner:
         return max(side, z - max(0.0, dz) - length)
-    over = plan - (radius - corner)
-    if dz == 0.0 or corner <= 0.0:
-        over, drop = max(over, 0.0), low + corner - z
+    if dz == 0.0 or corner < radius - 1e-12:
+        # never nearer in plan than that, and never lower than the lowest tip: both at once
+        over, drop = max(plan - (radius - corner), 0.0), low + corner - z
         return max(side, math.sqrt(over * over + drop * drop) - corner)
-    if corner < radius - 1e-12:
-        return max(side, low - z)
     z -= corner
     s = min(max((x * dx + y * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
     wx, wy, wz = x - s * dx, y - s * dy, z - s * dz
