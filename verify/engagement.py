@@ -29,7 +29,10 @@ def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBo
 
 
 def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int, Engagement]:
-    """Largest engaged angle of each tool that met stock, and what 99 % of its way in stock stays under, by T number."""
+    """Largest engaged angle of each tool that met stock, and what 99 % of its way in stock stays under, by T number.
+
+    angle : (m,) float64, rad, as ``engaged_angles``
+    """
     length, out = np.linalg.norm(moves.end - moves.start, axis=1), {}
     for k, tool in enumerate(tools):
         own = np.flatnonzero((moves.tool == k) & (angle > 0.0))
@@ -44,6 +47,8 @@ def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int
 
 def engagement_findings(angle: F64, moves: Moves, source: Source, limits: Mapping[int, float]) -> list[Finding]:
     """Where the engaged angle is above the limit of the tool, rad by T number; by neighbouring lines.
+
+    angle : (m,) float64, rad, as ``engaged_angles``
 
     Angles are known to ``RESOLUTION``, so a finding needs more than the limit and that.
     """

@@ -1,7 +1,5 @@
 """Figures by zone and by face: sums that can be done by hand, and of several accesses the least that is left."""
 
-from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,23 +57,3 @@ def test_a_program_that_cuts_air_leaves_every_face_uncut():
     air = [line for line in lines if "Z-" not in line and not line.startswith("G1 Z")]
     proof = prove([("air", text(air))], part, (TOOL,), SETUP, scored(part), ZONES)
     assert all(f.uncut == pytest.approx(f.area) and f.coverage == 0 for f in proof.faces.values())
-
-
-def test_of_two_accesses_the_least_left_counts():
-    from service.sides import joined_proofs
-
-    part, judged = block(), scored(block())
-    whole = prove([("pocket", text(program()))], part, (TOOL,), SETUP, judged, ZONES)
-    none = prove([], part, (TOOL,), SETUP, judged, ZONES)
-    assert none.faces[11].uncut == pytest.approx(none.faces[11].area)
-    made = SimpleNamespace(zones=[])
-
-    def side(name, proof):
-        return SimpleNamespace(view=SimpleNamespace(rotation=np.eye(3), id=name), proof=proof, made=made)
-
-    for pair in ((whole, none), (none, whole)):
-        got = joined_proofs([side("A1", pair[0]), side("A2", pair[1])], judged.samples, SETUP)
-        assert got.faces == whole.faces
-        assert ((got.program >= 0) == (whole.program >= 0)).all()
-    alone = joined_proofs([side("A1", replace(whole, findings=()))], judged.samples, SETUP)
-    assert alone.faces == whole.faces
