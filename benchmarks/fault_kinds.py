@@ -201,7 +201,7 @@ def _touching(case: Case, rng: np.random.Generator, part: str, make: Callable[[T
 def shank_touch(case: Case, rng: np.random.Generator) -> Planted:
     """A shank that is too wide or begins too low."""
     return _touching(case, rng, "shank", lambda t: replace(
-        t, shank_diameter=t.diameter + float(rng.uniform(1.0, 12.0)),
+        t, shank_diameter=t.diameter + float(rng.uniform(1.0, 14.0)),
         neck_length=t.flute_length + float(rng.uniform(0.2, 1.5))))
 
 
