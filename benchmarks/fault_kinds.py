@@ -88,7 +88,7 @@ def gouge(case: Case, rng: np.random.Generator) -> Planted:
     for _ in range(2):  # what a scallop had left there comes on top
         bad = _edit(case, step.row, f"G1 {place_words(case.mode, step.tip - dip * step.normal, step.turn)}")
         found = twin_of(bad).gouge({step.row + 1, then.row + 1 if then else 0})
-        dip += 0.01 - found.depth
+        dip += 0.01 - max(found.depth, 0.0)
     return _gouged(bad, found)
 
 
