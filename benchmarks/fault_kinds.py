@@ -88,7 +88,7 @@ def gouge(case: Case, rng: np.random.Generator) -> Planted:
     for _ in range(2):  # what a scallop had left there comes on top
         bad = _edit(case, step.row, f"G1 {place_words(case.mode, step.tip - dip * step.normal, step.turn)}")
         found = twin_of(bad).gouge({step.row + 1, then.row + 1 if then else 0})
-        dip += 0.01 - found.depth
+        dip += 0.01 - max(found.depth, 0.0)
     return _gouged(bad, found)
 
 
@@ -201,7 +201,7 @@ def _touching(case: Case, rng: np.random.Generator, part: str, make: Callable[[T
 def shank_touch(case: Case, rng: np.random.Generator) -> Planted:
     """A shank that is too wide or begins too low."""
     return _touching(case, rng, "shank", lambda t: replace(
-        t, shank_diameter=t.diameter + float(rng.uniform(1.0, 12.0)),
+        t, shank_diameter=t.diameter + float(rng.uniform(1.0, 14.0)),
         neck_length=t.flute_length + float(rng.uniform(0.2, 1.5))))
 
 

@@ -24,11 +24,15 @@ MACHINE = Kinematics("table-table-AC", PIVOTS)
 Turn = tuple[float, float]
 
 
-def _setup(radius: float, low: float, top: float, far: float) -> ProofSetup:
-    """A cylinder blank and two clamps beyond ``far`` mm."""
-    clamps = [[[-far - 6, -3, low], [-far, 3, 2]], [[far, -3, low], [far + 6, 3, 2]]]
+def _setup(radius: float, low: float, top: float, clamps: list[list[list[float]]]) -> ProofSetup:
+    """A cylinder blank between clamps."""
     return setup_of(np.array([[-radius, -radius, low], [radius, radius, top]]), clamps, kinematics=MACHINE,
                     stock_kind=StockKind.CYLINDER, stock_cylinder=(0.0, 0.0, low, radius, top - low))
+
+
+def _beside(far: float, low: float) -> list[list[list[float]]]:
+    """Two clamps beyond ``far`` mm either way along X."""
+    return [[[-far - 6, -3, low], [-far, 3, 2]], [[far, -3, low], [far + 6, 3, 2]]]
 
 
 def _rings(s: Script, outer: float, layers: list[float], inner: Callable[[float], float],
@@ -75,7 +79,7 @@ def dome(seed: int) -> Case:
     s.change(2, 0.0, 0.0, 1200)
     count = math.ceil(end * big / math.sqrt(8 * 0.0045 / (1 / r + 1 / big)))
     _dome_rings(s, big, zc, r, lean, [end * (1 - k / count) for k in range(count + 1)])
-    setup = _setup(plate + 0.3, low, top, 24.0)
+    setup = _setup(plate + 0.3, low, top, _beside(24.0, low))
     x = plate - 3.0
     zone_of = {"Z1": (3, (base + 0.22, plate)), "Z2": (5, (zc + big * math.cos(end) + 0.02, np.inf))}
     return made("dome", s, solid, tools, setup, [3, 5], zone_of, (x, 0.0, top, 1.6),
@@ -132,7 +136,7 @@ def cone(seed: int) -> Case:
     s.change(2, 0.0, 0.0, 900)
     for k, z in enumerate((0.5 * high, 0.05)):
         _flank(s, rho0 - z * math.tan(alpha), z, alpha, r, k)
-    setup = _setup(plate + 0.3, low, top, 24.0)
+    setup = _setup(plate + 0.3, low, top, _beside(24.0, low))
     x = plate - 3.0
     zone_of = {"Z1": (4, (-np.inf, np.inf)), "Z2": (3, (rho0 + 0.32, plate)), "Z3": (5, (0.06, np.inf))}
     return made("cone", s, solid, tools, setup, [3, 4, 5], zone_of, (x, 0.0, top, 3.0),
@@ -185,8 +189,9 @@ def house(seed: int) -> Case:
     s.change(2, 0.0, 0.0, 900)
     for i in range(k):
         _tilted_plane(s, solid, i, corner, f"Z{3 + i}")
-    setup = _setup(plate + 0.3, low, top, 30.0)
-    x = plate - 3.0
+    near = plate + 5.5  # the rings come in along X, so clamps may stand close along Y
+    setup = _setup(plate + 0.3, low, top, [[[-8, -near - 6, low], [8, -near, 4]], [[-8, near, low], [8, near + 6, 4]]])
+    x = plate - 2.5
     zone_of: dict[str, tuple[int, tuple[float, float]]] = {"Z1": (4, (-np.inf, np.inf)),
                                                            "Z2": (3, (widest + 0.25, plate))}
     for i in range(k):

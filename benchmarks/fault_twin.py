@@ -241,11 +241,12 @@ def _grid(low: F64, high: F64, step: float) -> F64:
 
 
 def _profile(u: F64, body: ToolBody) -> tuple[F64, F64]:
-    """Distance from the axis and height of a place 0..1 along the outline of a cutting part: end, corner, flank."""
+    """Distance from the axis and height of a place 0..1 along the outline of a cutting part, even in its length, mm."""
     a, r = body.radius - body.corner_radius, body.corner_radius
-    bend = np.clip(3 * u - 1, 0, 1) * 0.5 * np.pi
-    rho = a * np.clip(3 * u, 0, 1) + r * np.sin(bend)
-    return rho, r * (1 - np.cos(bend)) + (body.flute_length - r) * np.clip(3 * u - 2, 0, 1)
+    s = u * (a + 0.5 * np.pi * r + body.flute_length - r)
+    bend = np.clip((s - a) / max(r, 1e-12), 0.0, 0.5 * np.pi)
+    rho = np.minimum(s, a) + r * np.sin(bend)
+    return rho, r * (1 - np.cos(bend)) + np.maximum(s - a - 0.5 * np.pi * r, 0.0)
 
 
 def _places(poses: Poses, q: F64, body: ToolBody) -> F64:
@@ -262,7 +263,7 @@ def _places(poses: Poses, q: F64, body: ToolBody) -> F64:
 def _deepest(case: Case, way: Way, rows: NDArray[np.int64], body: ToolBody) -> tuple[dict[int, float], F64]:
     """Deepest place in the part by line for moves (k,) indices: a coarse look at all, then a random climb, mm."""
     rng = np.random.default_rng(7)
-    look = np.array([[u, f, s] for u in np.linspace(0, 1, 10) for f in np.linspace(0, 2 * np.pi, 13)[:-1]
+    look = np.array([[u, f, s] for u in np.linspace(0, 1, 19) for f in np.linspace(0, 2 * np.pi, 13)[:-1]
                      for s in (1.0, 0.4)])
     row, t = way.spread(rows, 0.6)
     score, pick = np.empty(len(row)), np.empty(len(row), int)

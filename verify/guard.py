@@ -21,6 +21,8 @@ EDGE_SPACING = 0.1
 SHARP = math.radians(20.0)
 DEPTH_STEPS = 64
 DEPTH_BATCH = 2048  # rays between two reports
+FACETS_OFF = 2e-3
+"""mm, what facets may lie under samples that are on the exact surface."""
 
 
 def guard_samples(mesh: TriangleMesh, density: float = GUARD_DENSITY) -> SurfaceSamples:
@@ -92,6 +94,12 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
 
 def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     through, hit = first_hits(tree, points, -normals, t_min=1e-4)
+    # a sample of the exact surface may stand over its facet: that is no place where the ray leaves the part
+    over = (hit >= 0) & (through < FACETS_OFF) & (np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) > 0)
+    if over.any():
+        low = through[over]
+        again, hit[over] = first_hits(tree, points[over] - low[:, None] * normals[over], -normals[over], t_min=1e-4)
+        through[over] = low + again
     # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
     stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
