@@ -135,8 +135,8 @@ def main() -> None:
         print(json.dumps(run(chosen.one, chosen.density, chosen.axes[0])))
         return
     print(f"{'axes':>4} {'points':>8} {'samples':>8} {'s':>7} {'CPU s':>7} {'read':>6} {'rays':>6} {'stock':>7} "
-          f"{'bodies':>6} {'µs a point':>10} {'least left mm':>13} {'most':>8} {'findings':>8} {'stock mm':>8} {'MB before':>9} "
-          f"{'MB peak':>8}")
+          f"{'bodies':>6} {'µs a point':>10} {'least left mm':>13} {'most':>8} {'findings':>8} {'stock mm':>8} "
+          f"{'MB before':>9} {'MB peak':>8}")
     for axes, points in itertools.product(chosen.axes, chosen.points):
         done = subprocess.run([sys.executable, __file__, "--one", str(points), "--density", str(chosen.density),
                                "--axes", str(axes)], capture_output=True, text=True, check=True)
