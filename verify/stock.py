@@ -288,7 +288,10 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
 
 def gather(results: list[object]) -> tuple[F64, int]:
-    """Events of all tiles as (e, 7) rows sorted by move, the deeper first, and how many the tables did not hold."""
+    """Events of all jobs in one table (e, 7), sorted by move, code and the deeper first, and how many were lost.
+
+    results : of every job its events (k, 7), depths and places in mm, and how many it found
+    """
     parts = [r for r in results if isinstance(r, tuple)]
     if not parts:
         return np.zeros((0, 7)), 0

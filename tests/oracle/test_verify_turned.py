@@ -142,12 +142,12 @@ def test_rays_meet_turning_tools_within_the_bow(kind):
     tool, rng = TOOLS[kind], np.random.default_rng(8)
     moves = random_moves(rng, 4)
     p, normal = random_rays(moves, tool, 40, rng)
-    any_way = unit(rng.normal(size=p.shape))
-    for bow, n in ((BOW, normal), (BOW, any_way), (0.02, normal)):
+    slanting = unit(normal + 0.7 * rng.normal(size=p.shape))
+    for bow, n in ((BOW, normal), (BOW, slanting), (0.02, normal)):
         left, mover = residual_on_normals(p, n, np.full(len(p), 3.0), moves, [tool], bow=bow)
         least, most = (least_left(p, n, moves, tool, 3.0, level, 41) for level in (bow, -bow))
         assert (left >= least - 1e-4).all() and (left <= most + 1e-4).all()
-        assert ((mover >= 0) == (left < 3.0)).all() and (mover >= 0).sum() > 8
+        assert ((mover >= 0) == (left < 3.0)).all() and (mover >= 0).sum() > 10
 
 
 def test_what_stands_still_agrees_with_the_kernel_of_upright_tools():

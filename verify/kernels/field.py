@@ -26,7 +26,7 @@ from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.heights import contact, overlap
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
-from verify.kernels.rays import gap
+from verify.kernels.rays import gap, plan_distance
 from verify.kernels.stock import CUTTER, _note, _worse
 
 LEAST_CUT = 1e-5
@@ -210,6 +210,19 @@ def _solid(tops, band, out):
 
 
 @njit(**KERNEL)
+def _seen_tile(p, x, y, z, rad):
+    """A ball as the tool sees it on piece p: how near its axis, how low and how high over its tip it comes, mm."""
+    qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+    return (plan_distance(qx, qy, dx, dy, dx * dx + dy * dy) - rad, qz - max(dz, 0.0) - rad, qz - min(dz, 0.0) + rad)
+
+
+@njit(**KERNEL)
+def _beside(seen, z0, z1, wide):
+    """Whether a cylinder from z0 to z1 over the tip passes a ball by."""
+    return seen[0] > wide or seen[1] > z1 or seen[2] < z0
+
+
+@njit(**KERNEL)
 def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, steep, tool, cutters, ends_radius,
                bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
     """Work all moves in order through the nodes of one tile, in place.
@@ -248,12 +261,17 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         sectors = np.int64(0)
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
-            if feed:
+            # most of a long tool passes most tiles by: one look at the ball round the tile decides
+            seen = _seen_tile(piece, cx, cy, cz, rad + band)
+            near = not _beside(seen, 0.0, cutters[k, 2], cutters[k, 0] + grow)
+            if near and feed:
                 sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
-            else:
+            elif near:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
             for b in range(body_first[k], body_first[k + 1]):
                 extra = 0.0 if feed else -bodies[b, 4] if lift else grow - min(grow, bodies[b, 4])
+                if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
+                    continue
                 beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
                 _meet(field, tops, solid, tile, h, origin, piece, bodies[b], False, cutters[k], extra,
                       slack if beside else TOUCHING, best)
