@@ -141,7 +141,8 @@ def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str,
         counts[str(f.kind)] = counts.get(str(f.kind), 0) + 1
     by_grade = sorted(findings, key=lambda f: (rank[f.kind], -abs(f.depth), f.program, f.line, f.face or ""))
     seen: dict[str, int] = {}
-    sure, more = [], []
+    sure: list[int] = []
+    more: list[int] = []
     for k, f in enumerate(by_grade):
         seen[str(f.kind)] = seen.get(str(f.kind), 0) + 1
         (sure if seen[str(f.kind)] <= OF_A_KIND else more).append(k)
