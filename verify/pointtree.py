@@ -43,7 +43,7 @@ class PointTree:
 
 
 def curve_keys(points: F64) -> NDArray[np.uint64]:
-    """(n,) uint64 places of (n, 3) points on a Z-order curve of 2^16 cells a side round them."""
+    """(n,) uint64 places of (n, 3) points, mm, on a Z-order curve of 2^16 cells a side round them."""
     if len(points) == 0:
         return np.zeros(0, np.uint64)
     lower = points.min(axis=0)

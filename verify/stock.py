@@ -281,6 +281,7 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
 
 def gather(results: list[object]) -> tuple[F64, int]:
+    """Events (e, 7) of all jobs sorted by move, code and depth, and the number beyond the tables."""
     parts = [r for r in results if isinstance(r, tuple)]
     if not parts:
         return np.zeros((0, 7)), 0
