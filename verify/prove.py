@@ -21,7 +21,7 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.guard import convex_edges, gouge_depths, guard_samples, sparse_faces
+from verify.guard import CLOSER_SHARE, closer_points, convex_edges, gouge_depths, guard_samples, sparse_faces
 from verify.material import contacts
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
@@ -124,10 +124,19 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
-                                          progress=lambda f: tell(0.1 + 0.8 * f))
+                                          progress=lambda f: tell(0.1 + 0.7 * f))
+    near = np.flatnonzero((residual < -CLOSER_SHARE * setup.gouge_tolerance) & (mover >= 0))
+    if len(near):
+        tree = TriangleTree(part.mesh)
+        places, outward, row = closer_points(tree, points[near], residual[near])
+        left, by = residual_on_normals(places, outward, np.full(len(places), reach), moves, tools, threads=threads,
+                                       progress=lambda f: tell(0.8 + 0.1 * f))
+        points, normals = np.concatenate([points, places]), np.concatenate([normals, outward])
+        face, area = np.concatenate([face, part.mesh.face_ids[row]]), np.concatenate([area, np.zeros(len(row))])
+        residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
     deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))
     if len(deep):
-        residual[deep] = -gouge_depths(TriangleTree(part.mesh), points[deep], normals[deep], -residual[deep],
+        residual[deep] = -gouge_depths(tree, points[deep], normals[deep], -residual[deep],
                                        lambda f: tell(0.9 + 0.1 * f))
     deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
     out = _Cuts()

@@ -12,13 +12,13 @@ from verify.findings import Source
 from verify.model import Finding, FindingKind
 from verify.removal import Moves
 
-LEAST_LINES = 12
+LEAST_LINES = 4
 WINDOW = 8
 ROUND = 1e-6  # mm, rad: moves nearer than that are the same
 
 
 def repeat_findings(moves: Moves, cut: NDArray[np.bool_], source: Source) -> list[Finding]:
-    """One finding for each run of feed moves over at least 12 lines that repeats an earlier one and takes no stock.
+    """One finding for each run of feed moves over at least 4 lines that repeats an earlier one and takes no stock.
 
     cut : (m,) bool, moves that took stock
     """

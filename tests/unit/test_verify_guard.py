@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
+from geometry.nearest import nearest
 from tests.hand_parts import dome
-from verify.guard import gouge_depths
+from verify.guard import MOST_SEEDS, closer_points, gouge_depths
 
 RADIUS = 15.0
 
@@ -23,3 +25,19 @@ def test_a_gouge_under_the_exact_surface_is_as_deep_as_it_is(off):
     points, normals = _on_sphere(off)
     depth = gouge_depths(TriangleTree(dome(RADIUS)), points, normals, np.full(len(points), 0.01))
     np.testing.assert_allclose(depth, 0.01, atol=1e-3)
+
+
+def test_places_round_the_lowest_samples_are_looked_at_closely():
+    """Every place of the surface near the lowest samples has one within 0.015 mm; the highest samples have none near."""
+    tree = TriangleTree(dome(RADIUS))
+    points, _ = _on_sphere(0.0)
+    residual = np.linspace(-0.02, 0.0, len(points))
+    places, normals, row = closer_points(tree, points, residual)
+    assert np.abs(np.einsum("ij,ij->i", places - tree.mesh.triangles[row].mean(axis=1), normals)).max() < 1e-9
+    lowest = points[np.argsort(residual)[:MOST_SEEDS // 2]]
+    rng = np.random.default_rng(2)
+    asked, _, there = nearest(tree, lowest + rng.uniform(-0.06, 0.06, lowest.shape))
+    assert cKDTree(places).query(there)[0].max() < 0.015 and len(asked) == len(lowest)
+    assert cKDTree(places).query(points[-100:])[0].min() > 0.3
+    empty = closer_points(tree, points[:0], residual[:0])
+    assert [len(part) for part in empty] == [0, 0, 0]
