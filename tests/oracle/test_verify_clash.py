@@ -8,7 +8,8 @@ import pytest
 from geometry.toolbody import HolderSegment, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.clash import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
-from verify.kernels.clash import TOUCHING, is_lift, meet_body
+from verify.kernels.clash import TOUCHING, is_lift
+from verify.kernels.heights import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 from verify.removal import BOW, Moves
@@ -151,7 +152,7 @@ def test_the_depth_in_one_body_is_the_deepest_of_many_places(grow):
         body = np.array([2.0, 6.0, 3.0 + 0.3, 3.0 + 1.5 * (case % 2) + 0.3, 0.3, SHANK])
         d = rng.normal(size=3) * np.array([[2, 2, 2], [2, 2, 0], [0, 0, 2], [0, 0, 0]][case % 4])
         q = rng.uniform([-5, -5, 0], [5, 5, 8])
-        got = meet_body(tuple(q), tuple(d), body, grow, TOUCHING)
+        got = contact(*q, *d, 2.0, 6.0, body[2] + grow, body[3] + grow, body[4] + grow, TOUCHING, 0.0, False)
         w = q - s[:, None] * d
         rho, h = np.hypot(w[:, 0], w[:, 1])[None], w[:, 2][None]
         least, most = (float(body_depth(rho, h, body, grow, TOUCHING, off)[0]) for off in (-1e-6, 1e-3))

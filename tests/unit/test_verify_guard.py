@@ -28,7 +28,7 @@ def test_a_gouge_under_the_exact_surface_is_as_deep_as_it_is(off):
 
 
 def test_places_round_the_lowest_samples_are_looked_at_closely():
-    """Every place of the surface near the lowest samples has one within 0.015 mm; the highest samples have none near."""
+    """Every place of the surface near the lowest samples has one within 0.015 mm; the highest have none near them."""
     tree = TriangleTree(dome(RADIUS))
     points, _ = _on_sphere(0.0)
     residual = np.linspace(-0.02, 0.0, len(points))
