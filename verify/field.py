@@ -158,8 +158,9 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
     Notes
     -----
-    Plunge: the volume that a steep descent takes off within the end-cutting region, over the area of that region, is
-    the mean depth it dug; such depths add up over the moves, and way made aside works them off at the slope of a ramp.
+    Plunge: the volume that a steep descent takes off within the end-cutting region, over the area that region goes
+    over, is the mean depth it dug; such depths add up over the moves, way made aside works them off at the slope of a
+    ramp, and what was dug where the region no longer stands is another hole.
     """
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
@@ -180,16 +181,33 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
     taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce([t[:, 2] for t in sums])
-    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * ends[moves.tool] ** 2)
-    plunges = _plunges(moves, dug, earned, setup.plunge_skin * 2.0 * cutters[:, 0])
+    end = ends[moves.tool]
+    aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
+    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * end**2 + 2.0 * end * aside)
+    plunges = _plunges(moves, axes, dug, end, earned, setup.plunge_skin * 2.0 * cutters[:, 0])
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)
 
 
-def _plunges(moves: Moves, dug: F64, earned: F64, skins: F64) -> F64:
-    """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves with which more than the skin of their tool is open."""
+def _across(way: F64, axis: F64) -> F64:
+    """Vectors (n, 3) less what of them goes along unit vectors (n, 3)."""
+    return np.asarray(way - (way * axis).sum(axis=1, keepdims=True) * axis)
+
+
+def _plunges(moves: Moves, axes: ToolAxes, dug: F64, end: F64, earned: F64, skins: F64) -> F64:
+    """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves with which more than the skin of their tool is open.
+
+    dug, end : (m,) float64, mm, mean depth of each move and radius of the end that dug it
+
+    What was dug before counts by the share of its width that the end still stands over, so a way that goes on
+    downhill is as deep as the stock it leaves, not as deep as all its steps together.
+    """
+    digging = np.flatnonzero(dug > 0.0)
+    gone = np.zeros(len(digging))
+    gone[1:] = np.linalg.norm(_across(np.diff(moves.end[digging], axis=0), axes.middle[digging[1:]]), axis=1)
+    over = np.maximum(1.0 - gone / (2.0 * end[digging]), 0.0)
     rows, depth, paid = [], 0.0, 0.0
-    for m in np.flatnonzero(dug > 0.0).tolist():
-        depth = max(depth - (earned[m] - paid), 0.0) + dug[m]
+    for m, share in zip(digging.tolist(), over.tolist(), strict=True):
+        depth = max(depth - (earned[m] - paid), 0.0) * share + dug[m]
         paid = earned[m]
         if depth > skins[moves.tool[m]]:
             rows.append((m, PLUNGE, depth, 0.0, *moves.end[m].tolist()))

@@ -155,6 +155,16 @@ def test_a_plunge_along_a_leaning_axis_is_as_deep_as_it_goes():
     assert len(down.events) == 0
 
 
+@pytest.mark.parametrize("steps", [20, 80])
+def test_a_way_downhill_is_a_plunge_as_deep_as_the_stock_it_leaves(steps):
+    """However many steps it is written in: what was dug where the tool no longer stands is not dug again."""
+    tool, s = mill(4.0, 0.0), np.linspace(0.0, 1.0, steps + 1)[:, None]
+    moves = path(np.array([-6.0, 0.0, 0.2]) + s * [11.0, 0.0, -1.2])
+    run = run_field(stock_field(MESH, block(), 0.2), moves, [tool], block(), bare=True)
+    dug = run.events[run.events[:, 1] == PLUNGE][:, 2]
+    assert 0.5 <= dug.max() <= 1.0  # 1 mm at the end of the way, less where the back of the tool still stands
+
+
 @pytest.mark.parametrize("kind", ["box", "part_offset"])
 def test_blanks_are_as_far_as_their_closed_forms(kind):
     part = np.array([[-4.0, -3.0, -5.0], [4.0, 3.0, 0.0]])
