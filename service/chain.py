@@ -276,7 +276,9 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
         rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=_access(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
-        gauge_length={body.number: t.gauge_length_mm or 0.0 for t, body in zip(s.tools, tool_bodies(s), strict=True)},
+        gauge_length={body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
+                      body.stickout + sum(h.length for h in body.holder)
+                      for t, body in zip(s.tools, tool_bodies(s), strict=True)},
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
         max_engaged={body.number: math.radians(t.max_engagement_deg)
                      for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},

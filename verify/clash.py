@@ -13,31 +13,59 @@ from verify.kernels.clash import clash_chunk
 from verify.model import ProofSetup
 from verify.pointtree import PointTree
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stock import EVENTS, Bodies, gather
+from verify.stock import Bodies, event_table, free_rapids, gather, noted
 from verify.toolaxes import ToolAxes
 
 FIXTURE_SPACING = 0.25
-MOST_FIXTURE_POINTS = 400_000
+MOST_FIXTURE_POINTS = 1_500_000
 
 
-def fixture_points(fixtures: Sequence[F64], floor: float) -> F64:
-    """Points on the faces of boxes, at most 0.25 mm apart (wider where that would take over 400 000 of them).
+def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> F64:
+    """Points on the faces of the fixtures where a tool may come near, at most 0.25 mm and half a tool radius apart.
 
-    fixtures : boxes as (2, 3) float64 corners, mm; each stands down to ``floor`` mm, or lower where it begins lower
+    bounds : (2, 3) float64, mm, of the part; a fixture stands down to its underside, or lower where it begins lower
+    moves, tools : what is farther from every tip than the longest tool reaches is left out
 
-    Returns (n, 3) float64, mm: tops and sides, edges and corners included; undersides stand on the table.
+    Returns (n, 3) float64, mm: tops, sides and undersides, edges and corners included. Wider apart where that would
+    take over 1.5 million points (see ``fixture_spacing``).
     """
-    boxes = [np.array([[*f[0, :2], min(f[0, 2], floor)], f[1]], dtype=np.float64) for f in fixtures]
-    area = sum(float(w * d + 2 * h * (w + d)) for w, d, h in (b[1] - b[0] for b in boxes))
-    spacing = max(FIXTURE_SPACING, (area / MOST_FIXTURE_POINTS) ** 0.5)
+    boxes = _near_boxes(setup, bounds, moves, tools)
+    spacing = fixture_spacing(setup, bounds, moves, tools)
     out = [np.zeros((0, 3))]
-    for low, high in boxes:
+    for low, high, under in boxes:
         x, y, z = (np.linspace(a, b, max(2, int(np.ceil((b - a) / spacing)) + 1))
                    for a, b in zip(low.tolist(), high.tolist(), strict=True))
-        out.append(_sheet(x, y, high[2:]))
+        out.extend(_sheet(x, y, np.array([v])) for v in (high[2], under))
         out.extend(_sheet(x, np.array([v]), z) for v in (low[1], high[1]))
         out.extend(_sheet(np.array([v]), y, z) for v in (low[0], high[0]))
     return np.concatenate(out)
+
+
+def fixture_spacing(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> float:
+    """mm between the points of ``fixture_points``; bounds (2, 3) float64, mm."""
+    area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in
+               (high - low for low, high, _ in _near_boxes(setup, bounds, moves, tools)))
+    least = min((0.5 * t.radius for t in tools), default=FIXTURE_SPACING)
+    return max(min(FIXTURE_SPACING, least), (area / MOST_FIXTURE_POINTS) ** 0.5)
+
+
+def _near_boxes(setup: ProofSetup, bounds: F64, moves: Moves,
+                tools: Sequence[ToolBody]) -> list[tuple[F64, F64, float]]:
+    """Lower and upper corner and underside of the fixtures, cut to where a tool may come."""
+    if len(moves) == 0 or not setup.fixtures:
+        return []
+    far = float(Bodies.of(tools, setup).reach(cutter_table(tools)).max()) + setup.clearance_rapid
+    ways = np.concatenate([moves.start, moves.end])
+    lower, upper = ways.min(axis=0) - far, ways.max(axis=0) + far
+    out = []
+    for f in setup.fixtures:
+        low, high = np.asarray(f, dtype=np.float64)
+        under = float(low[2])
+        low = np.maximum([low[0], low[1], min(under, float(bounds[0, 2]))], lower)
+        high = np.minimum(high, upper)
+        if (low < high).all():
+            out.append((low, high, max(under, float(low[2]))))
+    return out
 
 
 def _sheet(x: F64, y: F64, z: F64) -> F64:
@@ -45,10 +73,12 @@ def _sheet(x: F64, y: F64, z: F64) -> F64:
 
 
 def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *,
-                threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> tuple[F64, int]:
+                threads: int = 2, progress: Progress | None = None, bow: float = BOW,
+                free: NDArray[np.bool_] | None = None) -> tuple[F64, int]:
     """Bodies of all moves, and in rapids the cutting part, against (n, 3) float64 points, mm.
 
     fixed : (n,) bool, points of fixtures, which the cutting part must not touch either
+    free  : (m,) bool, rapids that no clearance is asked of; found from the moves where None
 
     Returns the events (e, 7) sorted by move and the number beyond the table.
     """
@@ -57,16 +87,16 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
     pts, held = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order])
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
-    reach = bodies.reach(cutters)
+    reach, free = bodies.reach(cutters), free_rapids(moves) if free is None else free
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
 
     def job(chunk: int) -> Callable[[], object]:
         def work() -> object:
-            events = np.empty((EVENTS, 7))
+            events = event_table()
             n = clash_chunk(chunk, *tree.balls, pts, held, start, end, axes.axis, axes.about, axes.angle, moves.feed,
-                            moves.tool, cutters, bodies.rows, bodies.first, reach, setup.clearance_rapid,
+                            free, moves.tool, cutters, bodies.rows, bodies.first, reach, setup.clearance_rapid,
                             setup.gouge_tolerance, bow, events)
-            return events[:min(n, EVENTS)].copy(), n
+            return noted(events), n
         return work
 
     return gather(run_tiles([job(c) for c in range(tree.chunks)], threads, progress))

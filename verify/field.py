@@ -24,13 +24,15 @@ from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
 from verify.stock import (
-    EVENTS,
     Bodies,
     StockPass,
     blank_cylinder,
     descents,
     end_radii,
+    event_table,
+    free_rapids,
     gather,
+    noted,
     stock_bounds,
     tables_for,
 )
@@ -166,17 +168,17 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
     reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
-    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
     sums, spare = tables_for(threads, (len(moves), 3))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
-            events, taken = np.empty((EVENTS, 7)), spare.get()
+            events, taken = event_table(), spare.get()
             n = field_tile(field.values, tile, field.origin, field.step, field.step, start, end, axes.axis,
-                           axes.about, axes.angle, moves.feed, steep, moves.tool, cutters, ends, bodies.rows,
+                           axes.about, axes.angle, moves.feed, free, steep, moves.tool, cutters, ends, bodies.rows,
                            bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
             spare.put(taken)
-            return events[:min(n, EVENTS)].copy(), n
+            return noted(events), n
         return work
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))

@@ -17,7 +17,7 @@ from verify.fitness import top_of_all
 from verify.model import ProofSetup
 from verify.progress import Stages
 from verify.removal import Moves
-from verify.stock import StockPass, blank, run_bodies, run_stock
+from verify.stock import StockPass, blank, free_rapids, run_bodies, run_stock
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +49,31 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     if moves.axes is None:
         lines = blank(mesh, setup, threads=threads, progress=stages.span(0.0, 0.1))
         run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.1, 0.6))
-        met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 1.0))
+        met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 0.8))
+        met, lost = _with_points(met, lost, points, ~moves.feed, False, moves, tools, setup, threads)
+        stages.tell(0.9)
+        held = fixture_points(setup, mesh.bounds, moves, tools)
+        met, lost = _with_points(met, lost, held, np.ones(len(moves), np.bool_), True, moves, tools, setup, threads)
         spacing = lines.step
     else:
         field = stock_field(mesh, setup, setup.line_spacing, threads=threads, progress=stages.span(0.0, 0.15))
         run = run_field(field, moves, tools, setup, threads=threads, progress=stages.span(0.15, 0.7))
-        held = fixture_points(setup.fixtures, float(mesh.bounds[0, 2]))
+        held = fixture_points(setup, mesh.bounds, moves, tools)
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=stages.span(0.7, 1.0))
         spacing = field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
+
+
+def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fixed: bool, moves: Moves,
+                 tools: Sequence[ToolBody], setup: ProofSetup, threads: int) -> tuple[F64, int]:
+    """Events and losses with those of the chosen moves at points, of fixtures or of the part, added."""
+    rows = np.flatnonzero(chosen)
+    more, away = run_clashes(points, np.full(len(points), fixed), moves.only(chosen), tools, setup, threads=threads,
+                             free=free_rapids(moves)[chosen])
+    more[:, 0] = rows[more[:, 0].astype(np.int64)]
+    return np.concatenate([met, more]), lost + away
 
 
 def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, count: int) -> StockPass:

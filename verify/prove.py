@@ -60,7 +60,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     ProgramError
         A program cannot be read; the subjects name the lines.
     VerificationError
-        Two tools share a number, a cutting part is impossible, or samples and zones do not fit each other.
+        Two tools share a number, a cutting part is impossible, samples and zones do not fit each other, a fixture is no
+        box, or the budget no number.
 
     Notes
     -----
@@ -68,7 +69,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     exact on the normal of each sample (error_bound); stock that is not part is seen on vertical lines, or on a grid
     where tools lean or programs run with another side up.
     """
-    _check(tools, scored, zone_ids)
+    _check(tools, setup, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
     stages = Stages(progress)
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
@@ -91,8 +92,17 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                   met.spacing, tuple(notes))
 
 
-def _check(tools: Sequence[ToolBody], scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
+def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
     check_numbers(tools)
+    for k, box in enumerate(setup.fixtures):
+        if not (np.isfinite(box).all() and (np.asarray(box)[0] < np.asarray(box)[1]).all()):
+            raise VerificationError(f"fixture {k + 1} is no box: {np.asarray(box).tolist()}", code="bad_fixture",
+                                    subjects=(f"fixture {k + 1}",), measured=np.asarray(box).tolist(),
+                                    remedy="give its lower corner first and its upper corner second, in mm")
+    budget = [setup.gouge_tolerance, setup.scallop_height, setup.stock_allowance]
+    if not np.isfinite(budget).all():
+        raise VerificationError("the budget of the proof is no number", code="bad_budget", measured=budget,
+                                remedy="give gouge tolerance, scallop height and stock allowance in mm")
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
         raise VerificationError("samples and zones do not fit each other", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))

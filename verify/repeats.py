@@ -21,13 +21,23 @@ def repeat_findings(moves: Moves, cut: NDArray[np.bool_], source: Source) -> lis
     """One finding for each run of feed moves over at least 4 lines that repeats an earlier one and takes no stock.
 
     cut : (m,) bool, moves that took stock
+
+    A level round walked once more at once, a spring pass, is none.
     """
     return [Finding(FindingKind.PROGRAM, source.names[source.program[a]], int(source.line[a]), None, None,
                     tuple(round(float(v), 6) for v in moves.end[a]), 0.0, 0.0,  # type: ignore[arg-type]
                     f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} run again what lines "
                     f"{source.line[a - shift]} to {source.line[b - shift]} ran, and take nothing off", b - a + 1)
             for a, b, shift in _runs(moves, cut)
-            if source.line[b] - source.line[a] + 1 >= LEAST_LINES]
+            if source.line[b] - source.line[a] + 1 >= LEAST_LINES and not _spring(moves, a, b, shift)]
+
+
+def _spring(moves: Moves, a: int, b: int, shift: int) -> bool:
+    """Whether moves a..b are a level round again, right after the first time."""
+    way = moves.end[a:b + 1] - moves.start[a:b + 1]
+    up = np.array([0.0, 0.0, 1.0]) if moves.axes is None else moves.axes.axis[a]
+    closed = np.linalg.norm(moves.end[b] - moves.start[a]) < 1e-3
+    return bool(shift == b - a + 1 and closed and np.abs(way @ up).max() < 1e-6)
 
 
 def _runs(moves: Moves, cut: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:

@@ -43,19 +43,19 @@ EVENTS = 4096
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 NEVER = -1e30
 ANOTHER_TOOL = 1e6  # mm
+NO_HOLDER = 200.0  # mm by which a shank goes on over its stickout where the setup names no holder
 
 
 @dataclass(frozen=True, eq=False)
 class StockField:
     """Vertical lines: line (i, j) stands at origin + ((i, j) + 0.5) step.
 
-    origin : (2,) float64, mm; height, fixed : (nx, ny) float64, mm, top of the stock and of the fixtures
+    origin : (2,) float64, mm; height : (nx, ny) float64, mm, top of the stock
     """
 
     origin: F64
     step: float
     height: F64
-    fixed: F64
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +98,9 @@ def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float
     for part in tool.holder:
         out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
         z += part.length
+    if not tool.holder:
+        # nobody said what holds it: at least the tool itself goes on
+        out.append((max(z, top), max(z, top) + NO_HOLDER, shank, shank, setup.clearance_shank, SHANK))
     return out
 
 
@@ -153,17 +156,14 @@ def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2, progress: 
     Exact on every line: an offset blank is the union of spheres on the surface, by facets, edges and corners.
     """
     box = stock_bounds(mesh.bounds, setup)
-    corners = [box, mesh.bounds, *(np.asarray(f, dtype=np.float64) for f in setup.fixtures)]
+    corners = [box, mesh.bounds]
     lower = np.min([c[0, :2] for c in corners], axis=0)
     extent = np.max([c[1, :2] for c in corners], axis=0) - lower
     step = max(setup.line_spacing, math.sqrt(float(extent.prod()) / MAX_LINES))
     nx, ny = (np.ceil(extent / step).astype(int) + 1).tolist()
     origin = lower - 0.5 * step
-    height, fixed = np.full((nx, ny), NEVER), np.full((nx, ny), NEVER)
+    height = np.full((nx, ny), NEVER)
     x, y = origin[0] + (np.arange(nx) + 0.5) * step, origin[1] + (np.arange(ny) + 0.5) * step
-    for f in corners[2:]:
-        inside = np.ix_((x >= f[0, 0]) & (x <= f[1, 0]), (y >= f[0, 1]) & (y <= f[1, 1]))
-        fixed[inside] = np.maximum(fixed[inside], f[1, 2])
     if setup.stock_kind == StockKind.BOX:
         height[np.ix_((x >= box[0, 0]) & (x <= box[1, 0]), (y >= box[0, 1]) & (y <= box[1, 1]))] = box[1, 2]
     elif setup.stock_kind == StockKind.CYLINDER:
@@ -171,7 +171,7 @@ def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2, progress: 
         height[np.hypot(x[:, None] - cx, y[None, :] - cy) <= radius] = box[1, 2]
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
     _raise(height, origin, step, mesh, reach, threads, progress)
-    return StockField(origin, step, height, fixed)
+    return StockField(origin, step, height)
 
 
 def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
@@ -196,7 +196,7 @@ def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
     Returns
     -------
     steep : (m,) bool
-    earned : (m,) float64, mm: sideways way of all moves before that are not steep, times the tangent of the angle;
+    earned : (m,) float64, mm: sideways way of all feed moves before that are not steep, times the tangent of the angle;
              without end at a change of the tool
     """
     d, slope = moves.end - moves.start, math.tan(ramp_angle)
@@ -207,7 +207,7 @@ def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
         rise = np.einsum("ij,ij->i", d, up)
         aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
     steep = np.asarray(moves.feed & (-rise > aside * slope + 1e-9))
-    earned = np.cumsum(np.where(steep, 0.0, aside * slope))
+    earned = np.cumsum(np.where(moves.feed & ~steep, aside * slope, 0.0))
     changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
     return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
 
@@ -244,19 +244,19 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
     (steep, earned), cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
-    skins = setup.plunge_skin * 2.0 * cutters[:, 0]
+    skins, free = setup.plunge_skin * 2.0 * cutters[:, 0], free_rapids(moves)
     nx, ny = field.height.shape
     tables, spare = tables_for(threads, (len(moves),))
 
     def job(i: int, j: int) -> Callable[[], object]:
         def work() -> object:
-            events, engaged = np.empty((EVENTS, 7)), spare.get()
+            events, engaged = event_table(), spare.get()
             n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
-                           field.fixed, moves.start, moves.end, moves.feed, steep, earned, moves.tool, cutters,
+                           moves.start, moves.end, moves.feed, free, steep, earned, moves.tool, cutters,
                            end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
                            setup.gouge_tolerance, cut, engaged, events)
             spare.put(engaged)
-            return events[:min(n, EVENTS)].copy(), n
+            return noted(events), n
         return work
 
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
@@ -278,13 +278,46 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
         def work() -> object:
-            events = np.empty((EVENTS, 7))
+            events = event_table()
             n = body_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, moves.start, moves.end,
                           moves.feed, moves.tool, radii, bodies.rows, bodies.first, setup.gouge_tolerance, events)
-            return events[:min(n, EVENTS)].copy(), n
+            return noted(events), n
         return work
 
     return gather(run_tiles([job(t) for t in grid.tiles()], threads, progress))
+
+
+def event_table() -> F64:
+    """An empty table of events (e + 1, 7), in mm; the kernels keep in its last row how many it holds."""
+    return np.zeros((EVENTS + 1, 7))
+
+
+def noted(events: F64) -> F64:
+    """The rows (e, 7) of a table that hold events, in mm."""
+    return events[:int(events[-1, 0])].copy()
+
+
+def free_rapids(moves: Moves) -> NDArray[np.bool_]:
+    """(m,) bool: rapids that no clearance is asked of.
+
+    Those that draw the tool straight out along its axis, and those that put it straight back no deeper than a feed
+    move had it, with no move aside since: a peck out of its hole and into it again.
+    """
+    d = moves.end - moves.start
+    up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
+    rise = np.einsum("ij,ij->i", d, up)
+    aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
+    straight = aside <= 1e-6 * np.abs(rise) + 1e-7
+    if moves.axes is not None:
+        straight &= moves.axes.angle == 0.0
+    out = np.asarray(~moves.feed & straight & (rise > 0))
+    for m in np.flatnonzero(~moves.feed & straight & (rise < 0)).tolist():
+        height, i = 0.0, m - 1  # of the end of move i over the start of move m
+        while i >= 0 and straight[i] and moves.tool[i] == moves.tool[m] and not out[m]:
+            out[m] = moves.feed[i] and height <= rise[m] + 1e-9
+            height -= rise[i]
+            i -= 1
+    return out
 
 
 def gather(results: list[object]) -> tuple[F64, int]:

@@ -183,25 +183,34 @@ def test_upright_moves_are_those_of_an_axis_along_z():
     assert len(a) > 0 and a.tobytes() == b.tobytes()
 
 
-def test_points_of_fixtures_cover_tops_and_sides():
+def near_all(boxes, lower=(-50.0, -50, -50), upper=(500.0, 400, 200)):
+    """Points of fixtures with a move of the tool that goes everywhere."""
+    moves = Moves(np.array([lower]), np.array([upper]), np.array([True]), np.zeros(1, np.int32))
+    bounds = np.array([[0.0, 0, -4], [10, 10, 10]])
+    return fixture_points(replace(SETUP, fixtures=tuple(boxes)), bounds, moves, [TOOL])
+
+
+def test_points_of_fixtures_cover_tops_sides_and_undersides():
     boxes = [np.array([[0.0, 0, 2], [10, 4, 5]]), np.array([[-3.0, -3, -8], [-1, 9, 1]])]
-    points = fixture_points(boxes, -4.0)
+    points = near_all(boxes)
     for box, floor in zip(boxes, (-4.0, -8.0), strict=True):
         low, high = np.array([*box[0, :2], floor]), box[1]
         own = points[((points >= low - 1e-9) & (points <= high + 1e-9)).all(axis=1)]
         on = np.isclose(own, low) | np.isclose(own, high)
-        on[:, 2] = np.isclose(own[:, 2], high[2])
-        assert len(own) and on.any(axis=1).all()  # nothing inside, nothing on the underside alone
+        on[:, 2] = np.isclose(own[:, 2], high[2]) | np.isclose(own[:, 2], box[0, 2])
+        assert len(own) and on.any(axis=1).all()
         rng = np.random.default_rng(2)
-        for axis, value in ((2, high[2]), (0, low[0]), (0, high[0]), (1, low[1]), (1, high[1])):
+        for axis, value in ((2, high[2]), (2, box[0, 2]), (0, low[0]), (0, high[0]), (1, low[1]), (1, high[1])):
             ask = rng.uniform(low, high, (300, 3))
             ask[:, axis] = value
             apart = np.linalg.norm(ask[:, None, :] - own, axis=2).min(axis=1)
             assert apart.max() <= FIXTURE_SPACING * np.sqrt(0.5) + 1e-9
-    assert fixture_points([], 0.0).shape == (0, 3)
+    assert near_all([]).shape == (0, 3)
 
 
-def test_many_fixture_points_are_thinned():
+def test_many_fixture_points_are_thinned_and_what_no_tool_comes_near_is_left_out():
     big = [np.array([[0.0, 0, 0], [400, 300, 100]])]
-    points = fixture_points(big, 0.0)
-    assert 0.5 * MOST_FIXTURE_POINTS < len(points) < 1.05 * MOST_FIXTURE_POINTS
+    assert 0.5 * MOST_FIXTURE_POINTS < len(near_all(big)) < 1.1 * MOST_FIXTURE_POINTS
+    here = near_all(big, (10.0, 10, 105), (20.0, 20, 110))
+    assert len(here) < 0.2 * MOST_FIXTURE_POINTS and here[:, 0].max() < 60 and here[:, 2].max() == 100
+

@@ -85,11 +85,12 @@ def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b,
 
 
 @njit(**KERNEL)
-def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about, angle, feeds, tool, cutters, bodies,
-                body_first, reach, rapid_grow, slack, bow, events):
+def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about, angle, feeds, free, tool, cutters,
+                bodies, body_first, reach, rapid_grow, slack, bow, events):
     """Events of all moves with the points of one chunk; returns their number, which may exceed the table.
 
     t0..t3  : (k, 4) float64 balls of 8, 64, 512, 4096 points; points (n, 3) in the order of the tree
+    free    : (m,) bool, rapids that no clearance is asked of
     fixed   : (n,) bool, points of fixtures: the cutting part must not touch those either
     reach   : (k,) float64, mm, how far the whole assembly reaches from the tip; bow : mm
     slack   : mm of overlap with the part that the cutting part, and a body beside its own cut, may have
@@ -103,8 +104,7 @@ def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about,
         far = reach[k] + rad + bow + rapid_grow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        lift = not feed and is_lift(angle[m], axis[m], starts[m], ends[m])
-        grow = 0.0 if feed or lift else rapid_grow
+        grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         for part in range(n):
@@ -113,7 +113,7 @@ def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about,
                 _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, not feed, cutters[k], bodies, -1, grow,
                           slack, best)
             for b in range(body_first[k], body_first[k + 1]):
-                extra = 0.0 if feed else -bodies[b, 4] if lift else grow - min(grow, bodies[b, 4])
+                extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
                 beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
                 _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, True, cutters[k], bodies, b, extra,
                           slack if beside else TOUCHING, best)

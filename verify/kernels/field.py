@@ -30,6 +30,7 @@ from verify.kernels.rays import gap, plan_distance
 from verify.kernels.stock import CUTTER, _note, _worse
 
 LEAST_CUT = 1e-5
+RISE = 0.1  # of the flutes: a tool goes up no further between two looks at its bodies
 VOLUME_UNITS = 1e9
 
 
@@ -104,7 +105,7 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             if d <= 0.0 and plan > 0.0 and qz - 0.5 * dz > LEAST_DEPTH * cutter[0]:
                                 sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h)
                         totals[0] += gone
-                        if steep and (qx - 0.5 * dx) ** 2 + (qy - 0.5 * dy) ** 2 < end_radius * end_radius:
+                        if steep and plan_distance(qx, qy, dx, dy, dx * dx + dy * dy) < end_radius:
                             totals[1] += gone
                         v = d
                 top = max(top, v)
@@ -223,11 +224,12 @@ def _beside(seen, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, steep, tool, cutters, ends_radius,
-               bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
+def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, free, steep, tool, cutters,
+               ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
+    free  : (m,) bool, rapids that no clearance is asked of
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
     taken : (m, 3) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
@@ -253,10 +255,14 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         far = reach[k] + rad + band + bow + rapid_grow
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
-        lift = not feed and is_lift(angle[m], axis[m], starts[m], ends[m])
-        grow = 0.0 if feed or lift else rapid_grow
+        grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
+        if feed and not is_lift(angle[m], axis[m], starts[m], ends[m]):
+            # flutes that come up past a place must not have cut it when the neck was there: cut and look by turns
+            rise = (ends[m, 0] - starts[m, 0]) * axis[m, 0] + (ends[m, 1] - starts[m, 1]) * axis[m, 1] \
+                + (ends[m, 2] - starts[m, 2]) * axis[m, 2]
+            n = max(n, math.ceil(rise / (RISE * cutters[k, 2])))
         totals[:] = 0.0
         sectors = np.int64(0)
         for part in range(n):
@@ -269,7 +275,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
             elif near:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
             for b in range(body_first[k], body_first[k + 1]):
-                extra = 0.0 if feed else -bodies[b, 4] if lift else grow - min(grow, bodies[b, 4])
+                extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
                 if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
                     continue
                 beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9

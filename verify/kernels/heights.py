@@ -161,8 +161,11 @@ def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, col
     r0, r1 hold the clearance. Up to the clearance that is how much nearer than it, aside; above it the clearance and
     how deep the point is in the bare body (``penetration``). 0 where it is no deeper than ``slack`` or ``known``.
     """
+    least = max(slack, known)
+    if r0 != r1 and overlap(wx, wy, wz, 0.0, 0.0, 0.0, dx, dy, dz, z0, z1, max(r0, r1), max(r0, r1), column) <= least:
+        return 0.0  # a cone is searched, the cylinder round it is not
     depth = overlap(wx, wy, wz, 0.0, 0.0, 0.0, dx, dy, dz, z0, z1, r0, r1, column)
-    if depth <= max(slack, known):
+    if depth <= least:
         return 0.0
     bare = penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, column)
     return clearance + bare if bare > slack else min(depth, clearance)

@@ -21,24 +21,34 @@ REFRESH = 64
 
 
 @njit(cache=True, nogil=True)
-def _top(height, fixed, i0, i1, j0, j1):
+def _top(height, i0, i1, j0, j1):
     most = -INF
     for i in range(i0, i1):
         for j in range(j0, j1):
-            most = max(most, height[i, j], fixed[i, j])
+            most = max(most, height[i, j])
     return most
 
 
 @njit(cache=True, nogil=True)
 def _note(events, count, m, best):
-    """Append the events of one move; rows beyond the table are counted only."""
+    """Append the events of one move; of a full table the worse half stays. Returns how many were noted in all.
+
+    The last row of the table tells how many before it hold events.
+    """
+    room = len(events) - 1
+    used = int(events[room, 0])
     for code in range(len(best)):
         if best[code, 0] > 0.0:
-            if count < len(events):
-                events[count, 0], events[count, 1] = m, code
-                events[count, 2:7] = best[code]
+            if used == room:
+                used = room // 2
+                worst = np.sort(np.argsort(events[:room, 3] - events[:room, 2])[:used])
+                events[:used] = events[worst]
+            events[used, 0], events[used, 1] = m, code
+            events[used, 2:7] = best[code]
+            used += 1
             count += 1
             best[code, 0] = 0.0
+    events[room, 0] = used
     return count
 
 
@@ -49,7 +59,7 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
+def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
     """Lower the lines under one feed move; returns whether any stock went, and the sectors of the cutter that met it.
     """
     i0, i1, j0, j1 = box
@@ -64,7 +74,7 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
-            over = max(height[i, j], fixed[i, j]) - floor
+            over = height[i, j] - floor
             if over <= 0.0:
                 continue
             y = origin[1] + (j + 0.5) * step
@@ -78,8 +88,6 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
             if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
                 continue
             low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
-            if fixed[i, j] > low + 1e-3:
-                _worse(best, CUTTER + FIXTURE, fixed[i, j] - low, 0.0, x, y, low)
             gone = height[i, j] - low
             if gone <= 1e-9 or height[i, j] > a[2] + s * d[2] + length + 1e-9:
                 continue
@@ -101,7 +109,7 @@ def _lower(height, fixed, box, origin, step, a, d, cutter, end_radius, skin, ste
 
 
 @njit(cache=True, nogil=True)
-def _meet_body(height, fixed, box, origin, step, a, d, body, grow, slack, best):
+def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
     """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
     z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
     wide = max(r0, r1)
@@ -114,18 +122,17 @@ def _meet_body(height, fixed, box, origin, step, a, d, body, grow, slack, best):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
             y = origin[1] + (j + 0.5) * step
-            for k in range(2):
-                top = height[i, j] if k == 0 else fixed[i, j]
-                if top <= under:
-                    continue
-                depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], z0, z1, r0, r1, body[4] + grow, slack,
-                                best[code + k * FIXTURE, 0], True)
-                if depth > 0.0:
-                    _worse(best, code + k * FIXTURE, depth, body[4] + grow, x, y, top)
+            top = height[i, j]
+            if top <= under:
+                continue
+            depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], z0, z1, r0, r1, body[4] + grow, slack,
+                            best[code, 0], True)
+            if depth > 0.0:
+                _worse(best, code, depth, body[4] + grow, x, y, top)
 
 
 @njit(cache=True, nogil=True)
-def _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best):
+def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
     """Find the lines that the cutting part, grown radially, enters in a rapid."""
     radius, corner, _ = cutter
     wide = radius + grow
@@ -136,26 +143,35 @@ def _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best):
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
-            if height[i, j] <= floor and fixed[i, j] <= floor:
+            top = height[i, j]
+            if top <= floor:
                 continue
             y = origin[1] + (j + 0.5) * step
             low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow)
-            for k in range(2):
-                top = height[i, j] if k == 0 else fixed[i, j]
-                if top > low + 1e-3:
-                    bare, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
-                    touching = top > bare + 1e-3
-                    _worse(best, CUTTER + k * FIXTURE, grow + top - bare if touching else min(top - low, grow) + 1e-9,
-                           grow, x, y, min(top, low))
+            if top <= low + 1e-3:
+                continue
+            bare, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
+            depth = grow + top - bare
+            if top <= bare + 1e-3:
+                # how wide the tool must be to touch: the gap to what stands here
+                free, hits = 0.0, grow
+                for _ in range(20):
+                    wider = 0.5 * (free + hits)
+                    if top > lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, wider)[0] + 1e-3:
+                        hits = wider
+                    else:
+                        free = wider
+                depth = grow - hits
+            _worse(best, CUTTER, depth, grow, x, y, min(top, low))
 
 
 @njit(cache=True, nogil=True)
-def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds, steep, earned, tool, cutters,
+def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, tool, cutters,
                ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, engaged, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
 
     steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
-    rapid_grow : mm around everything in a rapid, none in a straight lift
+    rapid_grow : mm around everything in a rapid, but in those that are ``free`` (m,) bool
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
     engaged : (m,) int64, sectors of the cutter that met stock, added to
 
@@ -165,7 +181,7 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds,
     since = np.zeros((i1 - i0, j1 - j0))
     dug = np.zeros((i1 - i0, j1 - j0))
     best = np.zeros((16, 5))
-    top = _top(height, fixed, i0, i1, j0, j1)
+    top = _top(height, i0, i1, j0, j1)
     x0, x1 = origin[0] + i0 * step, origin[0] + i1 * step
     y0, y1 = origin[1] + j0 * step, origin[1] + j1 * step
     count, lowered = 0, 0
@@ -175,8 +191,7 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds,
             continue
         d = (ends[m, 0] - a[0], ends[m, 1] - a[1], ends[m, 2] - a[2])
         k = tool[m]
-        lift = d[0] == 0.0 and d[1] == 0.0 and d[2] > 0.0
-        grow = 0.0 if feeds[m] or lift else rapid_grow
+        grow = 0.0 if feeds[m] or free[m] else rapid_grow
         wide = cutters[k, 0]
         for b in range(body_first[k], body_first[k + 1]):
             wide = max(wide, bodies[b, 2], bodies[b, 3])
@@ -186,22 +201,22 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, fixed, starts, ends, feeds,
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            went, sectors = _lower(height, fixed, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
+            went, sectors = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
                                    earned[m], since, dug, best)
             if went:
                 cut[m] = 1
                 engaged[m] |= sectors
                 lowered += 1
                 if lowered % REFRESH == 0:
-                    top = _top(height, fixed, i0, i1, j0, j1)
+                    top = _top(height, i0, i1, j0, j1)
         else:
-            _rapid_cutter(height, fixed, box, origin, step, a, d, cutter, grow, best)
+            _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best)
         for b in range(body_first[k], body_first[k + 1]):
             if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
                 # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
                 loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter[0] + 1e-9 else 1e-3
-                extra = grow - min(grow, bodies[b, 4]) if not lift else -bodies[b, 4]
-                _meet_body(height, fixed, box, origin, step, a, d, bodies[b], extra if not feeds[m] else 0.0, loose,
+                extra = grow - min(grow, bodies[b, 4]) if not free[m] else -bodies[b, 4]
+                _meet_body(height, box, origin, step, a, d, bodies[b], extra if not feeds[m] else 0.0, loose,
                            best)
         count = _note(events, count, m, best)
     return count
