@@ -233,6 +233,6 @@ CASES = (
     Foreign("impeller-7bl-xyzac", f"{_DEMOS}/impeller-7bl-xyzac.ngc", 3.0, True, 70.0, (0, 0, -4, 46, 44), 0.35, True,
             points=0.6),
 )
-SHORT = Foreign("3D_Chips, 15 mm flutes", _nc("3D_Chips"), 10.0, True, 15.0, (-50, -50, -50, 50, 50, 0), 0.25,
-                shank=12.0)
-"""The same program with a tool that is too short for it: contacts the twin has to agree on."""
+SHORT = Foreign("spiral, 1.5 mm flutes", _nc("spiral"), 3.175, False, 1.5, (-55, -55, -8, 55, 55, 0), 0.3, shank=6.0,
+                sticking=15.0, neck=0.7)
+"""A program with a tool that is too short for it: contacts the twin has to agree on."""
