@@ -10,8 +10,10 @@ from numba import njit
 from benchmarks.foreign_twin import SIDE, _count, _interval, _pose, _span, _strip, _up
 from geometry.kernels.options import KERNEL
 
+FRESH = KERNEL | {"cache": False}  # numba would not notice a change of what is taken from ``foreign_twin``
 
-@njit(**KERNEL)
+
+@njit(**FRESH)
 def _holds(s, r, row, ball, radius):
     """Whether a body holds what is s over the tip and r off the axis; a ball has its sphere below the radius."""
     if s < row[0] or s > row[1]:
@@ -22,7 +24,7 @@ def _holds(s, r, row, ball, radius):
     return r <= row[2] + share * (row[3] - row[2])
 
 
-@njit(**KERNEL)
+@njit(**FRESH)
 def _visit(stock, origin, h, p, q, t0, t1, row, ball, grow, spacing, remove):
     """Points a body meets on one move. Cutting: how many went; else 2 in stock, 1 within ``grow`` of it."""
     radius, wide = max(row[2], row[3]), max(row[2], row[3]) + grow
@@ -57,7 +59,7 @@ def _visit(stock, origin, h, p, q, t0, t1, row, ball, grow, spacing, remove):
     return gone
 
 
-@njit(**KERNEL)
+@njit(**FRESH)
 def _along(p, q, t0, t1):
     """How far a move goes up the tool and aside from it, by its axis half way, and whether it turns."""
     u = _up(0.5 * (t0[0] + t1[0]), 0.5 * (t0[1] + t1[1]))
@@ -67,7 +69,7 @@ def _along(p, q, t0, t1):
     return rise, aside, t0[0] != t1[0] or t0[1] != t1[1]
 
 
-@njit(**KERNEL)
+@njit(**FRESH)
 def leaning(stock, origin, h, starts, ends, turns, feeds, tool, bodies, clearance, spacing, rapid, body, cut):
     """Run a tool of any axis through ``stock`` (nx, ny, nz) bool, points h mm apart, in place.
 
