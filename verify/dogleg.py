@@ -1,8 +1,9 @@
 """Rapids of machines that run each linear axis at its own speed: the whole box of the move, as sweeps that fill it.
 
 Which way through the box such a machine takes depends on rates and accelerations nobody states, so everything between
-both ends along the linear axes must be clear. The box is filled with sweeps along its longest side. Between sweeps an
-eighth of the tool radius apart, a cylinder misses 1/512 of its radius at the sides of the box and a ball as much below.
+both ends along the linear axes must be clear. The box is filled with sweeps along its longest side, a quarter of the
+tool radius apart: between them a cylinder misses 1/128 of its radius at the sides of the box, and a ball as much below.
+A box that would take over 20 000 sweeps is not filled but a finding.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from verify.findings import Source
+from verify.model import Finding, FindingKind
 from verify.removal import Moves
 from verify.toolaxes import ToolAxes
 
 STILL = 1e-9
-SHARE = 8.0
-MOST = 60
+SHARE = 4.0
+MOST_SWEEPS = 20_000
 
 
 def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple[Moves, NDArray[np.int64]]:
@@ -33,17 +36,11 @@ def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple
 
     Notes
     -----
-    Rapids that turn the tool are left as they are. Sweeps never go up the tool, so none is taken for a lift.
-    At most 60 x 60 of them fill a box, so beyond 7.5 tool radii they are wider apart.
+    Rapids that turn the tool are left as they are, and so are boxes of too many sweeps (``box_findings``). Sweeps never
+    go up the tool, so none is taken for a lift.
     """
-    d = moves.end - moves.start
-    parts = d if slides is None else np.einsum("mij,mj->mi", slides, d)
-    several = (np.abs(parts) > STILL).sum(axis=1) > 1
-    low = np.minimum(moves.start[:, 2], moves.end[:, 2]) < clear
-    if moves.axes is not None:
-        several &= moves.axes.angle == 0.0
-        low |= moves.axes.axis[:, 2] < 1.0 - 1e-12
-    chosen = np.flatnonzero(~moves.feed & several & low)
+    boxed, parts = _boxed(moves, slides, clear)
+    chosen = np.flatnonzero(boxed & (_sweep_counts(parts, radius) <= MOST_SWEEPS))
     if len(chosen) == 0:
         return moves, np.arange(len(moves), dtype=np.int64)
     starts, ends, origin = [], [], []
@@ -65,11 +62,40 @@ def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple
                  moves.feed[rows], moves.tool[rows], axes), rows
 
 
+def box_findings(moves: Moves, slides: F64 | None, radius: F64, clear: float, source: Source) -> list[Finding]:
+    """Rapids whose box would take too many sweeps; parameters as of ``spread``, radius (m,) float64 mm."""
+    boxed, parts = _boxed(moves, slides, clear)
+    counts = _sweep_counts(parts, radius)
+    return [Finding(FindingKind.RAPID, source.names[source.program[m]], int(source.line[m]), None, None,
+                    tuple(round(float(v), 6) for v in moves.end[m]), 0.0, 0.0,  # type: ignore[arg-type]
+                    f"T{source.tool[m]}: the box of this rapid ({np.abs(parts[m]).max():.0f} mm long, rapid_motion "
+                    "dogleg) is too large to be looked through with so thin a tool: move Z alone, or X and Y alone")
+            for m in np.flatnonzero(boxed & (counts > MOST_SWEEPS)).tolist()]
+
+
+def _boxed(moves: Moves, slides: F64 | None, clear: float) -> tuple[NDArray[np.bool_], F64]:
+    """(m,) rapids in several linear axes that may meet something, and (m, 3) mm, how far each axis goes."""
+    d = moves.end - moves.start
+    parts = d if slides is None else np.einsum("mij,mj->mi", slides, d)
+    several = (np.abs(parts) > STILL).sum(axis=1) > 1
+    low = np.minimum(moves.start[:, 2], moves.end[:, 2]) < clear
+    if moves.axes is not None:
+        several &= moves.axes.angle == 0.0
+        low |= moves.axes.axis[:, 2] < 1.0 - 1e-12
+    return np.asarray(~moves.feed & several & low), np.asarray(parts)
+
+
+def _sweep_counts(parts: F64, radius: F64) -> F64:
+    """(m,) how many sweeps fill each box: rows across its two shorter sides."""
+    rows = 1.0 + np.ceil(np.sort(np.abs(parts), axis=1)[:, :2] * SHARE / radius[:, None])
+    return np.asarray(rows.prod(axis=1))
+
+
 def _sweeps(start: F64, parts: F64, basis: F64, axis: F64, apart: float) -> tuple[F64, F64]:
     """Starts and ends (k, 3), mm, of sweeps along the longest side of one box, not up ``axis``."""
     along = int(np.argmax(np.abs(parts)))
     u, v = (c for c in range(3) if c != along)
-    steps = [np.linspace(0.0, parts[c], 1 + min(MOST, int(np.ceil(abs(parts[c]) / apart)))) for c in (u, v)]
+    steps = [np.linspace(0.0, parts[c], 1 + int(np.ceil(abs(parts[c]) / apart))) for c in (u, v)]
     p, q = (x.reshape(-1, 1) for x in np.meshgrid(*steps, indexing="ij"))
     a = start + p * basis[u] + q * basis[v]
     b = a + parts[along] * basis[along]

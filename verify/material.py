@@ -43,9 +43,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     """
     stages, given, origin = Stages(progress), moves, None
     if setup.dogleg:
-        clear = top_of_all(mesh.bounds, setup) + setup.clearance_rapid
-        radius = np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
-        moves, origin = spread(moves, slides, radius, clear)
+        moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
     if moves.axes is None:
         lines = blank(mesh, setup, threads=threads, progress=stages.span(0.0, 0.1))
         run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.1, 0.6))
@@ -64,6 +62,12 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
                                 progress=stages.span(0.7, 1.0))
         spacing = field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
+
+
+def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:
+    """(m,) float64 tool radii, and the height above which a rapid of an upright tool meets nothing, mm."""
+    radius = np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    return radius, top_of_all(mesh.bounds, setup) + setup.clearance_rapid
 
 
 def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fixed: bool, moves: Moves,

@@ -13,6 +13,7 @@ from geometry.mesh import F64, I32
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
+from verify.dogleg import box_findings
 from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
     Source,
@@ -22,7 +23,7 @@ from verify.findings import (
     residual_findings,
 )
 from verify.guard import CLOSER_SHARE, closer_points, convex_edges, gouge_depths, guard_samples, sparse_faces
-from verify.material import contacts
+from verify.material import contacts, dogleg_limits
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
 from verify.reader import Program
@@ -75,14 +76,17 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
     moves, source = moves_of(read, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
-    met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup,
-                   slides_of(read, tools, setup), threads, stages.span(CUT, MET))
+    slides = slides_of(read, tools, setup)
+    met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
+                   stages.span(CUT, MET))
     run = met.run
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
                 *_idle_findings(read, run, moves, source), *repeat_findings(moves, run.cut, source),
+                *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
+                  if setup.dogleg else ()),
                 *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []

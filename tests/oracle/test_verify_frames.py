@@ -7,7 +7,8 @@ import pytest
 
 from geometry.sampling import SurfaceSamples
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
-from verify.dogleg import spread
+from verify.dogleg import box_findings, spread
+from verify.findings import Source
 from verify.kinematics import Kinematics
 from verify.model import FindingKind, NcProgram, ScoredSamples
 from verify.prove import prove
@@ -92,7 +93,11 @@ def test_a_box_of_a_dogleg_is_filled():
         d = out.end[own] - out.start[own]
         s = np.clip(np.einsum("pkj,kj->pk", places[:, None] - out.start[own], d) / (d * d).sum(1), 0, 1)
         gap = np.linalg.norm(places[:, None] - out.start[own] - s[:, :, None] * d, axis=2).min(axis=1)
-        assert gap.max() <= 2.0 / 8 * np.sqrt(0.5) + 1e-9
+        assert gap.max() <= 2.0 / 4 * np.sqrt(0.5) + 1e-9
+    thin = np.full(6, 0.01)
+    told = box_findings(moves, None, thin, 100.0, Source(("p",), np.zeros(6, np.int32), np.arange(1, 7, dtype=np.int32),
+                                                         np.ones(6, np.int32)))
+    assert [f.line for f in told] == [2, 3, 4, 5] and len(spread(moves, None, thin, 100.0)[0]) == 6
     above, _ = spread(moves, None, np.full(6, 2.0), -100.0)
     assert len(above) == 6
 
