@@ -4,8 +4,8 @@ It runs no code of the proof.
 
 Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part or
 fixture is in a shank or holder, the shorter of the way out aside and the way down out of its lower end (aside alone
-for a neck, and for tools along Z while ``Twin.aside_only``). Cutter against stock or fixture: for tools along Z how far
-under the place the tool's end reaches, else the way out of the cutting part. Residual: what is left on a normal.
+for a neck). Cutter against a fixture: the way out of the cutting part. Cutter against stock in a rapid: for tools along
+Z how far under the place the tool's end reaches, else the way out. Residual: what is left on a normal.
 """
 
 from __future__ import annotations
@@ -50,12 +50,10 @@ def worst(depth: dict[int, float], point: F64) -> Found:
 class Twin:
     """The twin of one case and program.
 
-    aside_only : whether tools along Z tell the way out of their bodies to the side alone
     """
 
     case: Case
     way: Way
-    aside_only: bool = True
 
     def gouge(self, lines: Collection[int] | None = None, tool: int | None = None) -> Found:
         """The deepest gouge of the feed moves on some lines, of one tool."""
@@ -79,7 +77,7 @@ class Twin:
         meshes = [self.case.part.mesh, *(box_mesh(f[0], f[1]) for f in self.case.setup.fixtures)]
         body = next(t for t in self.case.tools if t.number == number)
         rows = self.way.rows(lines, feed=True, tool=number)
-        radial = part == "neck" or (self.aside_only and self.case.mode == Mode.UPRIGHT)
+        radial = part == "neck"
         shapes = np.array([[*row, radial] for name, *row in frusta(body) if name == part], float).reshape(-1, 5)
         depth, point = self._touch(meshes, rows, shapes, np.zeros(3))
         return worst(depth, point)
@@ -96,12 +94,11 @@ class Twin:
     def _touch(self, meshes: list[TriangleMesh], rows: NDArray[np.int64], shapes: F64,
                cutter: F64) -> tuple[dict[int, float], F64]:
         """Depths by line of points of meshes in shapes (k, 5), or in a cutter (3,) where there are none; mm."""
-        upright = self.case.mode == Mode.UPRIGHT
         points = np.vstack([coarse_cloud(m) for m in meshes])
         step, depth, where = 0.6, {}, np.zeros(3)
         for near in (0.9, 0.15, 0.0):
             poses = self.way.poses(rows, step)
-            best, which = touch(poses.tip, poses.axis, points, shapes, cutter, upright)
+            best, which = touch(poses.tip, poses.axis, points, shapes, cutter, False)
             if best.max(initial=0.0) <= 0.0:
                 return {}, where
             per_move = np.zeros(len(self.way.line))
