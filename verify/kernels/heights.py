@@ -91,22 +91,24 @@ def _cone_gap(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
 
 
 @njit(cache=True, nogil=True)
+def _meeting(wz, dz, low, high):
+    """First and last s at which a place wz over the tip is between two heights of the tool; first > last for never."""
+    if abs(dz) < 1e-15:
+        return (0.0, 1.0) if low < wz < high else (1.0, 0.0)
+    u, v = (wz - low) / dz, (wz - high) / dz
+    return max(0.0, min(u, v)), min(1.0, max(u, v))
+
+
+@njit(cache=True, nogil=True)
 def overlap(x, y, z, ax, ay, az, dx, dy, dz, z0, z1, r0, r1, column):
     """How deep (radially, mm) a frustum z0..z1 over the tip takes in a point, or the column below it.
 
     Positive inside; -inf where the heights never meet.
     """
     wx, wy, wz = x - ax, y - ay, z - az
-    s1, s2 = 0.0, 1.0
-    high = INF if column else z1
-    if abs(dz) < 1e-15:
-        if wz <= z0 or wz >= high:
-            return -INF
-    else:
-        u, v = (wz - z0) / dz, (wz - high) / dz
-        s1, s2 = max(s1, min(u, v)), min(s2, max(u, v))
-        if s1 > s2:
-            return -INF
+    s1, s2 = _meeting(wz, dz, z0, INF if column else z1)
+    if s1 > s2:
+        return -INF
     plan2 = dx * dx + dy * dy
     if r0 == r1:
         s = s1 if plan2 < 1e-18 else min(max((wx * dx + wy * dy) / plan2, s1), s2)
@@ -134,16 +136,9 @@ def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
     (wx, wy, wz) is the point seen from the tip at the start of the move. Both ways are concave in s where the heights
     meet, so the search ends at the deepest. Returns 0 where they do not meet.
     """
-    s1, s2 = 0.0, 1.0
-    high = INF if column else z1
-    if abs(dz) < 1e-15:
-        if wz <= z0 or wz >= high:
-            return 0.0
-    else:
-        u, v = (wz - z0) / dz, (wz - high) / dz
-        s1, s2 = max(s1, min(u, v)), min(s2, max(u, v))
-        if s1 > s2:
-            return 0.0
+    s1, s2 = _meeting(wz, dz, z0, INF if column else z1)
+    if s1 > s2:
+        return 0.0
     for _ in range(60):
         u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
         if _inside(u, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column) \
