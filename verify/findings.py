@@ -13,7 +13,7 @@ from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
 
 MOST = 200
-OF_A_KIND = 25  # of eight kinds: at most 200
+OF_A_KIND = MOST // len(FindingKind)
 NEAR = 5.0
 LINES_APART = 5
 BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "holder"}
@@ -132,7 +132,7 @@ def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64,
 def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str, int]]:
     """200 findings, the gravest first, and how many there are of each kind.
 
-    The 25 gravest of each kind are always among them: a program in the wrong unit collides a thousand times, and what
+    The gravest ``OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times, and what
     says why is a single line.
     """
     rank = {kind: i for i, kind in enumerate(FindingKind)}

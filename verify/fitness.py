@@ -128,7 +128,8 @@ def _gauges(p: Program, setup: ProofSetup) -> F64:
 def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
     """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it.
 
-    To blame is the end that lies further from most of the program: one word without its point is the line named.
+    To blame is the end that lies further from most of the program: one word without its point is the line named. Of
+    two as far it is the later, where the travel runs out.
     """
     if setup.travel is None or len(p) == 0:
         return
@@ -137,6 +138,7 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
         return
     end, lengths = joints[1], _gauges(p, setup)
     spindle = end + np.column_stack([np.zeros((len(p), 2)), lengths])
+    lines = spindle[np.r_[p.line[1:] != p.line[:-1], True]]  # one vote each, in however many pieces it was read
     for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
         low, high = int(np.argmin(spindle[:, axis])), int(np.argmax(spindle[:, axis]))
         span = float(spindle[high, axis] - spindle[low, axis])
@@ -145,8 +147,8 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
             more = f" and tool lengths from {lengths[low]:g} to {lengths[high]:g} mm" \
                 if axis == 2 and lengths.any() else ""
             what = "the program moves" if p.poses is None else "the program moves the linear axes"
-            middle = float(np.median(spindle[:, axis]))
-            far = low if middle - spindle[low, axis] > spindle[high, axis] - middle else high
+            below, above = np.abs(spindle[[low, high], axis] - np.median(lines[:, axis])).tolist()
+            far = max(low, high) if abs(below - above) < 1e-9 else low if below > above else high
             yield _finding(FindingKind.LIMIT, p, far, span - limit, limit,
                            f"{what} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
                            f"travels {limit:g} mm")

@@ -117,7 +117,7 @@ def test_a_planned_job_has_a_mesh_when_it_is_asked_for(part, tmp_path):
                                    str(tmp_path / "out"), "--mesh-step", "0.2"])
     report = json.loads(got.stdout)
     Report.model_validate(report)
-    (made,) = report["machined"]
+    made = report["machined"]
     assert got.exit_code == 0 and (made["file"], made["access"]) == ("machined.stl", "A1")
     mesh = read_stl(tmp_path / "out" / "machined.stl")
     # the part is 16 x 12 x 4 mm less a step of 8 x 12 x 2; nothing machines its underside
