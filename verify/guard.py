@@ -12,6 +12,7 @@ from geometry.mesh import F64, I32, TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples, sample_surface
+from verify.kernels.depth import deepest
 from verify.progress import Report, silent
 
 GUARD_DENSITY = 25.0
@@ -19,7 +20,6 @@ GUARD_MOST = 1_000_000
 GUARD_SEED = 20_011
 EDGE_SPACING = 0.1
 SHARP = math.radians(20.0)
-DEPTH_STEPS = 64
 DEPTH_BATCH = 2048  # rays between two reports
 CLOSER_REACH, CLOSER_STEP, MOST_SEEDS = 0.15, 0.02, 1500
 CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper are looked round
@@ -109,8 +109,8 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
     Notes
     -----
     A cut grazing the top of a wall swallows whole rays of samples just below the top edge; the depth of a
-    gouge is how deep it goes under the surface. Read at 64 places: at most along / 128 too small. A ray that
-    leaves the part within 1e-4 mm counts 0.
+    gouge is how deep it goes under the surface. Exact as ``verify.kernels.depth.deepest`` is. A ray that leaves the
+    part within 1e-4 mm counts 0.
     """
     out = np.zeros(len(points))
     for i in range(0, len(points), DEPTH_BATCH):
@@ -131,7 +131,7 @@ def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
     stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
-    share = np.arange(1, DEPTH_STEPS + 1) / DEPTH_STEPS
-    where = points[:, None, :] - (stretch[:, None] * share)[:, :, None] * normals[:, None, :]
-    out, _, _ = nearest(tree, where.reshape(-1, 3))
-    return np.minimum(out.reshape(len(points), DEPTH_STEPS).max(axis=1), along)
+    t, out = tree.arrays, np.empty(len(points))
+    deepest(t.lower, t.upper, t.child, t.first, t.size, t.corners, np.ascontiguousarray(points),
+            np.ascontiguousarray(normals), stretch, out)
+    return np.minimum(out, along)

@@ -67,6 +67,32 @@ def _box2(lower, upper, px, py, pz):
 
 
 @njit(cache=True, nogil=True)
+def nearest_row(lower, upper, child, first, size, corners, px, py, pz, most2, stack):
+    """Squared distance in mm² from a point to the mesh, and the row of the nearest triangle.
+
+    most2 : mm², nothing as far is looked for: most2 and -1 then; stack : (128,) int64, written over
+    """
+    best, found = most2, -1
+    stack[0], depth = 0, 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if _box2(lower[node], upper[node], px, py, pz) >= best:
+            continue
+        c = child[node]
+        if c < 0:
+            for k in range(first[node], first[node] + size[node]):
+                d2 = triangle2(px, py, pz, corners[k])
+                if d2 < best:
+                    best, found = d2, k
+            continue
+        left_near = _box2(lower[c], upper[c], px, py, pz) <= _box2(lower[c + 1], upper[c + 1], px, py, pz)
+        stack[depth], stack[depth + 1] = (c + 1, c) if left_near else (c, c + 1)
+        depth += 2
+    return best, found
+
+
+@njit(cache=True, nogil=True)
 def nearest_triangles(lower, upper, child, first, size, corners, points, most, out, row, feet):
     """out[i] = distance in mm from points[i] to the mesh, row[i] the row of the nearest triangle, feet[i] the place.
 
@@ -75,23 +101,7 @@ def nearest_triangles(lower, upper, child, first, size, corners, points, most, o
     stack = np.empty(128, np.int64)
     for i in range(len(points)):
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        best, found = most * most, -1
-        stack[0], depth = 0, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if _box2(lower[node], upper[node], px, py, pz) >= best:
-                continue
-            c = child[node]
-            if c < 0:
-                for k in range(first[node], first[node] + size[node]):
-                    d2 = triangle2(px, py, pz, corners[k])
-                    if d2 < best:
-                        best, found = d2, k
-                continue
-            left_near = _box2(lower[c], upper[c], px, py, pz) <= _box2(lower[c + 1], upper[c + 1], px, py, pz)
-            stack[depth], stack[depth + 1] = (c + 1, c) if left_near else (c, c + 1)
-            depth += 2
+        best, found = nearest_row(lower, upper, child, first, size, corners, px, py, pz, most * most, stack)
         out[i] = math.sqrt(best) if found >= 0 else np.inf
         row[i] = found
         if found >= 0:

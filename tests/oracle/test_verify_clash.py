@@ -9,7 +9,7 @@ from geometry.toolbody import HolderSegment, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.clash import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.heights import contact
+from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 from verify.removal import BOW, Moves

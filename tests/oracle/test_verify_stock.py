@@ -10,7 +10,7 @@ from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
 from tests.pocket_case import TOOL, block
 from verify.guard import convex_edges, gouge_depths
-from verify.kernels.heights import lowest, overlap
+from verify.kernels.heights import lowest
 from verify.model import ProofSetup, StockKind
 from verify.removal import Moves
 from verify.stock import blank, descents, end_radii, run_stock, stock_on_normals
@@ -38,32 +38,6 @@ def test_lowest_is_the_least_of_many_standing_tools(radius, corner, grow):
         met += 1
         assert got <= want + 1e-9 and got >= want - 1e-3
         assert touch == pytest.approx(s[rho <= radius + grow].min(), abs=1e-4)
-    assert met > 20
-
-
-@pytest.mark.parametrize("r0, r1", [(3.0, 3.0), (2.0, 4.0), (4.0, 2.0)])
-@pytest.mark.parametrize("column", [True, False])
-def test_overlap_of_bodies_is_the_largest_of_many_standing_ones(r0, r1, column):
-    rng = np.random.default_rng(4)
-    s = np.linspace(0, 1, 4001)[:, None]
-    z0, z1 = 2.0, 6.0
-    h = np.linspace(z0, z1, 201)[None, :]
-    met = 0
-    for case in range(60):
-        d = rng.normal(size=3) * np.array([[2, 2, 2], [2, 2, 0], [0, 0, 2]][case % 3])
-        a, p = rng.normal(size=3), rng.uniform([-3, -3, 0], [3, 3, 8])
-        got = overlap(*p, *a, *d, z0, z1, r0, r1, column)
-        rho = np.hypot(p[0] - a[0] - s * d[0], p[1] - a[1] - s * d[1])
-        high = p[2] - a[2] - s * d[2]
-        if column:
-            value = np.where(high > h, r0 + (r1 - r0) * (h - z0) / (z1 - z0) - rho, -np.inf).max()
-        else:
-            inside = (high > z0) & (high < z1)
-            value = np.where(inside, r0 + (r1 - r0) * (high - z0) / (z1 - z0) - rho, -np.inf).max()
-        if np.isinf(value):
-            continue
-        met += 1
-        assert got == pytest.approx(value, abs=0.03) and got >= value - 1e-6
     assert met > 20
 
 

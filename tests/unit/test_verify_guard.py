@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
 from geometry.nearest import nearest
+from geometry.rays import first_hits
 from tests.hand_parts import dome
 from verify.guard import MOST_SEEDS, closer_points, gouge_depths
 
@@ -41,3 +42,21 @@ def test_places_round_the_lowest_samples_are_looked_at_closely():
     assert cKDTree(places).query(points[-100:])[0].min() > 0.3
     empty = closer_points(tree, points[:0], residual[:0])
     assert [len(part) for part in empty] == [0, 0, 0]
+
+
+def test_the_depth_of_a_stretch_is_the_largest_distance_on_it():
+    """Against readings every thousandth of a stretch, of rays that cross the dome every way."""
+    mesh = dome(RADIUS)
+    tree, rng = TriangleTree(mesh), np.random.default_rng(5)
+    row = rng.integers(len(mesh.faces), size=300)
+    points, normals = mesh.triangles[row].mean(axis=1), rng.normal(size=(300, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals *= np.sign(np.einsum("ij,ij->i", normals, mesh.normals[row]))[:, None]
+    along = rng.choice([0.01, 0.3, 4.0, 60.0], 300)
+    through, _ = first_hits(tree, points, -normals, t_min=1e-4)
+    stretch = np.minimum(along, through)
+    there = points[:, None] - stretch[:, None, None] * np.linspace(0, 1, 1001)[:, None] * normals[:, None]
+    want = nearest(tree, there.reshape(-1, 3))[0].reshape(300, -1).max(axis=1)
+    got = gouge_depths(tree, points, normals, along)
+    assert want.max() > 1.0 and (got <= want + stretch / 2000 + 1e-9).all()
+    assert (got >= want - np.maximum(1e-4, 0.005 * want) - 1e-9).all()

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from verify.kernels.heights import contact
+from verify.kernels.frustum import contact
 from verify.kernels.rays import plan_distance
 from verify.kernels.stock import _note, _worse
 

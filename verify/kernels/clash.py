@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from geometry.kernels.options import KERNEL
-from verify.kernels.heights import contact, overlap
+from verify.kernels.frustum import contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse
@@ -31,24 +31,27 @@ def is_lift(angle, axis, a, b):
 
 
 @njit(**KERNEL)
-def _meets(p, balls, node, z0, z1, wide):
-    """Whether a cylinder of radius ``wide`` from z0 to z1 over the tip may reach into a ball on piece p."""
+def _meets(p, balls, node, z0, z1, wide, clearance, known):
+    """Whether a cylinder of radius ``wide`` from z0 to z1 over the tip may take in a point of a ball on piece p, deeper
+    than known."""
     rad = balls[node, 3]
     if rad < 0.0:
         return False
     qx, qy, qz, dx, dy, dz = view(p, balls[node, 0], balls[node, 1], balls[node, 2])
-    wide += rad
-    return overlap(qx, qy, qz, 0.0, 0.0, 0.0, dx, dy, dz, z0 - rad, z1 + rad, wide, wide, False) > 0.0
+    return not no_deeper(qx, qy, qz, dx, dy, dz, z0 - rad, z1 + rad, wide + rad, clearance, known)
 
 
 @njit(**KERNEL)
-def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack):
-    """Depth of a point in body b of a tool on piece p as an event counts it; b < 0 is the cutting part."""
+def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
+    """Depth of a point in body b of a tool on piece p as an event counts it; b < 0 is the cutting part.
+
+    0 where it is no deeper than ``known`` in a body
+    """
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     if b >= 0:
         body, clearance = bodies[b], bodies[b, 4] + grow
-        return contact(qx, qy, qz, dx, dy, dz, body[0], body[1], body[2] + grow, body[3] + grow, clearance, slack, 0.0,
-                       False)
+        return contact(qx, qy, qz, dx, dy, dz, body[0], body[1], body[2] + grow, body[3] + grow, clearance, slack,
+                       known, False)
     a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
     bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
     if bare > slack:
@@ -58,27 +61,33 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack):
 
 
 @njit(**KERNEL)
-def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b, grow, slack, best):
-    """One body of a tool on piece p against the points of a chunk; of fixtures alone unless ``every``."""
+def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b, grow, slack, held, best):
+    """One body of a tool on piece p against the points of a chunk; of fixtures alone unless ``every``.
+
+    held : whether the chunk has points of fixtures
+    """
     z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
     if b >= 0:
         z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + grow
         clearance, code = bodies[b, 4] + grow, int(bodies[b, 5])
-    if not _meets(p, t3, chunk, z0, z1, wide):
+    known = best[code + FIXTURE, 0] if not every else min(best[code, 0], best[code + FIXTURE, 0]) if held else \
+        best[code, 0]
+    if not _meets(p, t3, chunk, z0, z1, wide, clearance, known):
         return
     for n2 in range(chunk * 8, chunk * 8 + 8):
-        if not _meets(p, t2, n2, z0, z1, wide):
+        if not _meets(p, t2, n2, z0, z1, wide, clearance, known):
             continue
         for n1 in range(n2 * 8, n2 * 8 + 8):
-            if not _meets(p, t1, n1, z0, z1, wide):
+            if not _meets(p, t1, n1, z0, z1, wide, clearance, known):
                 continue
             for leaf in range(n1 * 8, n1 * 8 + 8):
-                if not _meets(p, t0, leaf, z0, z1, wide):
+                if not _meets(p, t0, leaf, z0, z1, wide, clearance, known):
                     continue
                 for i in range(leaf * 8, min(leaf * 8 + 8, len(points))):
                     if every or fixed[i]:
                         depth = _meet_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b, grow,
-                                            TOUCHING if fixed[i] else slack)
+                                            TOUCHING if fixed[i] else slack,
+                                            best[code + (FIXTURE if fixed[i] else 0), 0])
                         if depth > 0.0:
                             _worse(best, code + (FIXTURE if fixed[i] else 0), depth, clearance, points[i, 0],
                                    points[i, 1], points[i, 2])
@@ -111,11 +120,11 @@ def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about,
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             if held or not feed:
                 _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, not feed, cutters[k], bodies, -1, grow,
-                          slack, best)
+                          slack, held, best)
             for b in range(body_first[k], body_first[k + 1]):
                 extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
                 beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
                 _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, True, cutters[k], bodies, b, extra,
-                          slack if beside else TOUCHING, best)
+                          slack if beside else TOUCHING, held, best)
         count = _note(events, count, m, best)
     return count

@@ -23,7 +23,7 @@ from numba import njit
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
-from verify.kernels.heights import contact, overlap
+from verify.kernels.frustum import contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.rays import gap, plan_distance
@@ -164,8 +164,7 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                                               origin[2] + (k0 + 1.5) * h)
                 far = half + top
                 # no node here can be deeper than that
-                if overlap(qx, qy, qz, 0.0, 0.0, 0.0, dx, dy, dz, z0 - far, z1 + far, wide + far, wide + far,
-                           False) <= best[code, 0]:
+                if no_deeper(qx, qy, qz, dx, dy, dz, z0 - far, z1 + far, wide + far, clearance, best[code, 0]):
                     continue
                 for i in range(i0, min(i0 + 4, tile[1])):
                     for j in range(j0, min(j0 + 4, tile[3])):

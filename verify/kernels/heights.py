@@ -1,4 +1,4 @@
-"""Vertical lines through stock: raising them to the blank, lowering them by a cutter, meeting them with bodies.
+"""Vertical lines through stock: raising them to the blank, lowering them by a cutter.
 
 Notation
     (x, y), top : one line and the height up to which it is solid
@@ -79,91 +79,6 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
         return INF, 0.0
     s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, wide, a, r)
     return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r), s1
-
-
-@njit(cache=True, nogil=True)
-def _cone_gap(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
-    """Radius of the frustum minus rho at s, at the height that suits a point or a solid column below it."""
-    h = wz - s * dz
-    if column:
-        h = min(h, z1) if r1 > r0 else z0
-    return r0 + (r1 - r0) * (h - z0) / max(z1 - z0, 1e-12) - _rho(s, wx, wy, dx, dy)
-
-
-@njit(cache=True, nogil=True)
-def _meeting(wz, dz, low, high):
-    """First and last s at which a place wz over the tip is between two heights of the tool; first > last for never."""
-    if abs(dz) < 1e-15:
-        return (0.0, 1.0) if low < wz < high else (1.0, 0.0)
-    u, v = (wz - low) / dz, (wz - high) / dz
-    return max(0.0, min(u, v)), min(1.0, max(u, v))
-
-
-@njit(cache=True, nogil=True)
-def overlap(x, y, z, ax, ay, az, dx, dy, dz, z0, z1, r0, r1, column):
-    """How deep (radially, mm) a frustum z0..z1 over the tip takes in a point, or the column below it.
-
-    Positive inside; -inf where the heights never meet.
-    """
-    wx, wy, wz = x - ax, y - ay, z - az
-    s1, s2 = _meeting(wz, dz, z0, INF if column else z1)
-    if s1 > s2:
-        return -INF
-    plan2 = dx * dx + dy * dy
-    if r0 == r1:
-        s = s1 if plan2 < 1e-18 else min(max((wx * dx + wy * dy) / plan2, s1), s2)
-        return r0 - _rho(s, wx, wy, dx, dy)
-    for _ in range(60):
-        u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
-        if _cone_gap(u, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column) \
-                > _cone_gap(v, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
-            s2 = v
-        else:
-            s1 = u
-    return _cone_gap(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column)
-
-
-@njit(cache=True, nogil=True)
-def _inside(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
-    """How deep at s a point, or the top of a column, is in a frustum: from its side or from its lower end."""
-    return min(_cone_gap(s, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column), wz - s * dz - z0)
-
-
-@njit(cache=True, nogil=True)
-def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
-    """How deep a frustum takes in a point (or the column below it), mm: the shorter way out, aside or down.
-
-    (wx, wy, wz) is the point seen from the tip at the start of the move. Both ways are concave in s where the heights
-    meet, so the search ends at the deepest. Returns 0 where they do not meet.
-    """
-    s1, s2 = _meeting(wz, dz, z0, INF if column else z1)
-    if s1 > s2:
-        return 0.0
-    for _ in range(60):
-        u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
-        if _inside(u, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column) \
-                > _inside(v, wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
-            s2 = v
-        else:
-            s1 = u
-    return max(_inside(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column), 0.0)
-
-
-@njit(cache=True, nogil=True)
-def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, column):
-    """How deep a body grown by ``clearance`` takes in a point (or the column below it), as an event counts it.
-
-    r0, r1 hold the clearance. Up to the clearance that is how much nearer than it, aside; above it the clearance and
-    how deep the point is in the bare body (``penetration``). 0 where it is no deeper than ``slack`` or ``known``.
-    """
-    least = max(slack, known)
-    if r0 != r1 and overlap(wx, wy, wz, 0.0, 0.0, 0.0, dx, dy, dz, z0, z1, max(r0, r1), max(r0, r1), column) <= least:
-        return 0.0  # a cone is searched, the cylinder round it is not
-    depth = overlap(wx, wy, wz, 0.0, 0.0, 0.0, dx, dy, dz, z0, z1, r0, r1, column)
-    if depth <= least:
-        return 0.0
-    bare = penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, column)
-    return clearance + bare if bare > slack else min(depth, clearance)
 
 
 @njit(cache=True, nogil=True)

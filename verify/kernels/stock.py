@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
-from verify.kernels.heights import INF, _cells, contact, lowest
+from verify.kernels.frustum import contact
+from verify.kernels.heights import INF, _cells, lowest
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
