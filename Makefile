@@ -36,7 +36,7 @@ check: $(STAMP)
 	$(BIN)/python -m pytest -q tests/unit/test_docstrings.py tests/unit/test_dependencies.py
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -m "not slow" -n 2 --dist worksteal
 
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow

@@ -11,13 +11,12 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
-from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.sampling import SurfaceSamples, lattice_samples
 from verify.kernels.depth import deepest
 from verify.progress import Report, silent
 
-GUARD_DENSITY = 25.0
+GUARD_SPACING = 0.18
 GUARD_MOST = 1_000_000
-GUARD_SEED = 20_011
 EDGE_SPACING = 0.1
 SHARP = math.radians(20.0)
 DEPTH_BATCH = 2048  # rays between two reports
@@ -27,18 +26,17 @@ FACETS_OFF = 2e-3
 """mm, what facets may lie under samples that are on the exact surface."""
 
 
-def guard_samples(mesh: TriangleMesh, density: float = GUARD_DENSITY) -> SurfaceSamples:
-    """Samples of the whole part, ``density`` a mm², fewer on parts that would need over a million."""
-    area = float(mesh.areas.sum())
-    return sample_surface(mesh, min(density, GUARD_MOST / max(area, 1e-9)), seed=GUARD_SEED)
+def guard_spacing(mesh: TriangleMesh) -> float:
+    """mm between the lattice lines of ``guard_samples``: 0.18, wider on parts that would need over a million samples.
+
+    A ball of radius R that gouges deeper than (0.87 spacing)² / 2R + 0.4 of the tolerance is seen by one of them.
+    """
+    return max(GUARD_SPACING, (float(mesh.areas.sum()) / GUARD_MOST) ** 0.5)
 
 
-def sparse_faces(mesh: TriangleMesh, scored: SurfaceSamples, density: float = GUARD_DENSITY) -> NDArray[np.bool_]:
-    """(m,) bool: triangles of faces on which the scored samples lie thinner than ``density`` a mm²."""
-    most = int(max(mesh.face_ids.max(initial=0), scored.face.max(initial=0))) + 1
-    area = np.bincount(mesh.face_ids, weights=mesh.areas, minlength=most)
-    count = np.bincount(scored.face, minlength=most)
-    return np.asarray((count < 0.9 * density * area)[mesh.face_ids])
+def guard_samples(mesh: TriangleMesh) -> SurfaceSamples:
+    """Samples of the whole part, so even that no place of a flat is farther than 0.87 ``guard_spacing`` from one."""
+    return lattice_samples(mesh, guard_spacing(mesh))
 
 
 def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:

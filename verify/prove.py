@@ -22,7 +22,7 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.guard import CLOSER_SHARE, closer_points, convex_edges, gouge_depths, guard_samples, sparse_faces
+from verify.guard import CLOSER_SHARE, GUARD_SPACING, closer_points, convex_edges, gouge_depths, guard_samples, guard_spacing
 from verify.material import contacts, dogleg_limits
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
@@ -90,6 +90,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
+    if guard_spacing(part.mesh) > GUARD_SPACING:
+        notes.append(f"the part is so large that gouges were looked for {guard_spacing(part.mesh):.2f} mm apart; "
+                     f"{GUARD_SPACING} mm is usual")
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
@@ -130,11 +133,10 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     tell(0.05)
     edge, bisector, edge_face = convex_edges(part.mesh)
     tell(0.1)
-    thin = guard.subset(sparse_faces(part.mesh, s)[guard.triangle])
-    points = np.concatenate([s.points, thin.points, edge])
-    normals = np.concatenate([s.normals, thin.normals, bisector])
-    face = np.concatenate([s.face, thin.face, edge_face])
-    area = np.concatenate([s.area, thin.area, np.zeros(len(edge))])
+    points = np.concatenate([s.points, guard.points, edge])
+    normals = np.concatenate([s.normals, guard.normals, bisector])
+    face = np.concatenate([s.face, guard.face, edge_face])
+    area = np.concatenate([s.area, guard.area, np.zeros(len(edge))])
     reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,

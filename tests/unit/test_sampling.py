@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay, cKDTree
 
 from geometry.mesh import TriangleMesh
-from geometry.sampling import joined, sample_borders, sample_surface, with_surface_normals
+from geometry.sampling import joined, lattice_samples, sample_borders, sample_surface, with_surface_normals
 from tests.hand_parts import bent_strip
 
 
@@ -71,3 +72,25 @@ def test_a_sample_on_a_border_has_the_normal_of_its_own_face():
     got = with_surface_normals(s, both)
     radius = np.where(got.face == 1, 4.0, 2.0)
     assert got.normals[:, :2] == pytest.approx(-got.points[:, :2] / radius[:, None], abs=6e-3)
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 0, 1), (1, 1, 1), (0.2, -0.9, 0.3), (-1, 0.7, -1)])
+def test_no_place_is_far_from_a_sample_of_the_lattice(normal):
+    """A disc in any direction, cut into triangles at random: the farthest place inside it, against random places."""
+    n = np.asarray(normal, float) / np.linalg.norm(normal)
+    u = np.linalg.svd(n[None])[2][1]
+    v = np.cross(n, u)
+    rng = np.random.default_rng(3)
+    flat = np.vstack([rng.uniform(-4, 4, (60, 2)), 4 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])])
+    faces = Delaunay(flat).simplices
+    corners = flat[:, :1] * u + flat[:, 1:] * v + [0.3, -7.1, 2.0]
+    wrong = np.einsum("ij,j->i", np.cross(corners[faces[:, 1]] - corners[faces[:, 0]],
+                                          corners[faces[:, 2]] - corners[faces[:, 0]]), n) < 0
+    faces[wrong] = faces[wrong][:, ::-1]
+    mesh = TriangleMesh(corners, faces.astype(np.int32), np.zeros(len(faces), np.int32))
+    s = lattice_samples(mesh, 0.2)
+    assert np.abs((s.points - corners[0]) @ n).max() < 1e-9
+    assert s.area.sum() == pytest.approx(mesh.areas.sum(), rel=0.01)
+    inner = rng.uniform(-3.7, 3.7, (20_000, 2))
+    gap = cKDTree(s.points).query(inner[:, :1] * u + inner[:, 1:] * v + [0.3, -7.1, 2.0])[0]
+    assert gap.max() <= 0.8661 * 0.2 and len(np.unique(np.round(s.points, 6), axis=0)) == len(s)

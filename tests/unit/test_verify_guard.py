@@ -5,10 +5,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 from geometry.bvh import TriangleTree
+from geometry.mesh import TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
 from tests.hand_parts import dome
-from verify.guard import MOST_SEEDS, closer_points, gouge_depths
+from verify.guard import MOST_SEEDS, closer_points, gouge_depths, guard_samples
 
 RADIUS = 15.0
 
@@ -60,3 +61,20 @@ def test_the_depth_of_a_stretch_is_the_largest_distance_on_it():
     got = gouge_depths(tree, points, normals, along)
     assert want.max() > 1.0 and (got <= want + stretch / 2000 + 1e-9).all()
     assert (got >= want - np.maximum(1e-4, 0.005 * want) - 1e-9).all()
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3, 0.7854, 1.2])
+def test_a_dimple_anywhere_is_deep_enough_at_some_sample(lean):
+    """A ball of 1 mm pressed 0.03 mm into a leaning face at 2,000 places: a sample there sees 0.4 of 0.01 mm."""
+    turn = np.array([[np.cos(lean), 0, np.sin(lean)], [0, 1, 0], [-np.sin(lean), 0, np.cos(lean)]])
+    flat = np.array([[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0]], float) @ turn.T
+    mesh = TriangleMesh(flat, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
+    samples = guard_samples(mesh).points
+    rng = np.random.default_rng(1)
+    tips = np.column_stack([rng.uniform(-9, 9, (2000, 2)), np.full(2000, -0.03)]) @ turn.T
+    reach = np.sqrt(0.5**2 - 0.47**2)
+    far, _ = cKDTree(samples).query(tips + 0.03 * turn[:, 2])
+    assert far.max() < reach
+    # how much of the ball is under the face where the nearest sample is
+    depth = np.sqrt(0.5**2 - far**2) - 0.47
+    assert depth.min() > 0.004

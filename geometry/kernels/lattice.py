@@ -1,0 +1,71 @@
+"""Places of square lattices on triangles, seen along the axes each triangle faces most.
+
+Notation
+    h          : mm between the lines of the lattice, which lies square to the axis, shifted by ``SHIFT`` h from 0
+    u, v, w    : the two coordinates across the axis and the one along it
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from geometry.kernels.options import KERNEL
+
+SHIFT = 0.381966  # of h: edges of parts stand on round numbers, and lattice lines should not
+OVER = 1e-9  # of h, by which triangles count beyond their edges
+ALIKE = 0.9  # of the largest part of a normal: along such an axis a lattice is laid, too, so that none ends at a seam
+
+
+@njit(**KERNEL)
+def _across(t, axis, u):
+    """First and last v at which the line of this u crosses a triangle (3, 3); first > last where it passes by."""
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    lo, hi = math.inf, -math.inf
+    for k in range(3):
+        p, q = t[k], t[(k + 1) % 3]
+        if p[a] == q[a]:
+            if p[a] == u:
+                lo, hi = min(lo, p[b], q[b]), max(hi, p[b], q[b])
+            continue
+        s = (u - p[a]) / (q[a] - p[a])
+        if 0.0 <= s <= 1.0:
+            v = p[b] + s * (q[b] - p[b])
+            lo, hi = min(lo, v), max(hi, v)
+    return lo, hi
+
+
+@njit(**KERNEL)
+def lattice_places(triangles, normals, h, out, area, owner):
+    """Write the places of the lattice on triangles (m, 3, 3) mm into out (n, 3), and their triangle into owner (n,).
+
+    normals : (m, 3) unit; area (n,) mm², what each place stands for. Nothing is written beyond n.
+
+    Returns how many there are, which may exceed n.
+    """
+    count = 0
+    for m in range(len(triangles)):
+        t, n = triangles[m], normals[m]
+        least = ALIKE * max(abs(n[0]), abs(n[1]), abs(n[2]))
+        laid = 0
+        for axis in range(3):
+            laid += abs(n[axis]) >= least
+        for axis in range(3):
+            if not 0.0 < least <= abs(n[axis]):
+                continue
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            low, high = min(t[0, a], t[1, a], t[2, a]), max(t[0, a], t[1, a], t[2, a])
+            for i in range(math.ceil(low / h - SHIFT), math.floor(high / h - SHIFT) + 1):
+                u = (i + SHIFT) * h
+                lo, hi = _across(t, axis, u)
+                if lo > hi:
+                    continue
+                for j in range(math.ceil(lo / h - SHIFT - OVER), math.floor(hi / h - SHIFT + OVER) + 1):
+                    if count < len(out):
+                        v = (j + SHIFT) * h
+                        out[count, a], out[count, b] = u, v
+                        out[count, axis] = t[0, axis] - (n[a] * (u - t[0, a]) + n[b] * (v - t[0, b])) / n[axis]
+                        area[count], owner[count] = h * h / (abs(n[axis]) * laid), m
+                    count += 1
+    return count
