@@ -132,8 +132,8 @@ def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64,
 def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str, int]]:
     """200 findings, the gravest first, and how many there are of each kind.
 
-    The gravest ``OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times, and what
-    says why is a single line.
+    The gravest ``OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times,
+    and what says why is a single line.
     """
     rank = {kind: i for i, kind in enumerate(FindingKind)}
     counts: dict[str, int] = {}

@@ -39,6 +39,13 @@ def guard_samples(mesh: TriangleMesh) -> SurfaceSamples:
     return lattice_samples(mesh, guard_spacing(mesh))
 
 
+def guard_notes(mesh: TriangleMesh) -> list[str]:
+    """That the part is too large for samples as close as usual, where it is."""
+    spacing = guard_spacing(mesh)
+    return [] if spacing <= GUARD_SPACING else [
+        f"the part is large: gouges outside zones were looked for {spacing:.2f} mm apart, not {GUARD_SPACING} mm"]
+
+
 def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:
     """Points along the sharp convex edges of a mesh, for gouges that slip between surface samples.
 

@@ -22,7 +22,7 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.guard import CLOSER_SHARE, GUARD_SPACING, closer_points, convex_edges, gouge_depths, guard_samples, guard_spacing
+from verify.guard import CLOSER_SHARE, closer_points, convex_edges, gouge_depths, guard_notes, guard_samples
 from verify.material import contacts, dogleg_limits
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
@@ -90,9 +90,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
-    if guard_spacing(part.mesh) > GUARD_SPACING:
-        notes.append(f"the part is so large that gouges were looked for {guard_spacing(part.mesh):.2f} mm apart; "
-                     f"{GUARD_SPACING} mm is usual")
+    notes.extend(guard_notes(part.mesh))
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),

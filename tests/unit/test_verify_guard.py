@@ -9,7 +9,7 @@ from geometry.mesh import TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
 from tests.hand_parts import dome
-from verify.guard import MOST_SEEDS, closer_points, gouge_depths, guard_samples
+from verify.guard import MOST_SEEDS, closer_points, gouge_depths, guard_notes, guard_samples
 
 RADIUS = 15.0
 
@@ -78,3 +78,11 @@ def test_a_dimple_anywhere_is_deep_enough_at_some_sample(lean):
     # how much of the ball is under the face where the nearest sample is
     depth = np.sqrt(0.5**2 - far**2) - 0.47
     assert depth.min() > 0.004
+
+
+def test_it_is_said_where_samples_lie_wider_apart_than_usual():
+    flat = np.array([[0, 0, 0], [300, 0, 0], [300, 200, 0], [0, 200, 0]], float)
+    mesh = TriangleMesh(flat, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
+    (note,) = guard_notes(mesh)
+    assert "0.24 mm apart" in note and len(guard_samples(mesh)) == pytest.approx(1e6, rel=0.01)
+    assert guard_notes(dome(RADIUS)) == []
