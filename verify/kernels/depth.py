@@ -79,7 +79,7 @@ def deepest(lower, upper, child, first, size, corners, points, normals, stretch,
                                             (at[after[j]], gap[after[j]], row[after[j]]))
             j = after[k]
             bound[k], where[k] = _bound(corners, p, n, (at[k], gap[k], row[k]), (at[j], gap[j], row[j]))
-            k = np.argmax(bound[:count])
+            k = int(np.argmax(bound[:count]))
             most, t = bound[k], where[k]
             if most <= best + max(CLOSE, SHARE * best):
                 break
