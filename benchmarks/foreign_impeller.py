@@ -6,7 +6,7 @@ program says itself that a lathe cuts the outer cone before it; here nobody has,
 would have taken. It is run with a ball of 3 mm whose flutes are longer than it is deep anywhere, and with one as they
 are sold: 9 mm of flutes, a neck to 20 mm, a shank of 6 mm and a holder at 36 mm. The same lines as the twin's are
 asked for, and of the deepest three collisions how far the body stands over the place named. ``zonemill verify`` proves
-the same hub in a box (a setup has no cylinder yet).
+the same from the command line.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ def write_hub(profile: F64, bottom: float, path: Path) -> None:
 
 
 def setup_file(case: Foreign) -> dict[str, object]:
-    """The setup of ``zonemill verify``, with the box round the cylinder as blank."""
-    t = case.tool
+    """The setup of ``zonemill verify``, with the cylinder as blank."""
+    t, (x, y, bottom, radius, height) = case.tool, case.blank
     tool = {"id": t.id, "number": 1, "kind": "ball", "diameter_mm": t.diameter, "flutes": 2,
             "flute_length_mm": t.flute_length, "neck_diameter_mm": t.neck_diameter, "neck_length_mm": t.neck_length,
             "shank_diameter_mm": t.shank_diameter, "stickout_mm": t.stickout,
@@ -84,7 +84,8 @@ def setup_file(case: Foreign) -> dict[str, object]:
                        for h in t.holder]}
     return {"access": [{"id": "A1", "direction": [0, 0, 1], "work_offset": "G54"}], "tools": [tool],
             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["linuxcnc"]},
-            "stock": {"kind": "box", "margin_mm": 0.0, "uncertainty_mm": 0.0, "box_mm": case.box.tolist()},
+            "stock": {"kind": "cylinder", "margin_mm": 0.0, "uncertainty_mm": 0.0,
+                      "cylinder_mm": {"x": x, "y": y, "bottom": bottom, "diameter": 2.0 * radius, "height": height}},
             "quality": {"scallop_height_mm": 0.05, "chordal_tolerance_mm": 0.005, "gouge_tolerance_mm": 0.01},
             "material": "AlMgSi1 6082"}
 
@@ -150,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/impeller"))
     parser.add_argument("--picture", type=Path, default=None)
-    parser.add_argument("--no-box", action="store_true", help="leave the run of the command line out")
+    parser.add_argument("--no-command", action="store_true", help="leave the run of the command line out")
     chosen = parser.parse_args(arguments)
     root = samples_root()
     if root is None:
@@ -176,11 +177,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"machined.stl: {len(mesh.faces)} facets {field.step:.3f} mm apart, {field.volume:.0f} mm³ left, "
           f"{time.perf_counter() - began:.1f} s")
     picture(mesh, chosen.picture or chosen.out / "machined.png")
-    if not chosen.no_box:
+    if not chosen.no_command:
         (chosen.out / "setup.json").write_text(json.dumps(setup_file(SOLD), indent=1) + "\n")
         command = [str(Path(sys.executable).with_name("zonemill")), "verify", str(chosen.out / "hub.step"), "--setup",
                    str(chosen.out / "setup.json"), "--program", str(root / LONG.file), "--spindle-tool", "1", "--out",
-                   str(chosen.out / "box")]
+                   str(chosen.out / "verified")]
         began = time.perf_counter()
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         print(f"zonemill verify ended with {done.returncode} after {time.perf_counter() - began:.1f} s\n{done.stderr}")

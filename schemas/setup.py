@@ -73,11 +73,22 @@ class Access(WireModel):
         return self
 
 
+class Cylinder(WireModel):
+    """A cylinder along Z of the setup frame."""
+
+    x: Annotated[Number, Field(ge=-1e6, le=1e6, description="Where its axis stands, mm.")] = 0.0
+    y: Annotated[Number, Field(ge=-1e6, le=1e6, description="Where its axis stands, mm.")] = 0.0
+    bottom: Annotated[Number, Field(ge=-1e6, le=1e6, description="Height of its lower end, mm.")]
+    diameter: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
+    height: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
+
+
 class Stock(WireModel):
     """The blank the job starts from."""
 
     kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
-        description="part_offset: the part grown by margin_mm; box: see box_mm; the others are not built yet.")
+        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm, for "
+                    "programs that are verified, not for plans yet; step is not built yet.")
         ] = "part_offset"
     margin_mm: Annotated[Number, Field(ge=0, le=1000, description="How far the blank stands off the part, mm.")] = 1.0
     uncertainty_mm: Annotated[Number, Field(ge=0, le=100, description="How far the real blank may stand beyond the "
@@ -85,11 +96,16 @@ class Stock(WireModel):
     box_mm: Annotated[Box | None, Field(
         description="Corners of a box blank in the setup frame, mm; null: the part's bounding box grown by "
                     "margin_mm.")] = None
+    cylinder_mm: Annotated[Cylinder | None, Field(
+        description="A cylinder blank along Z of the setup frame, mm; null: round the part's bounding box, grown by "
+                    "margin_mm aside and on top.")] = None
 
     @model_validator(mode="after")
     def _check(self) -> Stock:
-        if self.kind in ("cylinder", "step"):
-            raise ValueError(f"stock.kind '{self.kind}' is not built yet; use part_offset or box")
+        if self.kind == "step":
+            raise ValueError("stock.kind 'step' is not built yet; use part_offset, box or cylinder")
+        if self.cylinder_mm is not None and self.kind != "cylinder":
+            raise ValueError("stock.cylinder_mm belongs to stock.kind 'cylinder'")
         if self.box_mm is not None:
             if self.kind != "box":
                 raise ValueError("stock.box_mm belongs to stock.kind 'box'")

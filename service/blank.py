@@ -29,6 +29,7 @@ def check_against_part(setup: Setup, part: Part) -> None:
         Code 'stock_misses_part', 'allowance_beyond_stock', 'no_stock' or 'fixture_in_part'.
     """
     _check_box(setup, part)
+    _check_cylinder(setup, part)
     _check_fixtures(setup, part)
 
 
@@ -50,6 +51,56 @@ def _check_box(setup: Setup, part: Part) -> None:
         raise SetupError("nothing stands on the part that could be cut: the part fills its box blank", code="no_stock",
                          subjects=("stock",), measured=max(room - part.volume, 0.0), limit=0.0,
                          remedy="give a larger stock.box_mm, or a stock.margin_mm above 0")
+
+
+def stock_cylinder(setup: Setup, part: Part,
+                   rotation: np.ndarray) -> tuple[float, float, float, float, float] | None:
+    """x, y, bottom, radius, height of a cylinder blank as an access sees it, mm; None where the blank is none.
+
+    rotation : (3, 3) from the setup frame into that of the access. The uncertainty is in it on all sides.
+
+    Raises
+    ------
+    SetupError
+        Code 'cylinder_across_access': seen from there it lies, which the proof has no picture of.
+    """
+    stock = setup.stock
+    if stock.kind != "cylinder":
+        return None
+    if abs(abs(float(rotation[2, 2])) - 1.0) > AWAY:
+        raise SetupError("the program comes along another axis than Z of the setup, and a cylinder blank stands along "
+                         "that", code="cylinder_across_access", subjects=("stock.kind", "access"),
+                         measured=[round(float(v), 6) for v in rotation[2]], limit=[0.0, 0.0, 1.0],
+                         remedy="give the box round the cylinder as stock.box_mm, or turn the setup so that the "
+                                "cylinder stands along the access")
+    lower, upper = part.bounds
+    if (given := stock.cylinder_mm) is not None:
+        centre, low, high, radius = np.array([given.x, given.y]), given.bottom, given.bottom + given.height, \
+            0.5 * given.diameter
+    else:
+        centre, low, high = 0.5 * (lower + upper)[:2], float(lower[2]), float(upper[2]) + stock.margin_mm
+        radius = 0.5 * float(np.hypot(*(upper - lower)[:2])) + stock.margin_mm
+    ends = np.array([[*centre, low - stock.uncertainty_mm], [*centre, high + stock.uncertainty_mm]]) @ rotation.T
+    bottom, top = sorted(ends[:, 2].tolist())
+    return float(ends[0, 0]), float(ends[0, 1]), bottom, radius + stock.uncertainty_mm, top - bottom
+
+
+def _check_cylinder(setup: Setup, part: Part) -> None:
+    """Refuse a cylinder that the part stands out of."""
+    given = setup.stock.cylinder_mm
+    if given is None:
+        return
+    v = part.mesh.vertices
+    beside = np.hypot(v[:, 0] - given.x, v[:, 1] - given.y) - 0.5 * given.diameter
+    sides = {"side": beside, "top": v[:, 2] - (given.bottom + given.height), "underside": given.bottom - v[:, 2]}
+    worst, out = max(sides.items(), key=lambda item: float(item[1].max()))
+    if out.max() > OVERHANG:
+        at = v[int(out.argmax())]
+        raise SetupError(f"the part stands out of stock.cylinder_mm by {out.max():.3f} mm on its {worst}",
+                         code="stock_misses_part", subjects=("stock.cylinder_mm", worst),
+                         measured=round(float(out.max()), 6), limit=0.0,
+                         remedy=f"in the setup frame the part reaches ({', '.join(f'{x:.3f}' for x in at + 0.0)}) mm; "
+                                "the cylinder must hold that, or placement.origin_mm be another")
 
 
 def _check_contains(box: np.ndarray, part: Part) -> None:

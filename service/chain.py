@@ -23,6 +23,7 @@ from output.stepnc_arm import write_stepnc_arm
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.artifacts import clear_results
+from service.blank import stock_cylinder
 from service.convert import check_plannable, check_spindle_tool, machine_kinematics, rotary_limits, tool_bodies
 from service.delivery import Files, deliver, json_bytes
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
@@ -270,6 +271,7 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
         box = np.array([box[0] - s.stock.uncertainty_mm, box[1] + s.stock.uncertainty_mm])
     return ProofSetup(
         stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm, stock_box=box,
+        stock_cylinder=stock_cylinder(s, ready.part, view.rotation),
         fixtures=_fixtures(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,

@@ -71,7 +71,7 @@ def check_blank(setup: Setup) -> None:
         Code 'no_stock' or 'allowance_beyond_stock'.
     """
     stock, allowance = setup.stock, setup.quality.stock_allowance_mm
-    if stock.box_mm is not None:
+    if stock.box_mm is not None or stock.cylinder_mm is not None:
         return
     grown = stock.margin_mm + stock.uncertainty_mm
     offset = stock.kind == "part_offset"
@@ -89,13 +89,19 @@ def check_blank(setup: Setup) -> None:
 
 
 def check_plannable(setup: Setup) -> None:
-    """Refuse a machine that zones and plans are not built for.
+    """Refuse a machine or a blank that zones and plans are not built for.
 
     Raises
     ------
     SetupError
-        Code 'five_axis_not_planned'.
+        Code 'five_axis_not_planned' or 'cylinder_not_planned'.
     """
+    if setup.stock.kind == "cylinder":
+        raise SetupError("plans start from a box or from the part grown by a margin so far; of a cylinder only "
+                         "finished programs can be verified", code="cylinder_not_planned", subjects=("stock.kind",),
+                         measured=setup.stock.kind, limit=["part_offset", "box"],
+                         remedy="give stock.kind 'box' with the box round the cylinder, or verify a program: zonemill "
+                                "verify, POST /v1/verifications")
     if setup.machine.kind == "5-axis":
         raise SetupError("zones and plans are for machines of three axes so far; on a 5-axis one only finished "
                          "programs can be verified", code="five_axis_not_planned", subjects=("machine.kind",),
