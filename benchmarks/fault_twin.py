@@ -2,8 +2,8 @@
 
 It runs no code of the proof.
 
-Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part or
-fixture is in a shank or holder, the shorter of the way out aside and the way down out of its lower end (aside alone
+Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part,
+fixture or stock that still stands is in a shank or holder, the shorter of the way out aside and the way down out of its lower end (aside alone
 for a neck). Cutter against a fixture: the way out of the cutting part. Cutter against stock in a rapid: for tools along
 Z how far under the place the tool's end reaches, else the way out. Residual: what is left on a normal.
 """
@@ -48,9 +48,7 @@ def worst(depth: dict[int, float], point: F64) -> Found:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """The twin of one case and program.
-
-    """
+    """The twin of one case and program."""
 
     case: Case
     way: Way
@@ -80,7 +78,51 @@ class Twin:
         radial = part == "neck"
         shapes = np.array([[*row, radial] for name, *row in frusta(body) if name == part], float).reshape(-1, 5)
         depth, point = self._touch(meshes, rows, shapes, np.zeros(3))
-        return worst(depth, point)
+        stock, place = self._stock(rows, shapes)
+        if max(stock.values(), default=0.0) > max(depth.values(), default=0.0):
+            point = place
+        return worst({k: max(depth.get(k, 0.0), stock.get(k, 0.0)) for k in depth.keys() | stock.keys()}, point)
+
+    def _stock(self, rows: NDArray[np.int64], shapes: F64) -> tuple[dict[int, float], F64]:
+        """Depths by line of stock that still stands when shapes (k, 5) come there, mm, and the deepest place."""
+        low, high = blank_box(self.case.setup)
+        points, depth, where = _grid(low + 1e-6, high - 1e-6, 0.7), {}, np.zeros(3)
+        for step, near in ((0.8, 0.9), (0.2, 0.15), (0.05, 0.02), (0.02, 0.0)):
+            poses = self.way.poses(rows, step)
+            points = points[in_blank(points, self.case.setup)]
+            points = points[taken_in(points, poses.tip, poses.axis, shapes)]
+            best, which = touch_standing(poses.tip, poses.axis, poses.move, points, self._gone(points), shapes)
+            if best.max(initial=0.0) <= 0.0:
+                return depth, where
+            per_move = np.zeros(len(self.way.line))
+            np.maximum.at(per_move, poses.move, best)
+            where = points[which[np.argmax(best)]]
+            for move in rows.tolist():
+                line = int(self.way.line[move])
+                depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
+            if near == 0.0:
+                break
+            rough = 1.2 * near
+            rows = rows[per_move[rows] > best.max() - max(0.12 * best.max(), rough)]
+            seeds = thinned(points[which[best > best.max() - rough]], near)
+            seeds = seeds[np.linalg.norm(seeds - where, axis=1).argsort()[:12]]
+            points = np.vstack([_grid(p - near, p + near, near / 7.0) for p in seeds])
+            points = np.clip(points, low + 1e-6, high - 1e-6)
+        return depth, where
+
+    def _gone(self, points: F64) -> NDArray[np.int64]:
+        """(n,) the move that takes each place (n, 3), mm; after the last where none does."""
+        out = np.full(len(points), len(self.way.line), np.int64)
+        if len(points) == 0:
+            return out
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        far = np.linalg.norm(points - middle, axis=1).max()
+        for body in self.case.tools:
+            poses = self.way.poses(self.way.rows(feed=True, tool=body.number), 0.1)
+            cutter = np.array([body.radius, body.corner_radius, body.flute_length])
+            close = np.linalg.norm(poses.tip - middle, axis=1) < far + np.hypot(body.radius, body.flute_length)
+            taken_at(points, poses.tip[close], poses.axis[close], poses.move[close], cutter, out)
+        return out
 
     def cutter_on_fixtures(self, number: int) -> Found:
         """How deep fixtures come into the cutting part of a tool in feed moves."""
@@ -209,6 +251,14 @@ def thinned(points: F64, size: float) -> F64:
     return points[first]
 
 
+def blank_box(setup: ProofSetup) -> F64:
+    """(2, 3) mm, corners of the box round the blank."""
+    if setup.stock_kind == StockKind.CYLINDER and setup.stock_cylinder is not None:
+        x, y, z, radius, height = setup.stock_cylinder
+        return np.array([[x - radius, y - radius, z], [x + radius, y + radius, z + height]])
+    return np.asarray(setup.stock_box, float)
+
+
 def in_blank(points: F64, setup: ProofSetup) -> NDArray[np.bool_]:
     """(n,) bool: which places (n, 3), mm, lie in the blank."""
     if setup.stock_kind == StockKind.CYLINDER and setup.stock_cylinder is not None:
@@ -328,12 +378,70 @@ def touch(tips, axes, points, shapes, cutter, upright):
                 if d > best[m]:
                     best[m], which[m] = d, i
             for k in range(len(shapes)):
-                z0, z1 = shapes[k, 0], shapes[k, 1]
-                if z0 < h < z1:
-                    d = shapes[k, 2] + (shapes[k, 3] - shapes[k, 2]) * (h - z0) / (z1 - z0) - rho
-                    d = d if shapes[k, 4] > 0.0 else min(d, h - z0)
-                    if d > best[m]:
-                        best[m], which[m] = d, i
+                d = _in_shape(shapes[k], h, rho)
+                if d > best[m]:
+                    best[m], which[m] = d, i
+    return best, which
+
+
+@njit(cache=True, nogil=True)
+def _in_shape(shape, h, rho):
+    z0, z1 = shape[0], shape[1]
+    if not z0 < h < z1:
+        return -1.0
+    d = shape[2] + (shape[3] - shape[2]) * (h - z0) / (z1 - z0) - rho
+    return d if shape[4] > 0.0 else min(d, h - z0)
+
+
+@njit(cache=True, nogil=True)
+def taken_in(points, tips, axes, shapes):
+    """(n,) bool: which places (n, 3) mm any of the shapes (k, 5) takes in at poses (m, 3), (m, 3)."""
+    out = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        for m in range(len(tips)):
+            x, y, z = points[i, 0] - tips[m, 0], points[i, 1] - tips[m, 1], points[i, 2] - tips[m, 2]
+            h = x * axes[m, 0] + y * axes[m, 1] + z * axes[m, 2]
+            rho = np.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
+            for k in range(len(shapes)):
+                if _in_shape(shapes[k], h, rho) > 0.0:
+                    out[i] = True
+            if out[i]:
+                break
+    return out
+
+
+@njit(cache=True, nogil=True)
+def taken_at(points, tips, axes, moves, cutter, out):
+    """Lower out (n,) to the first of the moves (m,) whose cutter (3,) mm at its poses takes each place (n, 3), mm."""
+    far2 = cutter[0] ** 2 + cutter[2] ** 2
+    for i in range(len(points)):
+        for m in range(len(tips)):
+            if moves[m] >= out[i]:
+                continue
+            x, y, z = points[i, 0] - tips[m, 0], points[i, 1] - tips[m, 1], points[i, 2] - tips[m, 2]
+            r2 = x * x + y * y + z * z
+            if r2 > far2:
+                continue
+            h = x * axes[m, 0] + y * axes[m, 1] + z * axes[m, 2]
+            if _in_cutter(np.sqrt(max(r2 - h * h, 0.0)), h, cutter[0], cutter[1], cutter[2], True) > 0.0:
+                out[i] = moves[m]
+
+
+@njit(cache=True, nogil=True)
+def touch_standing(tips, axes, moves, points, gone, shapes):
+    """As ``touch`` for shapes, of places that no move up to that of the pose has taken; moves (m,), gone (n,)."""
+    best, which = np.zeros(len(tips)), np.zeros(len(tips), np.int64)
+    for m in range(len(tips)):
+        for i in range(len(points)):
+            if gone[i] <= moves[m]:
+                continue
+            x, y, z = points[i, 0] - tips[m, 0], points[i, 1] - tips[m, 1], points[i, 2] - tips[m, 2]
+            h = x * axes[m, 0] + y * axes[m, 1] + z * axes[m, 2]
+            rho = np.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
+            for k in range(len(shapes)):
+                d = _in_shape(shapes[k], h, rho)
+                if d > best[m]:
+                    best[m], which[m] = d, i
     return best, which
 
 
