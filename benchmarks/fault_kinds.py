@@ -24,7 +24,7 @@ REFUSED = "refused"
 
 
 class Redraw(Exception):
-    """This draw is no fault that anybody could find, or not one of its kind."""
+    """This draw is no fault that anybody could find, or not one of its kind; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,13 @@ def _edit(case: Case, row: int, *lines: str) -> Case:
 
 def _gouged(case: Case, found: Found) -> Planted:
     if found.depth < LEAST:
-        raise Redraw
+        raise Redraw(f"no gouge of {LEAST} mm comes of it")
     return Planted(case, ("gouge",), found.lines, found.depth)
 
 
 def _pick(rng: np.random.Generator, steps: list[Step]) -> Step:
     if not steps:
-        raise Redraw
+        raise Redraw("no such line in the program")
     return steps[int(rng.integers(len(steps)))]
 
 
@@ -154,7 +154,7 @@ def swapped_ij(case: Case, rng: np.random.Generator) -> Planted:
     line = case.lines[step.row]
     i, j = re.search(r"I(\S+)", line)[1], re.search(r"J(\S+)", line)[1]  # type: ignore[index]
     if i == j:
-        raise Redraw
+        raise Redraw("I and J are the same")
     return _bad_arc(_edit(case, step.row, re.sub(r"I\S+ J\S+", f"I{j} J{i}", line)), step.row + 1)
 
 
@@ -182,7 +182,7 @@ def missing_retract(case: Case, rng: np.random.Generator) -> Planted:
     bad = _edit(case, step.row, f"G0 {place_words(case.mode, tip, step.turn)}")
     found = twin_of(bad).rapid(step.row + 1)
     if found.depth < 0.3:
-        raise Redraw
+        raise Redraw("the way goes through air")
     return Planted(bad, ("rapid",), found.lines, found.depth, word="cutting part")
 
 
@@ -195,7 +195,7 @@ def _touching(case: Case, rng: np.random.Generator, part: str, make: Callable[[T
         found = twin_of(bad).body(part, body.number)
         if found.depth > 0.02:
             return Planted(bad, ("collision",), found.lines, found.depth, word=part)
-    raise Redraw
+    raise Redraw(f"no {part} of six touches anything")
 
 
 def shank_touch(case: Case, rng: np.random.Generator) -> Planted:
@@ -226,7 +226,7 @@ def clamp_hit(case: Case, rng: np.random.Generator) -> Planted:
     bad = replace(case, setup=replace(case.setup, fixtures=(*case.setup.fixtures[1:], box)))
     found = twin_of(bad).cutter_on_fixtures(step.tool)
     if found.depth < 0.02:
-        raise Redraw
+        raise Redraw("the clamp is not touched")
     return Planted(bad, ("collision",), found.lines, found.depth, word="cutting part enters a fixture")
 
 
@@ -272,11 +272,11 @@ def lost_point(case: Case, rng: np.random.Generator) -> Planted:
     then = _after(case, step)
     way = read_way(bad.text)
     if then is None or then.arc:
-        raise Redraw  # the arc after it would be refused, and rightly
+        raise Redraw("an arc follows, which would be refused")  # the arc after it would be refused, and rightly
     known = way.end[~np.isnan(way.end).any(axis=1), axis]
     over = float(np.ptp(known)) - 200.0
     if over < 1.0:
-        raise Redraw
+        raise Redraw("the travel is not exceeded")
     return Planted(bad, ("limit",), frozenset([step.row + 1]), over, word=f"in {'XYZ'[axis]}")
 
 
@@ -296,7 +296,7 @@ def _near(case: Case, zone: str, steps: list[Step], most: int) -> tuple[F64, F64
 def _run(case: Case, rng: np.random.Generator) -> tuple[str, list[Step]]:
     """A finishing pass: its zone and feed steps."""
     if not case.runs:
-        raise Redraw
+        raise Redraw("no finishing passes")
     k = int(rng.integers(len(case.runs)))
     return case.runs[k], [s for s in case.steps if s.run == k and not s.rapid]
 
@@ -304,10 +304,10 @@ def _run(case: Case, rng: np.random.Generator) -> tuple[str, list[Step]]:
 def _left(bad: Case, zone: str, steps: list[Step]) -> Planted:
     points, normals = _near(bad, zone, steps, 900)
     if len(points) == 0:
-        raise Redraw
+        raise Redraw("nobody looks there")
     most = float(twin_of(bad).left(points, normals).max())
     if most < LEAST_LEFT:
-        raise Redraw
+        raise Redraw(f"no {LEAST_LEFT} mm are left by it")
     return Planted(bad, ("residual",), None, most, zone)
 
 
@@ -319,7 +319,7 @@ def without(case: Case, steps: list[Step]) -> Case:
     joined = {row + 1 - sum(g < row for g in gone) for row in {s.row for s in case.steps} - gone
               if row - 1 in gone or row - 2 in gone}
     if way.refused or Twin(bad, way).gouge(joined).depth > 0.003:
-        raise Redraw
+        raise Redraw("the way past the gap would gouge")
     return bad
 
 
@@ -344,7 +344,7 @@ def shifted_pass(case: Case, rng: np.random.Generator) -> Planted:
     if found.depth >= LEAST:
         return _gouged(bad, found)
     if found.depth > 0.003:
-        raise Redraw
+        raise Redraw("neither gouge nor clean")
     return _left(bad, zone, steps)
 
 
@@ -354,7 +354,7 @@ def duplicated_zone(case: Case, rng: np.random.Generator) -> Planted:
     spans = [(a, b) for a, b in zip(tops[:-1], tops[1:], strict=True)
              if case.steps[a].tool == case.steps[b].tool and any(s.run >= 0 for s in case.steps[a + 1:b])]
     if not spans:
-        raise Redraw
+        raise Redraw("nothing is cut between two visits to the safe height")
     a, b = spans[int(rng.integers(len(spans)))]
     rows = [s.row for s in case.steps[a + 1:b + 1]]
     last = rows[-1]

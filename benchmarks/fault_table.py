@@ -61,10 +61,10 @@ def run(kind: str, part: str, seed: int) -> Outcome:
         try:
             planted = KINDS[kind](case, rng)
             break
-        except Redraw:
-            continue
+        except Redraw as why:
+            reason = str(why)
     else:
-        return Outcome(kind, part, seed, False, seconds=time.perf_counter() - begin)
+        return Outcome(kind, part, seed, False, told=reason, seconds=time.perf_counter() - begin)
     found, line, depth, off, told = judged(planted)
     return Outcome(kind, part, seed, True, found, line, depth, off, told, time.perf_counter() - begin)
 
@@ -144,6 +144,14 @@ def table(outcomes: list[Outcome], parts: list[str], kinds: list[str]) -> Iterat
         yield f"{kind:16}" + "".join(cells)
 
 
+def never(outcomes: list[Outcome]) -> Iterator[str]:
+    """What could not be planted on which part, how often, and why not at the last draw."""
+    asked = [o for o in outcomes if not o.drawn]
+    for kind, part, why in sorted({(o.kind, o.part, o.told) for o in asked}):
+        count = sum((o.kind, o.part, o.told) == (kind, part, why) for o in asked)
+        yield f"not in {DRAWS} draws: {kind} on {part}, {count} times: {why}"
+
+
 def main() -> None:
     """Print the table, the misses, and what clean programs were accused of."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -165,8 +173,10 @@ def main() -> None:
         for o in outcomes:
             if o.drawn and not (o.found and o.line and o.depth):
                 print(f"miss: {o.kind} on {o.part}, seed {o.seed}: {o.told}")
-        never = sum(not o.drawn for o in outcomes)
-        print(f"{len(outcomes)} asked, {never} not possible in {DRAWS} draws, {time.perf_counter() - begin:.0f} s")
+        print("\n".join(never(outcomes)))
+        total = sum(o.drawn for o in outcomes)
+        right = sum(o.drawn and o.found and o.line and o.depth for o in outcomes)
+        print(f"{right} right of {total} planted, {len(outcomes)} asked, {time.perf_counter() - begin:.0f} s")
         for told in pool.map(clean, *zip(*((parts[k % len(parts)], asked.seed + k) for k in range(asked.clean)),
                                          strict=True)) if asked.clean else ():
             for line in told:

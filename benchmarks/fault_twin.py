@@ -3,9 +3,10 @@
 It runs no code of the proof.
 
 Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part,
-fixture or stock that still stands is in a shank or holder, the shorter of the way out aside and the way down out of its lower end (aside alone
-for a neck). Cutter against a fixture: the way out of the cutting part. Cutter against stock in a rapid: for tools along
-Z how far under the place the tool's end reaches, else the way out. Residual: what is left on a normal.
+fixture or stock that still stands is in a shank or holder, the shorter of the way out aside and the way down out of its
+lower end (aside alone for a neck). Cutter against a fixture: the way out of the cutting part. Cutter against stock in a
+rapid: for tools along Z how far under the place the tool's end reaches, else the way out. Residual: what is left on a
+normal.
 """
 
 from __future__ import annotations
