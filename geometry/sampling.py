@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.kernels.lattice import lattice_places
+from geometry.kernels.sampling import lattice_places
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Normals of facet and surface that differ by more (cosine): the facet is a sliver or folded, the surface singular.
