@@ -36,12 +36,12 @@ from geometry.step import read_part  # noqa: E402
 from geometry.toolbody import ToolBody  # noqa: E402
 from service.convert import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402
+from verify.blank import stock_bounds  # noqa: E402
 from verify.field import Field  # noqa: E402
 from verify.material import machined  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402
 from verify.reader import FEED, read_program  # noqa: E402
 from verify.removal import Moves  # noqa: E402
-from verify.stock import stock_bounds  # noqa: E402
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from verify.bodies import Bodies
 from verify.kernels.clash import clash_chunk
 from verify.model import ProofSetup
 from verify.pointtree import PointTree
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stock import Bodies, event_table, free_rapids, gather, noted
+from verify.stockpass import event_table, free_rapids, gather, noted
 from verify.toolaxes import ToolAxes
 
 FIXTURE_SPACING = 0.25

@@ -18,24 +18,14 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.nearest import nearest
 from geometry.toolbody import ToolBody
+from verify.blank import blank_cylinder, stock_bounds
+from verify.bodies import Bodies
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stock import (
-    Bodies,
-    StockPass,
-    blank_cylinder,
-    descents,
-    end_radii,
-    event_table,
-    free_rapids,
-    gather,
-    noted,
-    stock_bounds,
-    tables_for,
-)
+from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
 from verify.toolaxes import ToolAxes
 
 F32 = NDArray[np.float32]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from verify.blank import stock_bounds
 from verify.cycles import FEED
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program import Program
-from verify.stock import stock_bounds
 
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 Z_AXIS = 4

@@ -13,13 +13,13 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
+from verify.blank import stock_bounds
 from verify.field import Field
 from verify.material import machined
 from verify.model import ProofSetup
 from verify.progress import Stages
 from verify.removal import BOW
 from verify.sequence import Given, check_numbers, moves_of, read_all
-from verify.stock import stock_bounds
 
 LEAST_STEP = 0.002
 MOST_STEP = 5.0

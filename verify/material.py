@@ -17,7 +17,8 @@ from verify.fitness import top_of_all
 from verify.model import ProofSetup
 from verify.progress import Stages
 from verify.removal import Moves
-from verify.stock import StockPass, blank, free_rapids, run_bodies, run_stock
+from verify.stock import blank, run_bodies, run_stock
+from verify.stockpass import StockPass, free_rapids
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from geometry.mesh import F64, I32
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
+from verify.blank import stock_on_normals
 from verify.dogleg import box_findings
 from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
@@ -31,7 +32,7 @@ from verify.removal import BOW, Moves, residual_on_normals
 from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
-from verify.stock import StockPass, stock_on_normals
+from verify.stockpass import StockPass
 
 LEAST_REACH = 1.0
 READ, CUT, MET = 0.12, 0.5, 0.97  # shares of the work done when the programs are read, residuals and contacts known

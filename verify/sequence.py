@@ -12,13 +12,13 @@ from geometry.errors import VerificationError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
+from verify.blank import stock_bounds
 from verify.findings import Source
 from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.progress import Report, Stages
 from verify.reader import FEED, Program, read_program
 from verify.removal import Moves
-from verify.stock import stock_bounds
 from verify.toolaxes import ToolAxes
 
 BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound

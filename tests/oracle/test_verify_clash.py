@@ -7,13 +7,13 @@ import pytest
 
 from geometry.toolbody import HolderSegment, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
+from verify.bodies import Bodies
 from verify.clash import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 from verify.removal import BOW, Moves
-from verify.stock import Bodies
 from verify.toolaxes import ToolAxes
 
 TOOL = ToolBody("T1", 1, 4.0, 2.0, 5.0, 3.6, 9.0, 5.0, 14.0, (HolderSegment(10.0, 14.0, 5.0),))

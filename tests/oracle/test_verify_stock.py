@@ -9,11 +9,13 @@ from geometry.bvh import TriangleTree
 from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
 from tests.pocket_case import TOOL, block
+from verify.blank import stock_on_normals
 from verify.guard import convex_edges, gouge_depths
 from verify.kernels.heights import lowest
 from verify.model import ProofSetup, StockKind
 from verify.removal import Moves
-from verify.stock import blank, descents, end_radii, run_stock, stock_on_normals
+from verify.stock import blank, run_stock
+from verify.stockpass import descents, end_radii
 
 
 def profile(rho, radius, corner, grow):

@@ -1,0 +1,62 @@
+"""Necks, shanks and holders as rows for the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from verify.kernels.stock import HOLDER, NECK, SHANK
+from verify.model import ProofSetup
+
+NO_HOLDER = 200.0  # mm by which a shank goes on over its stickout where the setup names no holder
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Neck, shank and holder rows of all tools; rows first[k]:first[k+1] belong to tool k (see kernels.stock)."""
+
+    rows: F64
+    first: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, tools: Sequence[ToolBody], setup: ProofSetup) -> Bodies:
+        """Rows (z0, z1, r0, r1, clearance, part) with the clearance in the radii."""
+        rows: list[tuple[float, ...]] = []
+        first = [0]
+        for tool in tools:
+            for z0, z1, r0, r1, clearance, part in _frusta(tool, setup):
+                if z1 <= z0:
+                    continue
+                if max(r0, r1) <= tool.radius + 1e-6:
+                    clearance = min(clearance, max(tool.radius - max(r0, r1), 0.0))
+                rows.append((z0, z1, r0 + clearance, r1 + clearance, clearance, part))
+            first.append(len(rows))
+        return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
+
+    def reach(self, cutters: F64) -> F64:
+        """(k,) float64, mm: how far each assembly reaches from its tip; cutters (k, 3) as ``cutter_table``."""
+        out = np.hypot(cutters[:, 0], cutters[:, 2])
+        for k in range(len(out)):
+            own = self.rows[self.first[k]:self.first[k + 1]]
+            out[k] = max(out[k], np.hypot(np.maximum(own[:, 2], own[:, 3]), own[:, 1]).max(initial=0.0))
+        return np.asarray(out)
+
+
+def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float, float, float, int]]:
+    neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
+    top = max(tool.neck_length, tool.flute_length)
+    out = [(tool.flute_length, top, neck, neck, tool.neck_clearance(setup.clearance_neck), NECK),
+           (top, max(tool.stickout, top), shank, shank, setup.clearance_shank, SHANK)]
+    z = tool.stickout
+    for part in tool.holder:
+        out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
+        z += part.length
+    if not tool.holder:
+        # nobody said what holds it: at least the tool itself goes on
+        out.append((max(z, top), max(z, top) + NO_HOLDER, shank, shank, setup.clearance_shank, SHANK))
+    return out

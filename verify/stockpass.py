@@ -1,0 +1,125 @@
+"""What every pass over the stock shares: which moves plunge or need no clearance, and tables of what is found."""
+
+from __future__ import annotations
+
+import math
+import queue
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from verify.removal import Moves
+
+EVENTS = 4096
+ANOTHER_TOOL = 1e6  # mm
+Spare = queue.SimpleQueue[NDArray[np.int64]]
+
+
+def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
+    """Feed moves that descend steeper than ``ramp_angle`` (rad), and what ramps could have taken since the beginning.
+
+    Down is along the tool, for one that turns along its axis half way.
+
+    Returns
+    -------
+    steep : (m,) bool
+    earned : (m,) float64, mm: sideways way of all feed moves before that are not steep, times the tangent of the angle;
+             without end at a change of the tool
+    """
+    d, slope = moves.end - moves.start, math.tan(ramp_angle)
+    if moves.axes is None:
+        rise, aside = d[:, 2], np.hypot(d[:, 0], d[:, 1])
+    else:
+        up = moves.axes.middle
+        rise = np.einsum("ij,ij->i", d, up)
+        aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
+    steep = np.asarray(moves.feed & (-rise > aside * slope + 1e-9))
+    earned = np.cumsum(np.where(moves.feed & ~steep, aside * slope, 0.0))
+    changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
+    return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
+
+
+@dataclass(frozen=True, eq=False)
+class StockPass:
+    """What one pass over the stock found.
+
+    events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
+    cut    : (m,) bool, moves that took stock
+    engaged : (m,) int64, sectors of the cutter that met stock (``kernels.engaged``)
+    taken  : (m,) float64, mm³ by move, or None where that is not known
+    """
+
+    events: F64
+    lost: int
+    cut: NDArray[np.bool_]
+    engaged: NDArray[np.int64]
+    taken: F64 | None = None
+
+
+def end_radii(tools: Sequence[ToolBody]) -> F64:
+    """(k,) float64, mm: radius of the region that cuts when the tool goes straight down (see ``verify.stock``)."""
+    share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
+             "bull": lambda t: t.radius - 0.5 * t.corner_radius}
+    return np.array([share[t.kind](t) for t in tools])
+
+
+def event_table() -> F64:
+    """An empty table of events (e + 1, 7), in mm; the kernels keep in its last row how many it holds."""
+    return np.zeros((EVENTS + 1, 7))
+
+
+def noted(events: F64) -> F64:
+    """The rows (e, 7) of a table that hold events, in mm."""
+    return events[:int(events[-1, 0])].copy()
+
+
+def free_rapids(moves: Moves) -> NDArray[np.bool_]:
+    """(m,) bool: rapids that no clearance is asked of.
+
+    Those that draw the tool straight out along its axis, and those that put it straight back no deeper than a feed
+    move had it, with no move aside since: a peck out of its hole and into it again.
+    """
+    d = moves.end - moves.start
+    up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
+    rise = np.einsum("ij,ij->i", d, up)
+    aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
+    straight = aside <= 1e-6 * np.abs(rise) + 1e-7
+    if moves.axes is not None:
+        straight &= moves.axes.angle == 0.0
+    out = np.asarray(~moves.feed & straight & (rise > 0))
+    for m in np.flatnonzero(~moves.feed & straight & (rise < 0)).tolist():
+        height, i = 0.0, m - 1  # of the end of move i over the start of move m
+        while i >= 0 and straight[i] and moves.tool[i] == moves.tool[m] and not out[m]:
+            out[m] = moves.feed[i] and height <= rise[m] + 1e-9
+            height -= rise[i]
+            i -= 1
+    return out
+
+
+def gather(results: list[object]) -> tuple[F64, int]:
+    """Events of all jobs in one table (e, 7), sorted by move, code and the deeper first, and how many were lost.
+
+    results : of every job its events (k, 7), depths and places in mm, and how many it found
+    """
+    parts = [r for r in results if isinstance(r, tuple)]
+    if not parts:
+        return np.zeros((0, 7)), 0
+    events = np.concatenate([p[0] for p in parts])
+    lost = sum(p[1] - len(p[0]) for p in parts)
+    order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
+    return events[order], int(lost)
+
+
+def tables_for(threads: int, shape: tuple[int, ...]) -> tuple[list[NDArray[np.int64]], Spare]:
+    """A table of int64 zeros for each thread, and all of them in a queue that jobs take one from and put it back.
+
+    Put together by an operation that knows no order, they say the same whichever thread did what.
+    """
+    tables, spare = [np.zeros(shape, np.int64) for _ in range(max(1, threads))], Spare()
+    for table in tables:
+        spare.put(table)
+    return tables, spare
