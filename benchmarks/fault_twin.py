@@ -95,12 +95,7 @@ class Twin:
             best, which = touch_standing(poses.tip, poses.axis, poses.move, points, self._gone(points), shapes)
             if best.max(initial=0.0) <= 0.0:
                 return depth, where
-            per_move = np.zeros(len(self.way.line))
-            np.maximum.at(per_move, poses.move, best)
-            where = points[which[np.argmax(best)]]
-            for move in rows.tolist():
-                line = int(self.way.line[move])
-                depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
+            per_move, where = self._by_line(depth, poses.move, best), points[which[np.argmax(best)]]
             if near == 0.0:
                 break
             rough = 1.2 * near
@@ -110,6 +105,15 @@ class Twin:
             points = np.vstack([_grid(p - near, p + near, near / 7.0) for p in seeds])
             points = np.clip(points, low + 1e-6, high - 1e-6)
         return depth, where
+
+    def _by_line(self, depth: dict[int, float], moves: NDArray[np.int64], best: F64) -> F64:
+        """Raise depths by line, mm, to the best (n,) of poses of moves (n,); the best by move, 0 for others, mm."""
+        out = np.zeros(len(self.way.line))
+        np.maximum.at(out, moves, best)
+        for move in np.unique(moves).tolist():
+            line = int(self.way.line[move])
+            depth[line] = max(depth.get(line, 0.0), float(out[move]))
+        return out
 
     def _gone(self, points: F64) -> NDArray[np.int64]:
         """(n,) the move that takes each place (n, 3), mm; after the last where none does."""
@@ -144,12 +148,7 @@ class Twin:
             best, which = touch(poses.tip, poses.axis, points, shapes, cutter, False)
             if best.max(initial=0.0) <= 0.0:
                 return {}, where
-            per_move = np.zeros(len(self.way.line))
-            np.maximum.at(per_move, poses.move, best)
-            where = points[which[np.argmax(best)]]
-            for move in rows.tolist():
-                line = int(self.way.line[move])
-                depth[line] = max(depth.get(line, 0.0), float(per_move[move]))
+            per_move, where = self._by_line(depth, poses.move, best), points[which[np.argmax(best)]]
             rough = 0.5 if near > 0.5 else 0.065
             rows = rows[per_move[rows] > best.max() - max(0.12 * best.max(), rough)]
             seeds = thinned(points[which[best > best.max() - rough]], max(near, 0.1))
