@@ -37,6 +37,8 @@ def axis_pieces(start: Sequence[float], end: Sequence[float]) -> int:
     Returns at least 1.
     """
     a, b = abs(end[0] - start[0]), abs(end[1] - start[1])
+    if max(a, b) <= MOST_TURN and _CURVED * b * math.hypot(b, 2 * a) <= 8 * TURN:
+        return 1  # wherever the axis points
     cosine, sine = _most_cosine(start[0], end[0]), _most_cosine(start[0] - math.pi / 2, end[0] - math.pi / 2)
     bend = b * cosine * math.hypot(b * sine, 2 * a)
     return max(1, math.ceil(max(a, b) / MOST_TURN), math.ceil(math.sqrt(_CURVED * bend / (8 * TURN))))

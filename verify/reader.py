@@ -28,7 +28,7 @@ from verify.motion import Motion
 from verify.program import NAN, Program, Remark
 from verify.progress import Report, silent
 from verify.served import served
-from verify.words import STRAIGHT, Block, BlockError, parse_block, used_letters
+from verify.words import Block, BlockError, parse_block, straight, used_letters
 
 BLEND_LIMIT = 0.01
 TOLD = 4096  # lines between two reports of how far the reading is
@@ -74,33 +74,39 @@ class Reader(Motion):
 
     def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
         """Run blocks given with their lines; the fast path serves plain straight moves, and only in the plain state."""
-        s, log, fast, rows, full = self.s, self.log, STRAIGHT, self.log.rows, Log.full
+        s, log, fast, rows, full = self.s, self.log, straight(self.rotary), self.log.rows, Log.full
         percents = 0
         plain = begun = False
         for number, raw in blocks:
             if plain and (m := fast(raw)):
-                g, x, y, z, f = m.groups()
+                g, x, y, z, *turns, f = m.groups()
                 if g is not None:
                     s.motion = float(g)
                 if s.motion == 1 or s.motion == 0:
                     if f is not None:
                         s.feed = float(f)
-                    if x is None and y is None and z is None:
-                        continue
-                    px, py, pz = s.position
-                    ex = px if x is None else float(x)
-                    ey = py if y is None else float(y)
-                    ez = pz if z is None else float(z)
-                    s.position = [ex, ey, ez]
-                    if len(rows) >= full:
-                        log.flush()
-                    if s.motion == 0:
-                        rows.append((px, py, pz, ex, ey, ez, RAPID, NAN, s.tool, number))
-                        continue
-                    if s.feed > 0:
-                        rows.append((px, py, pz, ex, ey, ez, FEED, s.feed, s.tool, number))
-                        continue
-                    s.position = [px, py, pz]
+                    if any(turns):
+                        if s.tcp and (s.motion == 0 or s.feed > 0):
+                            log.line = number
+                            self._tip_to((x, y, z), turns)
+                            continue
+                    else:
+                        if x is None and y is None and z is None:
+                            continue
+                        px, py, pz = s.position
+                        ex = px if x is None else float(x)
+                        ey = py if y is None else float(y)
+                        ez = pz if z is None else float(z)
+                        s.position = [ex, ey, ez]
+                        if len(rows) >= full:
+                            log.flush()
+                        if s.motion == 0:
+                            rows.append((px, py, pz, ex, ey, ez, RAPID, NAN, s.tool, number))
+                            continue
+                        if s.feed > 0:
+                            rows.append((px, py, pz, ex, ey, ez, FEED, s.feed, s.tool, number))
+                            continue
+                        s.position = [px, py, pz]
             log.line = number
             text = raw.strip()
             if text == "%":

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from verify.cycles import FEED, RAPID
 from verify.dividing import axis_pieces, tip_pieces
 from verify.kinematics import Kinematics
 from verify.log import Log
@@ -144,6 +145,18 @@ class Rotary:
         else:
             self._swing(start, target, kind, feed, was, minutes, gauge)
 
+    def _tip_to(self, place: Sequence[str | None], turns: Sequence[str | None]) -> None:
+        """A straight block of tip and angles, absolute, in mm and deg as written; tool centre point control is on."""
+        s = self.s
+        start, s.position = s.position, [p if w is None else float(w) for p, w in zip(s.position, place, strict=True)]
+        turn = [t if w is None else float(w) for t, w in zip(s.turn, turns, strict=True)]
+        self.stated_axes.update(letter for letter, w in zip(self.rotary, turns, strict=True) if w is not None)
+        if s.motion == 0:
+            self._write(start, s.position, RAPID, NAN, 0, turn, NAN)
+        else:
+            rate, minutes = self._timing(s.feed, math.dist(start, s.position), turn)
+            self._write(start, s.position, FEED, rate, 0, turn, minutes)
+
     def _swing(self, start: list[float], target: list[float], kind: int, feed: float, was: list[float],
                minutes: float, gauge: float) -> None:
         """Write a block that turns an axis from ``was`` to where it stands now, deg, in pieces."""
@@ -152,6 +165,9 @@ class Rotary:
         n = axis_pieces(a, b)
         if not s.tcp and self.machine is not None:
             n = max(n, tip_pieces(self.machine, start, target, (b[0] - a[0], b[1] - a[1]), gauge))
+        elif n == 1:
+            log.turned.swing(log.count, was, s.turn, minutes)
+            return log.move(start, target, kind, feed, s.tool, 0)
         log.room(n)
         points = [between(start, target, k / n) for k in range(n + 1)]
         turns = [between(was, s.turn, k / n) for k in range(n + 1)]
@@ -160,6 +176,7 @@ class Rotary:
         for k in range(n):
             log.turned.swing(log.count, turns[k], turns[k + 1], minutes / n)
             log.move(points[k], points[k + 1], kind, feed, s.tool, 0)
+        return None
 
     def _no_tips(self) -> None:
         """Refuse a move of the joints whose tip cannot be told."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 CYCLES = frozenset({73, 81, 82, 83, 85, 86, 89})
@@ -24,8 +25,13 @@ LARGEST = 1e15
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 # at most 15 digits before the point, so whatever this matches is finite; longer numbers take the slow way and are named
 _SHORT = r"[+-]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)"
-STRAIGHT = re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?(?:X({_SHORT}) ?)?(?:Y({_SHORT}) ?)?(?:Z({_SHORT}) ?)?"
-                      rf"(?:F({_SHORT}) ?)?\r?").fullmatch
+
+def straight(rotary: str) -> Callable[[str], re.Match[str] | None]:
+    """What matches a line of a plain straight move, words in the usual order: groups G, X, Y, Z, rotary words, F."""
+    words = "".join(rf"(?:{letter}({_SHORT}) ?)?" for letter in f"XYZ{rotary}F")
+    return re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?{words}\r?").fullmatch
+
+
 _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
