@@ -22,9 +22,12 @@ WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59"
 LARGEST = 1e15
 """The largest number a word may hold: above it whole millimetres are no longer told apart."""
 
+FARTHEST = 1e8
+"""mm or deg, the largest X, Y, Z, A, B or C: no machine goes there, and a turning way is written out in pieces."""
+
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
-# at most 15 digits before the point, so whatever this matches is finite; longer numbers take the slow way and are named
-_SHORT = r"[+-]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)"
+# at most 8 digits before the point, so whatever this matches is near; longer numbers take the slow way and are named
+_SHORT = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 
 def straight(rotary: str) -> Callable[[str], re.Match[str] | None]:
     """What matches a line of a plain straight move, words in the usual order: groups G, X, Y, Z, rotary words, F."""
@@ -32,6 +35,7 @@ def straight(rotary: str) -> Callable[[str], re.Match[str] | None]:
     return re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?{words}\r?").fullmatch
 
 
+_PLACES = frozenset("XYZABC")
 _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
@@ -140,6 +144,9 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
     number = float(digits)
     if not abs(number) <= LARGEST:
         raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, beyond {LARGEST:g}")
+    if letter in _PLACES and abs(number) > FARTHEST:
+        raise BlockError(f"{letter}{digits} is farther than any machine goes ({FARTHEST:g})",
+                         "look for a lost decimal point")
     if letter == "G":
         if number not in _G_CODES and not (rotary and number == _TCP_G):
             hint = _HINTS.get(number)

@@ -157,6 +157,7 @@ TAIL = "M30\n%\n"
     ("G0 Z5\rX1\n", "'\\r'"),
     ("G0 Z1" + "0" * 400 + "\n", "beyond 1e+15"),
     ("G1 F1" + "0" * 400 + " X1\n", "beyond 1e+15"),
+    ("G1 X-100000001 F100\n", "farther than any machine goes"),
     ("G2 X10 Y0 I999999 J0 F100\n", "off one circle"),
     ("X1 O5\n", "unknown word O5"),
 ])
