@@ -179,7 +179,7 @@ def test_a_program_that_breaks_off(text):
     "G2 X0 Y0 I5 P100000 F100\n", "G2 I1000000000000 F100\n", "G18 G3 K1000000000000 F100\n",
     "G2 I900000000000000 F9\n",
     "G83 X0 Y0 Z-5 R1 Q0.00001 F100\n", "G73 X0 Y0 Z-5 R1 Q0." + "0" * 320 + "1 F100\n",
-    "G81 X0 Y0 Z-5 R1 L1000000 F100\n", "G83 X0 Y0 Z-500000000000000 R1 Q0.1 F100\n"])
+    "G81 X0 Y0 Z-5 R1 L1000000 F100\n", "G83 X0 Y0 Z-50000000 R1 Q0.00000001 F100\n"])
 def test_a_block_that_would_grow_without_bound_costs_no_memory(body):
     tracemalloc.start()
     with pytest.raises(VerificationError) as caught:
