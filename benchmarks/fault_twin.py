@@ -5,8 +5,8 @@ It runs no code of the proof.
 Depths, mm. Gouge: the largest depth in the part of any place the cutting part takes. Body: how deep a point of part,
 fixture or stock that still stands is in a shank or holder, the shorter of the way out aside and the way down out of its
 lower end (aside alone for a neck). Cutter against a fixture: the way out of the cutting part. Cutter against stock in a
-rapid: for tools along Z how far under the place the tool's end reaches, else the way out. Residual: what is left on a
-normal.
+rapid: for tools along Z the shorter of the ways aside and down out of its end, else the way out. Residual: what is left
+on a normal.
 """
 
 from __future__ import annotations
@@ -342,7 +342,7 @@ def _deepest(case: Case, way: Way, rows: NDArray[np.int64], body: ToolBody) -> t
 
 @njit(cache=True, nogil=True)
 def _in_cutter(rho, h, radius, corner, length, upright):
-    """How deep (rho, h) is in a cutting part: over its end where upright, else the shortest way out; mm."""
+    """How deep (rho, h) is in a cutting part, mm: over its end or aside where upright, else the shortest way out."""
     if h < 0.0 or h > length or rho > radius:
         return -1.0
     a = radius - corner
@@ -350,7 +350,7 @@ def _in_cutter(rho, h, radius, corner, length, upright):
     if h <= bottom:
         return -1.0
     if upright:
-        return h - bottom
+        return min(h - bottom, radius - rho)
     if h < corner and rho > a:
         return corner - np.sqrt((rho - a) ** 2 + (corner - h) ** 2)
     return min(radius - rho, h, length - h)

@@ -67,7 +67,7 @@ def stock_cylinder(setup: Setup, part: Part,
     stock = setup.stock
     if stock.kind != "cylinder":
         return None
-    if abs(abs(float(rotation[2, 2])) - 1.0) > AWAY:
+    if float(np.hypot(rotation[2, 0], rotation[2, 1])) > AWAY:
         raise SetupError("the program comes along another axis than Z of the setup, and a cylinder blank stands along "
                          "that", code="cylinder_across_access", subjects=("stock.kind", "access"),
                          measured=[round(float(v), 6) for v in rotation[2]], limit=[0.0, 0.0, 1.0],
@@ -86,8 +86,14 @@ def stock_cylinder(setup: Setup, part: Part,
 
 
 def _check_cylinder(setup: Setup, part: Part) -> None:
-    """Refuse a cylinder that the part stands out of."""
-    given = setup.stock.cylinder_mm
+    """Refuse a cylinder that the part stands out of, or that it fills."""
+    given, blank = setup.stock.cylinder_mm, stock_cylinder(setup, part, np.eye(3))
+    if blank is not None:
+        volume = float(np.pi * blank[3] ** 2 * blank[4])
+        if volume - part.volume <= FULL * volume:
+            raise SetupError("nothing stands on the part that could be cut: the part fills its cylinder blank",
+                             code="no_stock", subjects=("stock",), measured=max(volume - part.volume, 0.0), limit=0.0,
+                             remedy="give a larger stock.cylinder_mm, or a stock.margin_mm above 0")
     if given is None:
         return
     v = part.mesh.vertices

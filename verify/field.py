@@ -151,15 +151,16 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     Notes
     -----
     Plunge: the volume that a steep descent takes off within the end-cutting region, over the area that region goes
-    over, is the mean depth it dug; such depths add up over the moves, way made aside works them off at the slope of a
-    ramp, and what was dug where the region no longer stands is another hole.
+    over, is the mean depth it dug, and where in the region it lay says how much deeper its middle is than its rim; so
+    a round end has its full depth, which is told. Both add up over the moves, way made aside works them off at the
+    slope of a ramp, and what was dug where the region no longer stands is another hole.
     """
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
     reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
     start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
-    sums, spare = tables_for(threads, (len(moves), 3))
+    sums, spare = tables_for(threads, (len(moves), 4))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
@@ -175,8 +176,9 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce([t[:, 2] for t in sums])
     end = ends[moves.tool]
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
-    dug = taken[:, 1] / VOLUME_UNITS / (np.pi * end**2 + 2.0 * end * aside)
-    plunges = _plunges(moves, axes, dug, end, earned, setup.plunge_skin * 2.0 * cutters[:, 0])
+    over = (np.pi * end**2 + 2.0 * end * aside)[:, None]
+    plunges = _plunges(moves, axes, taken[:, [1, 3]] / VOLUME_UNITS / over, end, earned,
+                       setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)
 
 
@@ -185,22 +187,37 @@ def _across(way: F64, axis: F64) -> F64:
     return np.asarray(way - (way * axis).sum(axis=1, keepdims=True) * axis)
 
 
-def _plunges(moves: Moves, axes: ToolAxes, dug: F64, end: F64, earned: F64, skins: F64) -> F64:
+def round_off(tools: Sequence[ToolBody]) -> F64:
+    """(k,) float64, mm: how much less than its middle the end of each tool digs on the mean, for the shape it has."""
+    share = (np.arange(400) + 0.5) / 400.0  # of the area of the end
+    out = []
+    for tool, end in zip(tools, end_radii(tools).tolist(), strict=True):
+        over = np.maximum(end * np.sqrt(share) - (tool.radius - tool.corner_radius), 0.0)
+        out.append(float(np.mean(tool.corner_radius - np.sqrt(np.maximum(tool.corner_radius**2 - over**2, 0.0)))))
+    return np.array(out)
+
+
+def _plunges(moves: Moves, axes: ToolAxes, dug: F64, end: F64, earned: F64, skins: F64, rounds: F64) -> F64:
     """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves with which more than the skin of their tool is open.
 
-    dug, end : (m,) float64, mm, mean depth of each move and radius of the end that dug it
+    dug    : (m, 2) float64, mm, mean depth of each move, and the mean of it times the square of the share of the radius
+    end    : (m,) float64, mm, radius of the end that dug it; rounds (k,) float64, mm, as ``round_off``
 
     What was dug before counts by the share of its width that the end still stands over, so a way that goes on
     downhill is as deep as the stock it leaves, not as deep as all its steps together.
     """
-    digging = np.flatnonzero(dug > 0.0)
+    digging = np.flatnonzero(dug[:, 0] > 0.0)
     gone = np.zeros(len(digging))
     gone[1:] = np.linalg.norm(_across(np.diff(moves.end[digging], axis=0), axes.middle[digging[1:]]), axis=1)
     over = np.maximum(1.0 - gone / (2.0 * end[digging]), 0.0)
-    rows, depth, paid = [], 0.0, 0.0
+    rows, mean, moment, paid = [], 0.0, 0.0, 0.0
     for m, share in zip(digging.tolist(), over.tolist(), strict=True):
-        depth = max(depth - (earned[m] - paid), 0.0) * share + dug[m]
+        kept = max(mean - (earned[m] - paid), 0.0) * share
+        moment = kept / mean * moment + dug[m, 1] if mean > 0.0 else dug[m, 1]
+        mean = kept + dug[m, 0]
         paid = earned[m]
+        # of a depth that falls with the square of the radius 4 mean - 6 moment is that of the middle
+        depth = min(max(4.0 * mean - 6.0 * moment, mean), mean + rounds[moves.tool[m]])
         if depth > skins[moves.tool[m]]:
             rows.append((m, PLUNGE, depth, 0.0, *moves.end[m].tolist()))
     return np.array(rows, dtype=np.float64).reshape(-1, 7)

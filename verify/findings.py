@@ -59,7 +59,7 @@ def contact_findings(events: F64, feed: NDArray[np.bool_], source: Source, rapid
     key = code + 16 * touching.astype(np.int32) * feed[move] + 32 * (~feed[move]).astype(np.int32)
     groups = chains(source.program[move], source.line[move], events[:, 4:7], key)
     out = []
-    for rows in worst_of(groups, events[:, 2]):
+    for rows in worst_of(groups, events[:, 2] - events[:, 3]):
         r = rows[0]
         m = move[r]
         depth, clearance = float(events[r, 2]), float(events[r, 3])

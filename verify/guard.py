@@ -20,7 +20,9 @@ GUARD_MOST = 1_000_000
 EDGE_SPACING = 0.1
 SHARP = math.radians(20.0)
 DEPTH_BATCH = 2048  # rays between two reports
-CLOSER_REACH, CLOSER_STEP, MOST_SEEDS = 0.15, 0.02, 1500
+CLOSER_REACH, CLOSER_STEP = 0.15, 0.02
+MOST_SEEDS, MOST_DEEP, DEEP_A_MOVE = 4500, 1500, 4
+SURE = 5.0  # gouge tolerances: what is deeper is found without a closer look
 CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper are looked round
 FACETS_OFF = 2e-3
 """mm, what facets may lie under samples that are on the exact surface."""
@@ -39,11 +41,16 @@ def guard_samples(mesh: TriangleMesh) -> SurfaceSamples:
     return lattice_samples(mesh, guard_spacing(mesh))
 
 
-def guard_notes(mesh: TriangleMesh) -> list[str]:
-    """That the part is too large for samples as close as usual, where it is."""
-    spacing = guard_spacing(mesh)
-    return [] if spacing <= GUARD_SPACING else [
-        f"the part is large: gouges outside zones were looked for {spacing:.2f} mm apart, not {GUARD_SPACING} mm"]
+def guard_notes(mesh: TriangleMesh, left_out: int = 0) -> list[str]:
+    """That the part is too large for samples as close as usual, and that seeds were left out, where it is so."""
+    out, spacing = [], guard_spacing(mesh)
+    if spacing > GUARD_SPACING:
+        out.append(f"the part is large: gouges outside zones were looked for {spacing:.2f} mm apart, not "
+                   f"{GUARD_SPACING} mm")
+    if left_out:
+        out.append(f"so much is cut too deep that {left_out} places of it were not looked at closely; gouges there may "
+                   "be a little deeper than told")
+    return out
 
 
 def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:
@@ -76,17 +83,35 @@ def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64
     return p[row] + f[:, None] * (q - p)[row], middle[row], mesh.face_ids[a[row]]
 
 
-def closer_points(tree: TriangleTree, points: F64, residual: F64) -> tuple[F64, F64, NDArray[np.int64]]:
-    """Places of the surface round samples, 0.02 mm apart, for gouges that are deepest between samples.
+def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F64, int]:
+    """Samples round which the surface is looked at closely: the lowest of every 0.15 mm cell, and not too many of them.
 
-    points   : (n, 3) float64, mm, samples with little or nothing left
-    residual : (n,) float64, mm, what is left there; round the 1500 lowest, 0.15 mm apart, is looked
+    points   : (n, 3) float64, mm, samples with little or nothing left; residual (n,) float64, mm, what is left
+    mover    : (n,) int32, the move that cut each
+    sure     : mm; of what is cut deeper, and found anyway, the four deepest of each move will do
 
-    Returns places (m, 3) float64 mm on the mesh, unit normals (m, 3) of their triangles, and those, (m,) int64.
+    Returns (k, 3) float64, mm, and how many are left out: of those less deep the 4500 deepest stay, of the others 1500.
     """
     order = np.argsort(residual, kind="stable")
     _, first = np.unique(np.floor(points[order] / CLOSER_REACH).astype(np.int64), axis=0, return_index=True)
-    seeds = points[order[np.sort(first)[:MOST_SEEDS]]]
+    rows = order[np.sort(first)]
+    deep, shallow = rows[residual[rows] < -sure], rows[residual[rows] >= -sure]
+    by_move = np.argsort(mover[deep], kind="stable")
+    _, begin, count = np.unique(mover[deep][by_move], return_index=True, return_counts=True)
+    nth = np.empty(len(deep), np.int64)
+    nth[by_move] = np.arange(len(deep)) - np.repeat(begin, count)
+    deep = deep[nth < DEEP_A_MOVE]
+    out = np.concatenate([deep[:MOST_DEEP], shallow[:MOST_SEEDS]])
+    return points[out], max(len(deep) - MOST_DEEP, 0) + max(len(shallow) - MOST_SEEDS, 0)
+
+
+def closer_points(tree: TriangleTree, seeds: F64) -> tuple[F64, F64, NDArray[np.int64]]:
+    """Places of the surface round seeds, 0.02 mm apart, for gouges that are deepest between samples.
+
+    seeds : (k, 3) float64, mm; 0.15 mm to all sides of each is looked
+
+    Returns places (m, 3) float64 mm on the mesh, unit normals (m, 3) of their triangles, and those, (m,) int64.
+    """
     if len(seeds) == 0:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
     _, row, _ = nearest(tree, seeds)

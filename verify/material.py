@@ -18,7 +18,9 @@ from verify.model import ProofSetup
 from verify.progress import Stages
 from verify.removal import Moves
 from verify.stock import blank, run_bodies, run_stock
-from verify.stockpass import StockPass, free_rapids
+from verify.stockpass import StockPass, end_radii, free_rapids
+
+LINES_APART, NODES_APART = 1.4, 0.6  # radii of the finest end between lines, and between nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +45,11 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``).
     """
     stages, given, origin = Stages(progress), moves, None
+    spacing = stock_spacing(setup, moves, tools)
     if setup.dogleg:
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
     if moves.axes is None:
-        lines = blank(mesh, setup, threads=threads, progress=stages.span(0.0, 0.1))
+        lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.1))
         run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.1, 0.6))
         met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 0.8))
         met, lost = _with_points(met, lost, points, ~moves.feed, False, moves, tools, setup, threads)
@@ -55,7 +58,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         met, lost = _with_points(met, lost, held, np.ones(len(moves), np.bool_), True, moves, tools, setup, threads)
         spacing = lines.step
     else:
-        field = stock_field(mesh, setup, setup.line_spacing, threads=threads, progress=stages.span(0.0, 0.15))
+        field = stock_field(mesh, setup, spacing, threads=threads, progress=stages.span(0.0, 0.15))
         run = run_field(field, moves, tools, setup, threads=threads, progress=stages.span(0.15, 0.7))
         held = fixture_points(setup, mesh.bounds, moves, tools)
         fixed = np.repeat([False, True], [len(points), len(held)])
@@ -63,6 +66,22 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
                                 progress=stages.span(0.7, 1.0))
         spacing = field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
+
+
+def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) -> float:
+    """mm wanted between lines or nodes of the stock: what the setup says, or what the finest end that cuts still meets.
+
+    A square lattice has a line in every circle of 1 / sqrt 2 of its spacing; nodes are to lie closer.
+    """
+    used = np.unique(moves.tool[moves.feed])
+    share = LINES_APART if moves.axes is None else NODES_APART
+    return min(setup.line_spacing, share * float(end_radii([tools[k] for k in used]).min(initial=np.inf)))
+
+
+def unseen(tools: Sequence[ToolBody], spacing: float, upright: bool) -> list[ToolBody]:
+    """The tools whose end may come down between lines or nodes of the stock that are ``spacing`` mm apart."""
+    least = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
+    return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < least]
 
 
 def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:

@@ -23,8 +23,17 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.guard import CLOSER_SHARE, closer_points, convex_edges, gouge_depths, guard_notes, guard_samples
-from verify.material import contacts, dogleg_limits
+from verify.guard import (
+    CLOSER_SHARE,
+    SURE,
+    closer_points,
+    closer_seeds,
+    convex_edges,
+    gouge_depths,
+    guard_notes,
+    guard_samples,
+)
+from verify.material import contacts, dogleg_limits, unseen
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
 from verify.progress import Report, Stages
 from verify.reader import Program
@@ -81,17 +90,20 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
                    stages.span(CUT, MET))
     run = met.run
+    fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, moves.axes is None)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
-                *_idle_findings(read, run, moves, source), *repeat_findings(moves, run.cut, source),
+                *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, moves, source, setup.max_engaged),
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
-    notes.extend(guard_notes(part.mesh))
+    notes.extend(cuts.notes)
+    notes.extend(f"T{t.number} is so fine that it may plunge unseen: the stock is looked at {met.spacing:.3f} mm apart"
+                 for t in fine)
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
@@ -124,6 +136,7 @@ class _Cuts:
     guard: F64
     edge: F64
     reach: float
+    notes: list[str]
 
 
 def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, moves: Moves,
@@ -140,10 +153,12 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
                                           progress=lambda f: tell(0.1 + 0.7 * f))
+    left_out = 0
     near = np.flatnonzero((residual < -CLOSER_SHARE * setup.gouge_tolerance) & (mover >= 0))
     if len(near):
         tree = TriangleTree(part.mesh)
-        places, outward, row = closer_points(tree, points[near], residual[near])
+        seeds, left_out = closer_seeds(points[near], residual[near], mover[near], SURE * setup.gouge_tolerance)
+        places, outward, row = closer_points(tree, seeds)
         left, by = residual_on_normals(places, outward, np.full(len(places), reach), moves, tools, threads=threads,
                                        progress=lambda f: tell(0.8 + 0.1 * f))
         points, normals = np.concatenate([points, places]), np.concatenate([normals, outward])
@@ -155,6 +170,7 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
                                        lambda f: tell(0.9 + 0.1 * f))
     deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
     out = _Cuts()
+    out.notes = guard_notes(part.mesh, left_out)
     out.residual, out.mover = residual[:len(s)], mover[:len(s)]
     out.guard, out.edge, out.reach = guard.points, edge, reach
     out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
@@ -168,12 +184,16 @@ def _program_findings(read: Sequence[Reading]) -> list[Finding]:
             for p in read for r in p.program.remarks]
 
 
-def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source: Source) -> list[Finding]:
-    """A program whose feed moves never meet the stock: another zero, or inch for mm."""
-    out = []
+def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source: Source,
+                   fine: Sequence[ToolBody]) -> list[Finding]:
+    """A program whose feed moves never meet the stock: another zero, or inch for mm.
+
+    fine : tools of which the stock need not show a trace
+    """
+    out, traceless = [], np.isin(source.tool, [t.number for t in fine])
     for number, p in enumerate(read):
         own = (source.program == number) & moves.feed
-        if own.any() and not run.cut[own].any():
+        if own.any() and not run.cut[own].any() and not traceless[own].all():
             m = int(np.flatnonzero(own)[0])
             out.append(Finding(FindingKind.PROGRAM, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
                                "no feed move meets the stock: is the unit, the zero or the tool another one?"))

@@ -55,8 +55,9 @@ class StockField:
     height: F64
 
 
-def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2, progress: Progress | None = None) -> StockField:
-    """The stock before the first cut, never below the part.
+def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int = 2,
+          progress: Progress | None = None) -> StockField:
+    """The stock before the first cut, never below the part; lines are spacing mm apart, or wider to be six million.
 
     Exact on every line: an offset blank is the union of spheres on the surface, by facets, edges and corners.
     """
@@ -64,7 +65,7 @@ def blank(mesh: TriangleMesh, setup: ProofSetup, *, threads: int = 2, progress: 
     corners = [box, mesh.bounds]
     lower = np.min([c[0, :2] for c in corners], axis=0)
     extent = np.max([c[1, :2] for c in corners], axis=0) - lower
-    step = max(setup.line_spacing, math.sqrt(float(extent.prod()) / MAX_LINES))
+    step = max(spacing, math.sqrt(float(extent.prod()) / MAX_LINES))
     nx, ny = (np.ceil(extent / step).astype(int) + 1).tolist()
     origin = lower - 0.5 * step
     height = np.full((nx, ny), NEVER)

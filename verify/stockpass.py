@@ -16,6 +16,7 @@ from verify.removal import Moves
 
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
+SAME = 1e-6  # mm, and rad: ends of moves and axes that are the same
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
@@ -81,7 +82,8 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
     """(m,) bool: rapids that no clearance is asked of.
 
     Those that draw the tool straight out along its axis, and those that put it straight back no deeper than a feed
-    move had it, with no move aside since: a peck out of its hole and into it again.
+    move had it, with no move aside since: a peck out of its hole and into it again. A way nobody wrote down, as after
+    a visit to the machine's own zero, counts as one aside.
     """
     d = moves.end - moves.start
     up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
@@ -90,10 +92,13 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
     straight = aside <= 1e-6 * np.abs(rise) + 1e-7
     if moves.axes is not None:
         straight &= moves.axes.angle == 0.0
+    linked = np.zeros(len(d), np.bool_)  # to the move before
+    linked[1:] = (moves.tool[1:] == moves.tool[:-1]) & (np.abs(moves.start[1:] - moves.end[:-1]) <= SAME).all(axis=1)
+    linked[1:] &= np.einsum("ij,ij->i", up[1:], up[:-1]) >= 1.0 - SAME**2
     out = np.asarray(~moves.feed & straight & (rise > 0))
     for m in np.flatnonzero(~moves.feed & straight & (rise < 0)).tolist():
         height, i = 0.0, m - 1  # of the end of move i over the start of move m
-        while i >= 0 and straight[i] and moves.tool[i] == moves.tool[m] and not out[m]:
+        while i >= 0 and linked[i + 1] and straight[i] and not out[m]:
             out[m] = moves.feed[i] and height <= rise[m] + 1e-9
             height -= rise[i]
             i -= 1

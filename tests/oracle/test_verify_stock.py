@@ -47,7 +47,7 @@ def test_offset_blank_is_the_union_of_spheres():
     """Twin: spheres on a fine cloud of surface points; it lies below the truth by less than its spacing allows."""
     part = block()
     setup = ProofSetup(margin=1.0, uncertainty=0.2, line_spacing=0.7)
-    field = blank(part.mesh, setup)
+    field = blank(part.mesh, setup.line_spacing, setup)
     f = np.linspace(0, 1, 241)
     u, v = (g.ravel() for g in np.meshgrid(f, f))
     keep = u + v <= 1
@@ -73,7 +73,7 @@ def test_stock_lines_are_lowered_exactly_and_only_as_far_as_the_flutes_reach():
     slot = np.array([[[-30.0, 1, -3], [30, 1, -3]]])
     for flutes, expected in ((8.0, -3.0), (2.0, 0.0)):
         tool = replace(TOOL, flute_length=flutes)
-        field = blank(part.mesh, setup)
+        field = blank(part.mesh, setup.line_spacing, setup)
         run = run_stock(field, Moves(slot[:, 0], slot[:, 1], np.ones(1, bool), np.zeros(1, np.int32)), [tool], setup)
         y = field.origin[1] + (np.arange(field.height.shape[1]) + 0.5) * field.step
         i = field.height.shape[0] // 2

@@ -27,7 +27,7 @@ def side_cut(width, depth=2.0, tool=TOOL, cut=0.25, lean=0.0):
     points = np.column_stack([x, np.full(len(x), y), np.full(len(x), 0.5 - depth)])
     moves = Moves(points[:-1], points[1:], np.ones(len(x) - 1, bool), np.zeros(len(x) - 1, np.int32))
     if lean == 0.0:
-        run = run_stock(blank(PART.mesh, BLANK), moves, [tool], BLANK)
+        run = run_stock(blank(PART.mesh, BLANK.line_spacing, BLANK), moves, [tool], BLANK)
     else:
         u = np.tile([math.sin(lean), 0.0, math.cos(lean)], (len(moves), 1))
         moves = replace(moves, axes=ToolAxes.between(u, u))

@@ -9,7 +9,15 @@ from geometry.mesh import TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
 from tests.hand_parts import dome
-from verify.guard import MOST_SEEDS, closer_points, gouge_depths, guard_notes, guard_samples
+from verify.guard import (
+    DEEP_A_MOVE,
+    MOST_SEEDS,
+    closer_points,
+    closer_seeds,
+    gouge_depths,
+    guard_notes,
+    guard_samples,
+)
 
 RADIUS = 15.0
 
@@ -30,19 +38,32 @@ def test_a_gouge_under_the_exact_surface_is_as_deep_as_it_is(off):
 
 
 def test_places_round_the_lowest_samples_are_looked_at_closely():
-    """Every place of the surface near the lowest samples has one within 0.015 mm; the highest have none near them."""
+    """Every place of the surface near a seed has one within 0.015 mm; where no seed is there is none."""
     tree = TriangleTree(dome(RADIUS))
     points, _ = _on_sphere(0.0)
-    residual = np.linspace(-0.02, 0.0, len(points))
-    places, normals, row = closer_points(tree, points, residual)
+    seeds = points[:700]
+    places, normals, row = closer_points(tree, seeds)
     assert np.abs(np.einsum("ij,ij->i", places - tree.mesh.triangles[row].mean(axis=1), normals)).max() < 1e-9
-    lowest = points[np.argsort(residual)[:MOST_SEEDS // 2]]
     rng = np.random.default_rng(2)
-    asked, _, there = nearest(tree, lowest + rng.uniform(-0.06, 0.06, lowest.shape))
-    assert cKDTree(places).query(there)[0].max() < 0.015 and len(asked) == len(lowest)
+    _, _, there = nearest(tree, seeds + rng.uniform(-0.06, 0.06, seeds.shape))
+    assert cKDTree(places).query(there)[0].max() < 0.015
     assert cKDTree(places).query(points[-100:])[0].min() > 0.3
-    empty = closer_points(tree, points[:0], residual[:0])
-    assert [len(part) for part in empty] == [0, 0, 0]
+    assert [len(part) for part in closer_points(tree, points[:0])] == [0, 0, 0]
+
+
+def test_a_large_gouge_leaves_room_for_small_ones():
+    """30,000 samples cut 0.3 mm deep by few moves, 40 cut little: round all of these is looked."""
+    rng = np.random.default_rng(1)
+    points = np.concatenate([rng.uniform(0, 30, (30_000, 3)) * [1, 1, 0], rng.uniform(50, 80, (40, 3)) * [1, 1, 0]])
+    residual = np.concatenate([rng.uniform(-0.31, -0.3, 30_000), rng.uniform(-0.03, -0.011, 40)])
+    mover = np.concatenate([rng.integers(20, size=30_000), np.full(40, 99)]).astype(np.int32)
+    seeds, left_out = closer_seeds(points, residual, mover, 0.05)
+    assert left_out == 0 and len(seeds) == 20 * DEEP_A_MOVE + 40
+    assert cKDTree(seeds).query(points[30_000:])[0].max() == 0.0
+    lowest = [points[mover == m][residual[mover == m].argmin()] for m in range(20)]
+    assert cKDTree(seeds).query(np.array(lowest))[0].max() == 0.0
+    seeds, left_out = closer_seeds(points, residual / 30.0, mover, 0.05)
+    assert len(seeds) == MOST_SEEDS and left_out > 1000
 
 
 def test_the_depth_of_a_stretch_is_the_largest_distance_on_it():

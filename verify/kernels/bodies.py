@@ -12,7 +12,7 @@ from numba import njit
 
 from verify.kernels.frustum import contact
 from verify.kernels.rays import plan_distance
-from verify.kernels.stock import _note, _worse
+from verify.kernels.stock import _note, _worse, known_depth
 
 
 @njit(cache=True, nogil=True)
@@ -38,7 +38,7 @@ def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bo
                 continue
             for i in range(first[row + low], first[row + high + 1]):
                 depth = contact(points[i, 0] - a[0], points[i, 1] - a[1], points[i, 2] - a[2], d[0], d[1], d[2], z0, z1,
-                                r0, r1, body[4], slack, best[int(body[5]), 0], False)
+                                r0, r1, body[4], slack, known_depth(best, int(body[5]), body[4]), False)
                 if depth > 0.0:
                     _worse(best, int(body[5]), depth, body[4], points[i, 0], points[i, 1], points[i, 2])
 

@@ -16,7 +16,7 @@ from geometry.kernels.options import KERNEL
 from verify.kernels.frustum import contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
-from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse
+from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse, known_depth
 
 TOUCHING = 1e-3
 ASIDE = 2e-3  # mm a straight lift may end beside its axis: X, Y, Z of programs have three decimals
@@ -70,8 +70,8 @@ def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b,
     if b >= 0:
         z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + grow
         clearance, code = bodies[b, 4] + grow, int(bodies[b, 5])
-    known = best[code + FIXTURE, 0] if not every else min(best[code, 0], best[code + FIXTURE, 0]) if held else \
-        best[code, 0]
+    of_fixture, known = known_depth(best, code + FIXTURE, clearance), known_depth(best, code, clearance)
+    known = of_fixture if not every else min(known, of_fixture) if held else known
     if not _meets(p, t3, chunk, z0, z1, wide, clearance, known):
         return
     for n2 in range(chunk * 8, chunk * 8 + 8):
@@ -87,7 +87,7 @@ def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b,
                     if every or fixed[i]:
                         depth = _meet_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b, grow,
                                             TOUCHING if fixed[i] else slack,
-                                            best[code + (FIXTURE if fixed[i] else 0), 0])
+                                            known_depth(best, code + (FIXTURE if fixed[i] else 0), clearance))
                         if depth > 0.0:
                             _worse(best, code + (FIXTURE if fixed[i] else 0), depth, clearance, points[i, 0],
                                    points[i, 1], points[i, 2])

@@ -27,7 +27,7 @@ from verify.kernels.frustum import contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.rays import gap, plan_distance
-from verify.kernels.stock import CUTTER, _note, _worse
+from verify.kernels.stock import CUTTER, _note, _worse, known_depth
 
 LEAST_CUT = 1e-5
 RISE = 0.1  # of the flutes: a tool goes up no further between two looks at its bodies
@@ -78,7 +78,10 @@ def _box(p, z0, z1, wide):
 
 @njit(**KERNEL)
 def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, totals):
-    """Lower the nodes of one brick by piece p; adds to totals (volume, volume by the end, 1 where stock was touched).
+    """Lower the nodes of one brick by piece p.
+
+    totals : added to: volume, volume by the end, 1 where stock was touched, and the end's volume times the square of
+             how far from the middle of the end it was, as a share of its radius
 
     Returns the new top and the sectors of the cutter that met stock.
     """
@@ -105,8 +108,14 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             if d <= 0.0 and plan > 0.0 and qz - 0.5 * dz > LEAST_DEPTH * cutter[0]:
                                 sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h)
                         totals[0] += gone
-                        if steep and plan_distance(qx, qy, dx, dy, dx * dx + dy * dy) < end_radius:
-                            totals[1] += gone
+                        if steep:
+                            off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
+                            # a cell on the rim of the end counts by about the part of it that lies inside; where that
+                            # is the rim of the cut as well, what went says so already
+                            rim = end_radius + max(h - (cutter[0] - end_radius), 0.0)
+                            own = gone * min(max(0.5 + (rim - off) / h, 0.0), 1.0)
+                            totals[1] += own
+                            totals[3] += own * min(off / end_radius, 1.0) ** 2
                         v = d
                 top = max(top, v)
     return top, sectors
@@ -164,7 +173,8 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                                               origin[2] + (k0 + 1.5) * h)
                 far = half + top
                 # no node here can be deeper than that
-                if no_deeper(qx, qy, qz, dx, dy, dz, z0 - far, z1 + far, wide + far, clearance, best[code, 0]):
+                if no_deeper(qx, qy, qz, dx, dy, dz, z0 - far, z1 + far, wide + far, clearance,
+                             known_depth(best, code, clearance)):
                     continue
                 for i in range(i0, min(i0 + 4, tile[1])):
                     for j in range(j0, min(j0 + 4, tile[3])):
@@ -184,7 +194,8 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                             else:
                                 # the ball of radius v round the node is stock
                                 depth = contact(qx, qy, qz, dx, dy, dz, z0 - v, z1 + v, body[2] + grow + v,
-                                                body[3] + grow + v, clearance, slack, best[code, 0], False)
+                                                body[3] + grow + v, clearance, slack,
+                                                known_depth(best, code, clearance), False)
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
 
@@ -231,16 +242,17 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
     free  : (m,) bool, rapids that no clearance is asked of
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
-    taken : (m, 3) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
+    taken : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
             so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went;
-            third the sectors of the cutter that met stock, put together bit by bit
+            third the sectors of the cutter that met stock, put together bit by bit; fourth what the end does times
+            the square of the share of its radius it is from the middle
 
     Returns the number of events found, which may exceed the table.
     """
     tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
     solid = np.zeros(6, np.int64)
     changing = _solid(tops, band, solid)
-    best, piece, totals = np.zeros((16, 5)), np.empty(PIECE), np.zeros(3)
+    best, piece, totals = np.zeros((16, 5)), np.empty(PIECE), np.zeros(4)
     rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
     sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
     cx, cy = origin[0] + tile[0] * h + 0.5 * sx, origin[1] + tile[2] * h + 0.5 * sy
@@ -283,6 +295,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
+            taken[m, 3] += round(totals[3] * VOLUME_UNITS)
             taken[m, 2] |= sectors
             cuts += 1
             if cuts % 64 == 0:

@@ -82,6 +82,43 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
 
 
 @njit(cache=True, nogil=True)
+def _within(s, wx, wy, dx, dy, dz, over, radius, corner):
+    """How deep a line is in a cutting part at s: the shorter of the way aside and the way over its end."""
+    rho = _rho(s, wx, wy, dx, dy)
+    return min(radius - rho, over - s * dz - bottom(min(rho, radius), radius - corner, corner))
+
+
+@njit(cache=True, nogil=True)
+def entered(wx, wy, over, dx, dy, dz, radius, corner):
+    """How deep a line is in a cutting part carried along a move, mm: the shorter way out, aside or over its end.
+
+    (wx, wy) is the line seen from the tool at the start of the move, ``over`` its top over the tip there. Aside is
+    concave in s, and so is the way over the end, which is convex below: the deepest is searched while the line is
+    under the tool. Negative where it never is.
+    """
+    plan2 = dx * dx + dy * dy
+    s1, s2 = 0.0, 1.0
+    if plan2 < 1e-18:
+        if _rho(0.0, wx, wy, dx, dy) > radius:
+            return -1.0
+    else:
+        s0 = (wx * dx + wy * dy) / plan2
+        half2 = (radius * radius - (wx * wx + wy * wy - s0 * s0 * plan2)) / plan2
+        if half2 < 0.0:
+            return -1.0
+        s1, s2 = max(0.0, s0 - math.sqrt(half2)), min(1.0, s0 + math.sqrt(half2))
+        if s1 > s2:
+            return -1.0
+    for _ in range(60):
+        u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
+        if _within(u, wx, wy, dx, dy, dz, over, radius, corner) > _within(v, wx, wy, dx, dy, dz, over, radius, corner):
+            s2 = v
+        else:
+            s1 = u
+    return _within(0.5 * (s1 + s2), wx, wy, dx, dy, dz, over, radius, corner)
+
+
+@njit(cache=True, nogil=True)
 def _cells(lo, hi, origin, step, first, stop):
     """Lines whose coordinate lies in [lo, hi], cut to first..stop-1."""
     return (max(first, math.ceil((lo - origin) / step - 0.5)), min(stop - 1, math.floor((hi - origin) / step - 0.5)))

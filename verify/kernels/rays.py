@@ -15,6 +15,7 @@ from numba import njit
 from verify.kernels.sweep import capsule_start, cutter_interval
 
 TOUCH = 1e-6
+SAME = 1e-8  # mm: a move that takes less than that off a ray has taken nothing, as the way back out of a plunge
 
 
 @njit(cache=True, nogil=True)
@@ -159,7 +160,7 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
                         t = new_left(points[i, 0] - ax, points[i, 1] - ay, points[i, 2] - az, normals[i, 0],
                                      normals[i, 1], normals[i, 2], dx, dy, dz, plan2, radius, corner, length,
                                      residual[i])
-                        if t < residual[i]:
+                        if t < residual[i] - SAME:
                             residual[i], mover[i] = t, m
                         most = max(most, residual[i])
                     left[c] = most

@@ -15,7 +15,7 @@ from numba import njit
 
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.frustum import contact
-from verify.kernels.heights import INF, _cells, lowest
+from verify.kernels.heights import INF, _cells, entered, lowest
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
@@ -54,8 +54,17 @@ def _note(events, count, m, best):
 
 
 @njit(cache=True, nogil=True)
+def known_depth(best, code, clearance):
+    """What a depth that counts from a body grown by ``clearance`` must exceed to be graver than the one noted.
+
+    Graver is deeper in the bare body, or nearer to it: bodies of one code may have different clearances.
+    """
+    return max(best[code, 0] - best[code, 1] + clearance, 0.0) if best[code, 0] > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
 def _worse(best, code, depth, clearance, x, y, z):
-    if depth > best[code, 0]:
+    if depth > known_depth(best, code, clearance):
         best[code, 0], best[code, 1], best[code, 2], best[code, 3], best[code, 4] = depth, clearance, x, y, z
 
 
@@ -127,7 +136,7 @@ def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
             if top <= under:
                 continue
             depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], z0, z1, r0, r1, body[4] + grow, slack,
-                            best[code, 0], True)
+                            known_depth(best, code, body[4] + grow), True)
             if depth > 0.0:
                 _worse(best, code, depth, body[4] + grow, x, y, top)
 
@@ -151,9 +160,9 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
             low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow)
             if top <= low + 1e-3:
                 continue
-            bare, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
-            depth = grow + top - bare
-            if top <= bare + 1e-3:
+            bare = entered(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius, corner)
+            depth = grow + bare
+            if bare <= 1e-3:
                 # how wide the tool must be to touch: the gap to what stands here
                 free, hits = 0.0, grow
                 for _ in range(20):

@@ -15,7 +15,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, turned, view
-from verify.kernels.rays import TOUCH, gap, new_left
+from verify.kernels.rays import SAME, TOUCH, gap, new_left
 
 AGAIN = 6
 SETTLED = 1e-7
@@ -62,7 +62,7 @@ def _leaves(p, chunk, n1, b0, left0, points, normals, residual, mover, m, margin
             for i in range(leaf * 8, min(leaf * 8 + 8, len(points))):
                 t = _cut_ray(p, points[i, 0], points[i, 1], points[i, 2], normals[i, 0], normals[i, 1], normals[i, 2],
                              radius, corner, length, residual[i])
-                if t < residual[i]:
+                if t < residual[i] - SAME:
                     residual[i], mover[i] = t, m
                 most = max(most, residual[i])
             left0[n0] = most
