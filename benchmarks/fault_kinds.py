@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.fault_case import Case, Mode, Step, place_words, tool_axis
-from benchmarks.fault_reading import read_way
+from benchmarks.fault_case import Case, Mode, Step, place_words, to_joints, tool_axis
+from benchmarks.fault_reading import Way, read_way
 from benchmarks.fault_twin import Found, Twin, in_blank
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
@@ -266,18 +266,25 @@ def inch_for_mm(case: Case, rng: np.random.Generator) -> Planted:
 def lost_point(case: Case, rng: np.random.Generator) -> Planted:
     """A decimal point left out."""
     step = _pick(rng, [s for s in case.steps if not s.rapid and not s.arc])
-    axis = int(rng.integers(3))
-    line = case.lines[step.row]
-    bad = _edit(case, step.row, re.sub(rf"({'XYZ'[axis]}-?\d+)\.", r"\1", line))
+    word = "XYZ"[int(rng.integers(3))]
+    bad = _edit(case, step.row, re.sub(rf"({word}-?\d+)\.", r"\1", case.lines[step.row]))
     then = _after(case, step)
-    way = read_way(bad.text)
     if then is None or then.arc:
-        raise Redraw("an arc follows, which would be refused")  # the arc after it would be refused, and rightly
-    known = way.end[~np.isnan(way.end).any(axis=1), axis]
-    over = float(np.ptp(known)) - 200.0
-    if over < 1.0:
+        raise Redraw("an arc follows, which would be refused")  # and rightly
+    over = np.ptp(_slides(read_way(bad.text)), axis=0) - 200.0
+    axis = int(np.argmax(over))
+    if over[axis] < 1.0:
         raise Redraw("the travel is not exceeded")
-    return Planted(bad, ("limit",), frozenset([step.row + 1]), over, word=f"in {'XYZ'[axis]}")
+    return Planted(bad, ("limit",), frozenset([step.row + 1]), float(over[axis]), word=f"in {'XYZ'[axis]}")
+
+
+def _slides(way: Way) -> F64:
+    """(n, 3) mm, where the linear axes are along all moves."""
+    share = np.linspace(0.0, 1.0, 65)[:, None, None]
+    at = (way.start + share * (way.end - way.start)).reshape(-1, 5)
+    centre = np.tile(way.centre, len(share))
+    at = at[keep := ~np.isnan(at).any(axis=1)]
+    return np.where(centre[keep, None], to_joints(at[:, :3], np.radians(at[:, 3:])), at[:, :3])
 
 
 def _near(case: Case, zone: str, steps: list[Step], most: int) -> tuple[F64, F64]:

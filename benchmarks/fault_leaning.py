@@ -176,7 +176,7 @@ def house(seed: int) -> Case:
     solid = House(planes, high, low, plate)
     corner = 0.5 if rng.random() < 0.5 else 0.0
     tools = (ROUGH, ToolBody("T2", 2, 4.0, corner, 6.0, 3.7, 14.0, 6.0, 28.0, HOLDER))
-    s = Script(Mode.CENTRE, 40.0)
+    s = Script(Mode.CENTRE, 45.0)
     s.begin()
     s.change(1, plate + 4.8, 0.0, 900)
     count = math.ceil(high / 0.9)

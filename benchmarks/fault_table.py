@@ -92,12 +92,19 @@ def judged(planted: Planted) -> tuple[bool, bool, bool, float, str]:
 
 
 def clean(part: str, seed: int) -> list[str]:
-    """What proof and twin find in a clean case: nothing, if both are right."""
+    """What proof and twin find in a clean case: nothing, if both are right. What the twin finds too, it says."""
     case = PARTS[part](seed)
-    proof = proof_of(case)
-    out = [f"{part} {seed}: {f.kind} line {f.line}: {f.message}" for f in proof.findings]
-    depth = twin_of(case).gouge().depth
-    return out + ([f"{part} {seed}: the twin finds a gouge of {depth:.4f} mm"] if depth > CLEAN else [])
+    proof, twin, s = proof_of(case), twin_of(case), case.scored.samples
+    out, depth = [], twin.gouge().depth
+    for f in proof.findings:
+        left = 0.0
+        if str(f.kind) == "residual" and f.point is not None:
+            row = np.linalg.norm(s.points - f.point, axis=1).argmin()[None]
+            left = float(twin.left(s.points[row], s.normals[row])[0])
+        real = left > case.setup.scallop_height
+        out.append(f"{'true' if real else 'FALSE'}: {part} {seed}: {f.kind} line {f.line}: {f.message}"
+                   + (f"; the twin says {left:.4f}" if real else ""))
+    return out + ([f"the twin finds a gouge of {depth:.4f} mm: {part} {seed}"] if depth > CLEAN else [])
 
 
 def uncovered(part: str, seed: int) -> tuple[bool, str]:

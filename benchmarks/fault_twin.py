@@ -182,6 +182,8 @@ class Twin:
             low, high = np.append(low[:2] + 0.3, low[2] + margin), np.append(high[:2] - body.flute_length, high[2])
             high[2] = self.case.blank_top
         points, step = _grid(low, high, max(0.25, float(np.cbrt(np.prod(high - low) / 400_000)))), 0.0
+        skin = points[in_blank(points - [0.0, 0.0, 0.3], self.case.setup) & ~in_blank(points, self.case.setup)]
+        points = np.vstack([points, np.column_stack([skin[:, :2], np.full(len(skin), self.case.blank_top - 1e-6)])])
         most, where = -1.0, np.zeros(3)
         for fine in (0.08, 0.02, 0.0):
             points = points[self.standing(points, line)]

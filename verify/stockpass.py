@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from verify.kernels.clash import ASIDE
 from verify.removal import Moves
 
 EVENTS = 4096
@@ -89,7 +90,7 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
     up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
     rise = np.einsum("ij,ij->i", d, up)
     aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
-    straight = aside <= 1e-6 * np.abs(rise) + 1e-7
+    straight = aside <= ASIDE
     if moves.axes is not None:
         straight &= moves.axes.angle == 0.0
     linked = np.zeros(len(d), np.bool_)  # to the move before

@@ -180,8 +180,9 @@ def _disc_nearest(qx, qy, qz, dx, dy, dz, a):
     if fhi <= 0.0:
         return hi
     side = 0
-    for _ in range(60):
-        s = (lo * fhi - hi * flo) / (fhi - flo)
+    for k in range(120):
+        # where the disc covers q the slope all but vanishes, and the false position creeps: halve in between
+        s = 0.5 * (lo + hi) if k % 3 == 2 else (lo * fhi - hi * flo) / (fhi - flo)
         f = _disc_slope(s, qx, qy, qz, dx, dy, dz, a)
         if abs(f) < 1e-14 or hi - lo < 1e-13:
             return s
