@@ -15,7 +15,8 @@ def test_a_disc_that_just_covers_a_point_is_found(fall):
         for _ in range(30):
             a, d = float(rng.uniform(0.3, 3.0)), rng.normal(size=3) * [5.0, 5.0, fall]
             across = np.array([-d[1], d[0]]) / np.hypot(d[0], d[1])
-            q = np.array([*(rng.uniform(0.1, 0.9) * d[:2] + a * (1.0 + offset) * across), rng.choice([-0.5, 0.5, 1e-3])])
+            plan = rng.uniform(0.1, 0.9) * d[:2] + a * (1.0 + offset) * across
+            q = np.array([*plan, rng.choice([-0.5, 0.5, 1e-3])])
 
             def gap(t, q=q, d=d, a=a):
                 return np.hypot(np.maximum(np.hypot(q[0] - t * d[0], q[1] - t * d[1]) - a, 0.0), q[2] - t * d[2])
