@@ -1,0 +1,141 @@
+"""Re-parameterisation that cannot fold: a triangulated region laid into the unit square.
+
+The border goes onto the sides of the square by its length, and every inner place becomes a mean of its neighbours with
+positive weights; then no triangle turns over (Tutte 1963, Floater 1997: the square is convex). Mean value weights make
+that nearly harmonic on the surface the triangles lie on. So where the surface is stretched against the square, the
+weights towards stretched places are lowered and it is laid out again, as long as that makes it evener (Yoshizawa,
+Belyaev and Seidel 2004): still positive, still no fold, and what bulges inwards crowds no more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+
+from geometry.bvh import TriangleTree
+from geometry.errors import GeometryError
+from geometry.mesh import F64, TriangleMesh
+from geometry.nearest import nearest
+
+MOST_ROUNDS = 20
+LEAST_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
+
+
+def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) -> F64:
+    """Places in the unit square of the vertices of a region.
+
+    vertices : (k, 2) or (k, 3) float64, mm, of a plane region or of a piece of surface, without holes
+    faces    : (m, 3) int, counterclockwise
+    sides    : vertices along bottom, right, top and left, each going on where the last one ends
+
+    Returns
+    -------
+    (k, 2) float64, xi and eta; every triangle lies counterclockwise
+
+    Raises
+    ------
+    GeometryError
+        Code 'flat_triangle': an edge joins two places of one side through the region, so that what it cuts off has no
+        room; the triangulation is to have a place between them.
+    """
+    place = np.full((len(vertices), 2), np.nan)
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    for k, side in enumerate(sides):
+        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices[side], axis=0), axis=1))])
+        place[side] = corner[k] + (way / way[-1])[:, None] * (corner[(k + 1) % 4] - corner[k])
+    start, end, weight = _mean_values(vertices, faces)
+    held = ~np.isnan(place[:, 0])
+    best, least = place, np.inf
+    for _ in range(MOST_ROUNDS):
+        laid = _solved(place, held, start, end, weight)
+        stretch, total = _stretch(vertices, faces, laid)
+        if not total < least:
+            break
+        best, least = laid, total
+        weight = weight / stretch[end]
+    flat = _turn(best, faces)
+    if flat.min() <= LEAST_TURN * np.abs(flat).mean():
+        worst = int(flat.argmin())
+        at = vertices[faces[worst]].mean(axis=0)
+        raise GeometryError("a triangle of the region is laid flat on a side of the square", code="flat_triangle",
+                            subjects=(f"triangle {worst}", f"({', '.join(f'{x:.3f}' for x in at)})"),
+                            measured=float(flat.min()), limit=0.0,
+                            remedy="split the edges that join two places of one side")
+    return best
+
+
+def grid_of(vertices: F64, faces: np.ndarray, laid: F64, n: int, m: int) -> F64:
+    """(m, n, d) float64, mm: the places of a region that lie at an even grid of the unit square.
+
+    vertices : (k, d) float64, mm; laid : (k, 2) as ``embedded`` returns it
+    """
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m))
+    asked = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * m)])
+    flat = TriangleMesh(np.column_stack([laid, np.zeros(len(laid))]), faces.astype(np.int32),
+                        np.zeros(len(faces), np.int32))
+    _, row, _ = nearest(TriangleTree(flat), asked)
+    a, b, c = (laid[faces[row, k]] for k in range(3))
+    q = asked[:, :2]
+    whole = _cross(b - a, c - a)
+    share = np.column_stack([_cross(b - q, c - q), _cross(c - q, a - q), _cross(a - q, b - q)]) / whole[:, None]
+    return np.einsum("ij,ijk->ik", share, vertices[faces[row]]).reshape(m, n, -1)
+
+
+def _mean_values(vertices: F64, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, F64]:
+    """Directed edges, start and end (e,), and their mean value weights, (e,) 1/mm; both triangles of an edge add."""
+    start, end, weight = [], [], []
+    for k in range(3):
+        i, j, o = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        u, v = vertices[j] - vertices[i], vertices[o] - vertices[i]
+        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+        half = np.tan(0.5 * np.arccos(np.clip((u * v).sum(axis=1) / (lu * lv), -1.0, 1.0)))
+        start += [i, i]
+        end += [j, o]
+        weight += [half / lu, half / lv]
+    return np.concatenate(start), np.concatenate(end), np.concatenate(weight)
+
+
+def _solved(place: F64, held: np.ndarray, start: np.ndarray, end: np.ndarray, weight: F64) -> F64:
+    """Places (k, 2) with every one that is not held a mean of its neighbours."""
+    number = np.full(len(place), -1)
+    number[~held] = np.arange((~held).sum())
+    inner = ~held[start]
+    i, j, w = number[start[inner]], end[inner], weight[inner]
+    count = int((~held).sum())
+    known = np.zeros((count, 2))
+    border = held[j]
+    np.add.at(known, i[border], w[border, None] * place[j[border]])
+    total = np.bincount(i, w, count)
+    system = coo_matrix((np.concatenate([total, -w[~border]]),
+                         (np.concatenate([np.arange(count), i[~border]]),
+                          np.concatenate([np.arange(count), number[j[~border]]]))), shape=(count, count)).tocsc()
+    out = place.copy()
+    out[~held] = np.asarray(spsolve(system, known)).reshape(-1, 2)
+    return out
+
+
+def _stretch(vertices: F64, faces: np.ndarray, laid: F64) -> tuple[F64, float]:
+    """How much longer ways are on the surface than in the square: (k,) float64, mm, round each vertex, and over all."""
+    p, q = vertices[faces], laid[faces]
+    u, v = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
+    turn = np.maximum(_cross(u, v), 1e-100)
+    e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    along = (e * v[:, 1:] - f * u[:, 1:]) / turn[:, None]
+    across = (f * u[:, :1] - e * v[:, :1]) / turn[:, None]
+    square = 0.5 * ((along * along).sum(axis=1) + (across * across).sum(axis=1))
+    area = 0.5 * np.sqrt(np.maximum((e * e).sum(axis=1) * (f * f).sum(axis=1) - (e * f).sum(axis=1) ** 2, 0.0))
+    count = len(vertices)
+    over = sum(np.bincount(faces[:, k], area * square, count) for k in range(3))
+    round_it = sum(np.bincount(faces[:, k], area, count) for k in range(3))
+    return np.sqrt(over / np.maximum(round_it, 1e-300)), float((area * square).sum())
+
+
+def _turn(laid: F64, faces: np.ndarray) -> F64:
+    """(m,) twice the area of each triangle as it is laid; negative where it is turned over."""
+    a, b, c = (laid[faces[:, k]] for k in range(3))
+    return _cross(b - a, c - a)
+
+
+def _cross(u: F64, v: F64) -> F64:
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
