@@ -35,7 +35,8 @@ def quad(name: str, n: int, m: int) -> Quad:
                              "B": {"bump": 0.35, "notch": -0.28, "step": 0.12}}[name]), n, m)  # type: ignore[arg-type]
 
 
-def triangulated(sides: tuple[np.ndarray, ...], spacing: float) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+def triangulated(sides: tuple[np.ndarray, ...],
+                 spacing: float) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
     """Vertices (k, 2), triangles (m, 3) and the vertices along each side of a region, about ``spacing`` apart."""
     border: list[np.ndarray] = []
     rows = []
