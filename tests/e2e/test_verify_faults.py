@@ -252,7 +252,8 @@ def test_a_dogleg_takes_the_whole_box_of_its_move():
     proof = run(lines, setup=replace(SETUP, dogleg=True))
     assert {f.line for f in proof.findings} == {line_of(lines, "X-12 Z25")}
     found = first(proof, FindingKind.RAPID)
-    assert "cutting part into stock" in found.message and found.depth == pytest.approx(2.5, abs=1e-6)
+    # 2.5 mm under the top, and no deeper than half the tool is wide
+    assert "cutting part into stock" in found.message and found.depth == pytest.approx(TOOL.radius, abs=0.08)
     assert found.point[0] <= -12 + TOOL.radius and run(program(), setup=replace(SETUP, dogleg=True)).clean
 
 

@@ -95,4 +95,4 @@ def test_the_grid_changes_nothing(tool):
             lo, hi = cutter_interval(*(p[i] - a), *n[i], *(b - a), tool.radius, tool.corner_radius, tool.flute_length)
             if lo <= hi and hi >= -1e-6:
                 best = min(best, lo)
-        assert res[i] == pytest.approx(best, abs=1e-12)
+        assert res[i] == pytest.approx(best, abs=1.01e-8)  # what a move must take to count
