@@ -23,7 +23,7 @@ from numba import njit
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
-from verify.kernels.frustum import contact, no_deeper
+from verify.kernels.frustum import contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import carried
 from verify.kernels.rays import gap, plan_distance
@@ -193,9 +193,8 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                                     depth = min(near, grow) if near > slack else 0.0
                             else:
                                 # the ball of radius v round the node is stock
-                                depth = contact(qx, qy, qz, dx, dy, dz, z0 - v, z1 + v, body[2] + grow + v,
-                                                body[3] + grow + v, clearance, slack,
-                                                known_depth(best, code, clearance), False)
+                                depth = contact_of_ball(qx, qy, qz, dx, dy, dz, z0, z1, body[2] + grow, body[3] + grow,
+                                                        v, clearance, slack, known_depth(best, code, clearance))
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
 

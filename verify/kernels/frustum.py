@@ -18,6 +18,8 @@ import numpy as np
 from numba import njit
 
 INF = np.inf
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+SECTIONS = 32  # of a move: 2e-7 of it is left
 
 
 @njit(cache=True, nogil=True)
@@ -143,3 +145,76 @@ def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, col
         return 0.0
     bare = penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, column)
     return clearance + bare if bare > slack else min(depth, clearance)
+
+
+@njit(cache=True, nogil=True)
+def _of_ball(s, wx, wy, wz, dx, dy, dz, z0, z1, r, k, v, lesser):
+    """The greatest of aside, or of the lesser of aside and down, of places within v of the point, at s.
+
+    Of all places q higher than the point the deepest is nearer the axis by what is left of v. -inf where none of them
+    is between z0 and z1.
+    """
+    ux, uy, high = wx - s * dx, wy - s * dy, wz - s * dz - z0
+    low, up = max(-v, -high), min(v, z1 - z0 - high)
+    if low > up:
+        return -INF
+    rho = math.sqrt(ux * ux + uy * uy)
+    # where aside is greatest: along the normal of the side, or from there on where the axis is within v
+    q = max(v * abs(k) / math.sqrt(1.0 + k * k), math.sqrt(max(v * v - rho * rho, 0.0))) if k != 0.0 else 0.0
+    q = min(max(q if k > 0.0 else -q, low), up)
+    aside = r + k * (high + q) - max(rho - math.sqrt(max(v * v - q * q, 0.0)), 0.0)
+    if not lesser or aside <= high + q:
+        return aside
+    # from there up aside falls and down grows: where they are equal
+    for _ in range(40):
+        mid = 0.5 * (q + up)
+        if r + k * (high + mid) - max(rho - math.sqrt(max(v * v - mid * mid, 0.0)), 0.0) > high + mid:
+            q = mid
+        else:
+            up = mid
+    return high + q
+
+
+@njit(cache=True, nogil=True)
+def _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, lesser):
+    """The greatest on the move of ``_of_ball``, which is concave in s: by golden sections."""
+    s1, s2 = _meeting(wz, dz, z0 - v, z1 + v)
+    if s1 > s2:
+        return -INF
+    k = (r1 - r0) / max(z1 - z0, 1e-12)
+    if (s2 - s1) ** 2 * (dx * dx + dy * dy + dz * dz) < 1e-18:
+        return _of_ball(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+    a, b = s2 - GOLDEN * (s2 - s1), s1 + GOLDEN * (s2 - s1)
+    at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+    at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+    most = max(at_a, at_b, _of_ball(s1, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser),
+               _of_ball(s2, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser))
+    for _ in range(SECTIONS):
+        if at_a < at_b:
+            s1, a, at_a = a, b, at_b
+            b = s1 + GOLDEN * (s2 - s1)
+            at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+        else:
+            s2, b, at_b = b, a, at_a
+            a = s2 - GOLDEN * (s2 - s1)
+            at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+        most = max(most, at_a, at_b)
+    return most
+
+
+@njit(cache=True, nogil=True)
+def contact_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, clearance, slack, known):
+    """As ``contact``, for the deepest of all places within v mm of the point."""
+    k = (r1 - r0) / max(z1 - z0, 1e-12)
+    side = v * math.sqrt(1.0 + k * k)  # the side moves out by so much, measured across the axis
+    most = overlap(wx, wy, wz, dx, dy, dz, z0 - v, z1 + v, r0 + side - v * k, r1 + side + v * k, False)
+    if most <= max(slack, known) or (known >= clearance and clearance + wz - min(dz, 0.0) + v - z0 <= known):
+        return 0.0
+    if most > clearance + slack:
+        bare = _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, v, True)
+        if bare > slack:
+            return clearance + bare
+    if known >= clearance:
+        return 0.0
+    near = _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, False)
+    return min(near, clearance) if near > max(slack, known) else 0.0
