@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,13 @@ from verify.clash import fixture_points, run_clashes
 from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
 from verify.fitness import top_of_all
-from verify.model import ProofSetup
-from verify.progress import Stages
+from verify.kernels.stock import FIXTURE, HOLDER, NECK, SHANK
+from verify.model import ProofSetup, StockKind
+from verify.progress import Report, Stages
 from verify.removal import Moves
 from verify.stock import blank, run_bodies, run_stock
 from verify.stockpass import StockPass, end_radii, free_rapids
+from verify.toolaxes import ToolAxes
 
 LINES_APART, NODES_APART = 1.4, 0.6  # radii of the finest end between lines, and between nodes
 
@@ -29,10 +31,12 @@ class Contacts:
 
     run     : StockPass; its events hold those of the part as well, the deeper first
     spacing : mm between the lines or nodes of the stock
+    upright : whether those were lines of one height
     """
 
     run: StockPass
     spacing: float
+    upright: bool
 
 
 def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -42,30 +46,54 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
     slides       : where the linear axes point, move by move (``verify.dogleg``); only used where rapids are doglegs
 
-    Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``).
+    Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``)
+    and those whose flutes cut under what stands.
     """
     stages, given, origin = Stages(progress), moves, None
     spacing = stock_spacing(setup, moves, tools)
     if setup.dogleg:
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
-    if moves.axes is None:
-        lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.1))
-        run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.1, 0.6))
+    upright = moves.axes is None
+    if upright:
+        run, spacing = _lines(mesh, spacing, moves, tools, setup, threads, stages.span(0.0, 0.6))
+        upright = not _undercuts(run, moves, setup)
+        moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
+    held = fixture_points(setup, mesh.bounds, moves, tools)
+    if upright:
         met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 0.8))
         met, lost = _with_points(met, lost, points, ~moves.feed, False, moves, tools, setup, threads)
         stages.tell(0.9)
-        held = fixture_points(setup, mesh.bounds, moves, tools)
         met, lost = _with_points(met, lost, held, np.ones(len(moves), np.bool_), True, moves, tools, setup, threads)
-        spacing = lines.step
     else:
-        field = stock_field(mesh, setup, spacing, threads=threads, progress=stages.span(0.0, 0.15))
+        field = stock_field(mesh, setup, stock_spacing(setup, moves, tools), threads=threads,
+                            progress=stages.span(0.0, 0.15))
         run = run_field(field, moves, tools, setup, threads=threads, progress=stages.span(0.15, 0.7))
-        held = fixture_points(setup, mesh.bounds, moves, tools)
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=stages.span(0.7, 1.0))
         spacing = field.step
-    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing)
+    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright)
+
+
+def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
+           threads: int, progress: Report) -> tuple[StockPass, float]:
+    """The pass over lines of one height, and mm between them."""
+    stages = Stages(progress)
+    lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.2))
+    return run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.2, 1.0)), lines.step
+
+
+def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:
+    """Whether flutes went under stock or part that no body above them met, which lines of one height cannot follow.
+
+    Stock of a box or cylinder stands under itself until a feed move takes it from below.
+    """
+    if run.under is None:
+        return False
+    under = run.under if setup.stock_kind == StockKind.PART_OFFSET else run.under & moves.feed
+    met = run.events[(run.events[:, 2] > run.events[:, 3]) & np.isin(run.events[:, 1] % FIXTURE, (NECK, SHANK, HOLDER))]
+    under[met[:, 0].astype(np.int64)] = False
+    return bool(under.any())
 
 
 def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) -> float:

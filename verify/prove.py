@@ -90,7 +90,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
                    stages.span(CUT, MET))
     run = met.run
-    fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, moves.axes is None)
+    fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),

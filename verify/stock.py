@@ -33,7 +33,7 @@ from verify.blank import blank_cylinder, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import stock_tile
+from verify.kernels.stock import UNDER, stock_tile
 from verify.model import ProofSetup, StockKind
 from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
 from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
@@ -119,7 +119,8 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
 
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
     events, lost = gather(run_tiles([job(*b) for b in blocks], threads, progress))
-    return StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables))
+    seen = np.bitwise_or.reduce(tables)
+    return StockPass(events, lost, cut.astype(bool), seen & ~UNDER, under=(seen & UNDER) != 0)
 
 
 def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,

@@ -53,6 +53,7 @@ class StockPass:
     cut    : (m,) bool, moves that took stock
     engaged : (m,) int64, sectors of the cutter that met stock (``kernels.engaged``)
     taken  : (m,) float64, mm³ by move, or None where that is not known
+    under  : (m,) bool, moves whose flutes were under stock, or None where that makes no difference
     """
 
     events: F64
@@ -60,6 +61,7 @@ class StockPass:
     cut: NDArray[np.bool_]
     engaged: NDArray[np.int64]
     taken: F64 | None = None
+    under: NDArray[np.bool_] | None = None
 
 
 def end_radii(tools: Sequence[ToolBody]) -> F64:

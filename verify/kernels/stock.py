@@ -19,6 +19,8 @@ from verify.kernels.heights import INF, _cells, entered, lowest
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
+UNDER = 1 << 40  # beside the sectors of ``engaged``
+ARM = 0.05  # mm by which a line must stand over the flutes, and reach into them, to be under an arm
 
 
 @njit(cache=True, nogil=True)
@@ -70,11 +72,13 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 @njit(cache=True, nogil=True)
 def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
-    """Lower the lines under one feed move; returns whether any stock went, and the sectors of the cutter that met it.
+    """Lower the lines under one feed move.
+
+    Returns whether any stock went, the sectors of the cutter that met it, and whether the flutes were under stock.
     """
     i0, i1, j0, j1 = box
     radius, corner, length = cutter
-    cut, engaged = False, np.int64(0)
+    cut, engaged, under = False, np.int64(0), False
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
@@ -97,9 +101,14 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                 reach = flat + math.sqrt(over * (2.0 * corner - over))
             if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
                 continue
+            beside = s
             low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
             gone = height[i, j] - low
-            if gone <= 1e-9 or height[i, j] > a[2] + s * d[2] + length + 1e-9:
+            if gone <= 1e-9:
+                continue
+            if height[i, j] > a[2] + s * d[2] + length + 1e-9:
+                under = under or (height[i, j] > a[2] + beside * d[2] + length + ARM and
+                                  wx * wx + wy * wy < (radius - ARM) * abs(radius - ARM))
                 continue
             height[i, j] = low
             cut = cut or gone > 1e-6
@@ -115,7 +124,7 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
                 if dug[i - i0, j - j0] > skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
-    return cut, engaged
+    return cut, engaged, under
 
 
 @njit(cache=True, nogil=True)
@@ -143,8 +152,9 @@ def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
 
 @njit(cache=True, nogil=True)
 def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
-    """Find the lines that the cutting part, grown radially, enters in a rapid."""
-    radius, corner, _ = cutter
+    """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
+    radius, corner, length = cutter
+    under, above = False, max(a[2], a[2] + d[2]) + length + ARM
     wide = radius + grow
     i0, i1, j0, j1 = box
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - wide, max(a[0], a[0] + d[0]) + wide, origin[0], step, i0, i1)
@@ -173,6 +183,8 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
                         free = wider
                 depth = grow - hits
             _worse(best, CUTTER, depth, grow, x, y, min(top, low))
+            under = under or top > above
+    return under
 
 
 @njit(cache=True, nogil=True)
@@ -183,7 +195,8 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
     steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
     rapid_grow : mm around everything in a rapid, but in those that are ``free`` (m,) bool
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
-    engaged : (m,) int64, sectors of the cutter that met stock, added to
+    engaged : (m,) int64, sectors of the cutter that met stock, added to, and UNDER where the flutes were under stock,
+              of which lines of one height cannot tell
 
     Returns the number of events found, which may exceed the table.
     """
@@ -211,8 +224,10 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            went, sectors = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
+            went, sectors, under = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
                                    earned[m], since, dug, best)
+            if under:
+                engaged[m] |= UNDER
             if went:
                 cut[m] = 1
                 engaged[m] |= sectors
@@ -220,7 +235,8 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
                 if lowered % REFRESH == 0:
                     top = _top(height, i0, i1, j0, j1)
         else:
-            _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best)
+            if _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
+                engaged[m] |= UNDER
         for b in range(body_first[k], body_first[k + 1]):
             if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
                 # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
