@@ -140,6 +140,20 @@ class NurbsSurface:
         """
         return self._normal(self.derivatives(uv))
 
+    def points_and_normals(self, uv: ArrayLike) -> tuple[F64, F64]:
+        """Points (p, 3) mm and unit normals out of the material (p, 3), NaN at singular points, at once.
+
+        uv : (p, 2), parameters
+        Raises GeometryError as ``points``.
+        """
+        at = self._inside(uv)
+        a, au, av = (self._value(at, i, j) for i, j in _WAYS[:3])
+        if self.weights is None:
+            return a, self._across(au, av)
+        w, wu, wv = (self._value(at, i, j, weight=True) for i, j in _WAYS[:3])
+        s = a / w
+        return s, self._across((au - wu * s) / w, (av - wv * s) / w)
+
     def forms(self, uv: ArrayLike) -> tuple[F64, F64]:
         """First and second fundamental form; parameters and errors are those of ``points``.
 
@@ -227,9 +241,13 @@ class NurbsSurface:
         return int(counts[0]), int(counts[1])
 
     def _normal(self, d: SurfaceDerivatives) -> F64:
-        across = np.cross(d.u, d.v)
+        return self._across(d.u, d.v)
+
+    def _across(self, u: F64, v: F64) -> F64:
+        """Unit normals from both first derivatives, (p, 3)."""
+        across = np.cross(u, v)
         size = np.linalg.norm(across, axis=1)
-        along = [np.linalg.norm(way, axis=1) for way in (d.u, d.v)]
+        along = [np.linalg.norm(way, axis=1) for way in (u, v)]
         least = SINGULAR * self._size / (self.domain[1] - self.domain[0])
         good = (along[0] > least[0]) & (along[1] > least[1]) & (size > SINGULAR * along[0] * along[1])
         out: F64 = np.full(across.shape, np.nan)

@@ -1,0 +1,57 @@
+"""A grid on a region of the parameters of a surface, as a smooth map of the unit square.
+
+Notation
+    xi, eta : coordinates of the unit square, eta across the passes; (u, v) : parameters of the surface
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.quadgrid import folds
+
+FINER = 4  # places a cell, each way, at which the map is looked at for folds
+
+
+@dataclass(frozen=True, eq=False)
+class GridMap:
+    """Bicubic splines through a grid: u and v over (eta, xi)."""
+
+    u: RectBivariateSpline
+    v: RectBivariateSpline
+
+    @classmethod
+    def of(cls, grid: F64) -> GridMap:
+        """The map through a grid (m, n, 2) of parameters, m and n at least 4, which lies counterclockwise.
+
+        Raises
+        ------
+        GeometryError
+            Code 'folded': the grid, or the spline between its places, turns over somewhere.
+        """
+        m, n = grid.shape[:2]
+        eta, xi = np.linspace(0.0, 1.0, m), np.linspace(0.0, 1.0, n)
+        out = cls(*(RectBivariateSpline(eta, xi, grid[:, :, c]) for c in (0, 1)))
+        count = folds(grid)
+        if not count:
+            a, b = np.meshgrid(np.linspace(0.0, 1.0, FINER * (n - 1) + 1), np.linspace(0.0, 1.0, FINER * (m - 1) + 1))
+            along, across = out.tangents(a.ravel(), b.ravel())
+            count = int((along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0] <= 0.0).sum())
+        if count:
+            raise GeometryError(f"a grid on a region folds at {count} places", code="folded", measured=count, limit=0,
+                                remedy="blend it with another, lay the region into the square, or split it")
+        return out
+
+    def __call__(self, xi: F64, eta: F64) -> F64:
+        """(p, 2) float64, (u, v) at xi and eta, both (p,)."""
+        return np.column_stack([self.u.ev(eta, xi), self.v.ev(eta, xi)])
+
+    def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Derivatives of (u, v) along xi and along eta, both (p, 2) float64, parameters by 1."""
+        along = np.column_stack([self.u.ev(eta, xi, dy=1), self.v.ev(eta, xi, dy=1)])
+        return along, np.column_stack([self.u.ev(eta, xi, dx=1), self.v.ev(eta, xi, dx=1)])

@@ -1,0 +1,108 @@
+"""Side steps and passes over re-parameterised surfaces: against constructions, and against what is truly left."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import GeometryError
+from geometry.fronts import interpolated
+from geometry.gridmap import GridMap
+from geometry.laplace import laplace
+from geometry.nurbs import NurbsSurface
+from geometry.quadgrid import Quad
+from tests.square_regions import region
+from toolpath.cutter import Cutter
+from toolpath.envelope import Envelope
+from toolpath.forward import Profile, steps
+from toolpath.isoparametric import IsoSurface, lay_out, side_step
+
+RADIUS, SCALLOP = 5.0, 0.5
+
+
+def hills(height: float = 12.0) -> NurbsSurface:
+    """About 280 mm by 300 mm, hollows and hills with radii down to 200 mm / height * 5."""
+    x, y = np.meshgrid(np.linspace(-40, 240, 7), np.linspace(-40, 260, 7), indexing="ij")
+    z = height * np.sin(x / 70) * np.cos(y / 60) + 0.0008 * (x - 100) ** 2
+    return NurbsSurface.from_control_points(np.stack([x, y, z], -1), 4)
+
+
+def iso_of(name: str, method, surface: NurbsSurface) -> IsoSurface:
+    sides = region(**{"I": {"bump": 0.0, "notch": 0.05}, "II": {"bump": 0.2, "notch": -0.17}}[name], size=200.0)
+    grid = method(Quad.of(sides, 41, 31))
+    low, high = surface.domain
+    return IsoSurface(surface, GridMap.of(low + (grid + 20.0) / [240.0, 250.0] * (high - low)))
+
+
+@pytest.mark.parametrize("curvature, arc", [
+    (-1 / 20, 3.8524), (1 / 20, 5.1008), (1 / 8, 7.418), (1 / 6, 11.598), (0.0, 2 * np.sqrt(2 * 5 * 0.5 - 0.25))])
+def test_side_steps_are_those_of_the_derivation(curvature, arc):
+    assert side_step(np.array([curvature]), RADIUS, SCALLOP)[0] == pytest.approx(arc, rel=2e-4)
+
+
+@pytest.mark.parametrize("curvature", np.linspace(-0.5, 0.17, 23))
+@pytest.mark.parametrize("scallop", [0.5, 0.01])
+def test_two_balls_a_side_step_apart_leave_the_scallop(curvature, scallop):
+    """On a circle of the curvature, where two balls meet."""
+    arc = side_step(np.array([curvature]), RADIUS, scallop)[0]
+    if abs(curvature) < 1e-6:
+        meet = RADIUS - np.sqrt(RADIUS**2 - arc**2 / 4)
+    else:
+        big = -1 / curvature  # of the part, positive convex: the ball is outside
+        half = arc / (2 * big)
+        centre = (big + RADIUS) * np.array([np.sin(half), np.cos(half)])
+        meet = centre[1] - np.sqrt(RADIUS**2 - centre[0] ** 2) - big
+    assert meet == pytest.approx(scallop, rel=1e-6)
+
+
+def test_a_ball_that_does_not_fit_has_no_side_step():
+    arc = side_step(np.array([0.21, 0.2, 0.195]), RADIUS, SCALLOP)
+    assert np.isnan(arc[:2]).all() and arc[2] == pytest.approx(2 * np.pi / 0.195)
+
+
+def cylinder() -> NurbsSurface:
+    """A quarter of radius 20 about x, convex, facing z: v along x."""
+    c = np.sqrt(0.5)
+    arc = 20.0 * np.array([[-c, c], [0.0, 1 / c], [c, c]])
+    net = np.array([[[x, y, z] for x in (0.0, 50.0)] for y, z in arc])
+    return NurbsSurface(net, np.array([0, 0, 0, 1, 1, 1.0]), np.array([0, 0, 1, 1.0]), (3, 2),
+                        np.repeat([[1.0], [c], [1.0]], 2, axis=1), side=-1)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3])
+def test_the_way_across_a_pass_is_square_to_it_on_the_surface(lean):
+    """Passes along the axis of a cylinder, the other lines of the grid leaning: across is round the cylinder."""
+    surface = cylinder()
+    at = np.linspace(0.0, 1.0, 9)
+    xi, eta = np.meshgrid(at, at)
+    grid = np.stack([0.2 + 0.6 * eta, 0.9 - 0.5 * xi - lean * eta], axis=-1)
+    iso = IsoSurface(surface, GridMap.of(grid))
+    width, curvature = iso.across(np.array([0.1, 0.5]), np.array([0.3, 0.6]))
+    assert curvature == pytest.approx([-1 / 20, -1 / 20])
+    high, low = (surface.points(np.array([[0.2 + 0.6 * e, 0.5]])) for e in (0.3 + 1e-5, 0.3))
+    assert width[0] == pytest.approx(np.linalg.norm(high - low) / 1e-5, rel=1e-4)
+
+
+def left_standing(iso: IsoSurface, chord: float) -> np.ndarray:
+    """What is left at a fine lattice of places away from the borders, under polylines of tips, mm."""
+    paths = []
+    for eta in lay_out(iso, RADIUS, SCALLOP).tolist():
+        profile = Profile.of(iso.curve(eta), chord)
+        paths.append(profile.centres(steps(profile, RADIUS, chord, SCALLOP), RADIUS) - [0.0, 0.0, RADIUS])
+    xi, eta = np.meshgrid(np.linspace(0.02, 0.98, 120), np.linspace(0.005, 0.995, 301))
+    return Envelope(paths, Cutter.ball(diameter=2 * RADIUS, length=20.0)).along(*iso.contact(xi.ravel(), eta.ravel()))
+
+
+@pytest.mark.parametrize("name, method", [("I", interpolated), ("II", interpolated),
+                                          ("II", lambda quad: laplace(quad)[0])])
+def test_passes_leave_the_scallop_and_little_less(name, method):
+    left = left_standing(iso_of(name, method, hills()), 0.005)
+    assert left.max() <= SCALLOP + 0.005
+    assert left.max() >= 0.93 * SCALLOP
+    assert left.min() >= -0.0051
+
+
+def test_a_grid_that_folds_is_refused():
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 8), np.linspace(0, 1, 8)), axis=-1)
+    grid[3, 3] += [0.2, 0.0]
+    with pytest.raises(GeometryError) as refusal:
+        GridMap.of(grid)
+    assert refusal.value.code == "folded"

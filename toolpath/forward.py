@@ -1,0 +1,187 @@
+"""Forward steps of a ball on the true profile of a pass (papers/000, section 3.4, by the errata's scheme).
+
+Between two tool locations the ball sweeps a capsule round the way of its centre. How far a place of the pass is from
+that capsule is the chordal error there, overcut of the nose and stock left alike:
+
+    dev(P) = dist(P, segment C1 C2) - r,    C = P + r n
+
+That does not see a pass that bends sideways: by d the capsule leaves the contact only by d² / 2 r, while the ridge to
+the next pass, of height h, grows by d sqrt(h / 2 r). So ways aside count with that factor where a scallop is given. A
+step is as long as the greater of the two, the chordal error, allows. The circular-arc rule takes the curvature at the
+start of a step for that of the whole step, so past an inflection, or where a profile tightens, it leaves more than the
+tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from toolpath.kernels import forward as kernels
+
+LONGEST = 40.0  # mm
+MOST_STEPS = 1_000_000
+FIRST = 256  # intervals a pass is looked at in at first
+SHARE = 2e-4  # of the tolerance: what the cubics of a profile may be off
+MOST_PLACES = 1 << 18
+
+Curve = Callable[[F64], tuple[F64, F64]]
+"""Contacts (n, 3) mm and unit normals out of the material (n, 3) at parameters (n,) in 0 to 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A pass over the surface by its length.
+
+    at      : (k + 1,) float64, parameters at even ways; width : mm between them
+    contact : (k + 1, 3) float64, mm; normal : (k + 1, 3) unit
+    """
+
+    at: F64
+    width: float
+    contact: F64
+    normal: F64
+
+    @classmethod
+    def of(cls, curve: Curve, tolerance: float) -> Profile:
+        """A pass over 0 to 1 with places so close that cubics through them are off by 2e-4 of a tolerance (mm).
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_pass': the pass is a point, or its normals are not known.
+        """
+        t = np.linspace(0.0, 1.0, FIRST + 1)
+        way = _way(curve(t)[0])
+        if not way[-1] > 0.0:
+            raise GeometryError("a pass has no length, or no places", code="bad_pass", measured=float(way[-1]),
+                                limit=0.0, remedy="leave it out")
+        count = FIRST // 4
+        ways = np.linspace(0.0, way[-1], count + 1)
+        t = _even(way, t, ways)
+        contact, normal = curve(t)
+        while True:
+            between = _even(way, np.linspace(0.0, 1.0, FIRST + 1), 0.5 * (ways[1:] + ways[:-1]))
+            more, lean = curve(between)
+            if not (np.isfinite(contact).all() and np.isfinite(normal).all() and np.isfinite(lean).all()):
+                raise GeometryError("a pass goes over a place without a normal", code="bad_pass",
+                                    remedy="keep it off poles and tips")
+            off = np.abs(CubicSpline(ways, contact)(0.5 * (ways[1:] + ways[:-1])) - more).max()
+            ways, t = _merged(ways, 0.5 * (ways[1:] + ways[:-1])), _merged(t, between)
+            contact, normal = _merged(contact, more), _merged(normal, lean)
+            if off <= SHARE * tolerance or len(t) > MOST_PLACES:
+                return cls(t, float(ways[-1]) / (len(ways) - 1), contact, normal)
+
+    @property
+    def length(self) -> float:
+        """mm."""
+        return self.width * (len(self.at) - 1)
+
+    @property
+    def ways(self) -> F64:
+        """(k + 1,) float64, mm, of the places."""
+        return self.width * np.arange(len(self.at))
+
+    def pieces(self) -> F64:
+        """(k, 6, 4) float64: contact and normal as cubics of the way into each interval."""
+        spline = CubicSpline(self.ways, np.column_stack([self.contact, self.normal]))
+        return np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+
+    def parameters(self, way: F64) -> F64:
+        """(n,) float64, the parameters at ways (n,) mm."""
+        return np.clip(CubicSpline(self.ways, self.at)(way), self.at[0], self.at[-1])
+
+    def centres(self, way: F64, radius: float) -> F64:
+        """(n, 3) float64, mm: centres of a ball of a radius (mm) that touches the pass at ways (n,) mm."""
+        spline = CubicSpline(self.ways, np.column_stack([self.contact, self.normal]))(way)
+        normal = spline[:, 3:] / np.linalg.norm(spline[:, 3:], axis=1)[:, None]
+        return np.asarray(spline[:, :3] + radius * normal)
+
+
+def _way(points: F64) -> F64:
+    return np.asarray(np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]))
+
+
+def _even(way: F64, t: F64, wanted: F64) -> F64:
+    """Parameters at ways: smooth, so that a smooth pass stays one, and growing."""
+    keep = np.concatenate([[True], np.diff(way) > 1e-12 * way[-1]])
+    way, t = way[keep], t[keep]
+    t[-1] = 1.0
+    smooth = CubicSpline(way, t)(wanted)
+    if (np.diff(smooth) <= 0.0).any():
+        smooth = PchipInterpolator(way, t)(wanted)
+    return np.clip(smooth, 0.0, 1.0)
+
+
+def _merged(a: F64, b: F64) -> F64:
+    """Rows of a with those of b, one fewer, between them."""
+    out = np.empty((len(a) + len(b), *a.shape[1:]))
+    out[::2], out[1::2] = a, b
+    return out
+
+
+def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.0, longest: float = LONGEST) -> F64:
+    """Ways along a pass at which a ball is to be located.
+
+    radius, tolerance : mm; longest : mm, of a step
+    scallop : mm, between passes, which may grow by the tolerance; 0 where only the pass itself counts
+
+    Returns
+    -------
+    (n,) float64, mm, from 0 to the length of the pass. Each step but the last, and those of the greatest length, has a
+    chordal error of 0.9985 to 1 of the tolerance.
+
+    Raises
+    ------
+    GeometryError
+        Code 'too_many_steps': the tolerance asks for over a million.
+    """
+    pieces, aside = profile.pieces(), _aside(radius, scallop)
+    room = 1024
+    while room <= MOST_STEPS:
+        ends = np.empty(room)
+        count = int(kernels.forward(pieces, profile.width, profile.length, radius, aside, tolerance, longest,
+                                    ends))
+        if count > 0:
+            return ends[:count].copy()
+        room *= 8
+    raise GeometryError(f"a pass of {profile.length:g} mm asks for over {MOST_STEPS} steps", code="too_many_steps",
+                        measured=profile.length, limit=MOST_STEPS, remedy="allow a larger chord tolerance")
+
+
+def _aside(radius: float, scallop: float) -> float:
+    return float(np.sqrt(scallop / (2.0 * radius)))
+
+
+def errors(profile: Profile, ends: F64, radius: float, scallop: float = 0.0) -> F64:
+    """(n - 1,) float64, mm: the greatest chordal error of each step between ways (n,) mm."""
+    pieces, seen, out = profile.pieces(), np.empty(kernels.PLACES + 1), np.empty(6)
+    return np.array([kernels.greatest(pieces, profile.width, a, b, radius, _aside(radius, scallop), seen, out)
+                     for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)])
+
+
+def arc_rule(profile: Profile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
+    """Ways by the rule of a circular arc, (n,) float64 mm: the curvature at the start of a step taken for all of it.
+
+    Convex of radius R: cos phi = 1 - e / (R + r), concave 1 - e / (R - r); the step is the chord 2 R sin phi. For
+    comparison: it does not keep the tolerance where the curvature changes.
+    """
+    s = profile.ways
+    spline = CubicSpline(s, profile.contact)
+    bend = np.einsum("ij,ij->i", spline(s, 2), profile.normal)  # positive concave
+    out = [0.0]
+    while out[-1] < profile.length:
+        k = float(np.interp(out[-1], s, bend))
+        step = longest
+        if abs(k) > 1e-9:
+            big = 1.0 / abs(k)
+            share = tolerance / (big + radius if k < 0.0 else max(big - radius, 1e-9))
+            if share < 1.0:
+                step = min(2.0 * big * np.sin(np.arccos(1.0 - share)), longest)
+        out.append(min(out[-1] + step, profile.length))
+    return np.array(out)

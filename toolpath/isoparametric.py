@@ -1,0 +1,213 @@
+"""Passes of a ball along the lines of a re-parameterised surface (papers/000, section 3, mended by its errata).
+
+Notation
+    xi, eta   : the unit square; a pass is a line of one eta, xi along it
+    C         : S(u(xi, eta), v(xi, eta)), the contact; n its normal, out of the material
+    k         : normal curvature across the pass, positive where the part is concave
+    r, h, g   : radius of the ball, what may be left standing, side step as an arc on the surface
+
+The side step 3.7 to 3.11 in one closed form, which is level at k = 0: with R = 1 / |k|
+
+    1 - cos phi = (2 r h - h²) / (2 (R + h) (R + r)) convex, (R - h) (R - r) concave;   g = 2 R phi
+    g = (4 / |k|) asin(|k| sqrt((2 r h - h²) / (4 (1 - h k) (1 - r k))))
+
+It is right across straight neighbours alike all along; how far apart two passes may truly be is bracketed on what the
+ball leaves between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.spatial import cKDTree
+
+from geometry.gridmap import GridMap
+from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
+from toolpath.forward import Curve
+
+LEVEL = 1e-9  # 1/mm: what is less curved is level
+TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
+ALONG = 65  # places along a pass at which its distance to the next is looked at
+MOST_LINES = 513
+CENTRES = 513  # of the ball along a pass
+ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
+FULL, AIM, TRIALS = 0.97, 0.985, 8
+
+
+def side_step(curvature: F64, radius: float, scallop: float) -> F64:
+    """Largest arc across two neighbouring passes: 3.7 to 3.11.
+
+    curvature : (n,) float64, 1/mm, across the pass, positive concave; radius, scallop : mm
+
+    Returns (n,) float64, mm; nan where the surface is so hollow that the ball does not fit, and the whole of what is
+    round the ball where it fits so closely that nothing as high as the scallop can stay.
+    """
+    k = np.asarray(curvature, dtype=np.float64)
+    size = np.maximum(np.abs(k), LEVEL)
+    room = (1.0 - scallop * k) * (1.0 - radius * k)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sine = size * np.sqrt((2.0 * radius * scallop - scallop**2) / (4.0 * room))
+    arc = 4.0 / size * np.arcsin(np.minimum(sine, 1.0))
+    return np.where(k < 1.0 / radius, np.where(np.isnan(sine), 2.0 * np.pi / size, arc), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class IsoSurface:
+    """A surface over the unit square."""
+
+    surface: NurbsSurface
+    grid: GridMap
+
+    def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Places (p, 3) mm and unit normals (p, 3) at xi and eta, both (p,)."""
+        return self.surface.points_and_normals(self._inside(self.grid(xi, eta)))
+
+    def curve(self, eta: float) -> Curve:
+        """The pass at eta, as ``toolpath.forward`` takes it."""
+        return lambda xi: self.contact(xi, np.full(len(xi), eta))
+
+    def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """How the surface lies across a pass at xi and eta, both (p,).
+
+        Returns
+        -------
+        width : (p,) float64, mm by 1 of eta, square to the pass on the surface
+        curvature : (p,) float64, 1/mm, across the pass, positive concave
+
+        The way square to the direction (u', v') is (-(F u' + G v'), E u' + F v').
+        """
+        uv = self._inside(self.grid(xi, eta))
+        along, over = self.grid.tangents(xi, eta)
+        first, second = self.surface.forms(uv)
+        e, f, g = first.T
+        u, v = -(f * along[:, 0] + g * along[:, 1]), e * along[:, 0] + f * along[:, 1]
+        size = e * u * u + 2.0 * f * u * v + g * v * v
+        curvature = (second[:, 0] * u * u + 2.0 * second[:, 1] * u * v + second[:, 2] * v * v) / size
+        inner = e * u * over[:, 0] + f * (u * over[:, 1] + v * over[:, 0]) + g * v * over[:, 1]
+        return np.abs(inner) / np.sqrt(size), curvature
+
+    def _inside(self, uv: F64) -> F64:
+        return np.clip(uv, *self.surface.domain)
+
+
+class _Table:
+    """Contacts and normals as splines over the unit square, fine enough for what a scallop is measured with.
+
+    Asked on lattices only, which costs a twentieth of asking the surface. Contacts are off by 1e-3 of the scallop at
+    most half way between its places, or the lattice has 513 by 513.
+    """
+
+    def __init__(self, iso: IsoSurface, scallop: float) -> None:
+        count, off = 33, np.inf
+        while off > 1e-3 * scallop and count <= MOST_LINES:
+            at = np.linspace(0.0, 1.0, count)
+            xi, eta = np.meshgrid(at, at)
+            point, normal = iso.contact(xi.ravel(), eta.ravel())
+            values = np.column_stack([point, normal]).reshape(count, count, 6)
+            self.splines = [RectBivariateSpline(at, at, values[:, :, c]) for c in range(6)]
+            between = 0.5 * (at[1::2] + at[:-1:2])
+            xi, eta = np.meshgrid(between, between)
+            true, _ = iso.contact(xi.ravel(), eta.ravel())
+            off = float(np.abs(self(between, between)[0].reshape(-1, 3) - true).max())
+            count = 2 * count - 1
+
+    def __call__(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Contacts and unit normals, both (m, n, 3), at all of xi (n,) and eta (m,), which grow."""
+        out = np.stack([spline(eta, xi) for spline in self.splines], axis=-1)
+        return out[..., :3], out[..., 3:] / np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
+
+
+def lay_out(iso: IsoSurface, radius: float, scallop: float) -> F64:
+    """The passes, (k,) float64, eta from 0 to 1: both borders, and as few between them as the scallop allows.
+
+    radius, scallop : mm
+    """
+    out, step = [0.0], None
+    table = _Table(iso, scallop)
+    before = _Pass(table, 0.0, radius)
+    while out[-1] < 1.0:
+        guess = _first_guess(iso, out[-1], radius, scallop) if step is None else step
+        eta, before = _next(table, before, out[-1], guess, radius, scallop)
+        step = eta - out[-1]
+        out.append(eta)
+    return np.array(out)
+
+
+def _first_guess(iso: IsoSurface, eta: float, radius: float, scallop: float) -> float:
+    xi = np.linspace(0.0, 1.0, ALONG)
+    width, curvature = iso.across(xi, np.full(ALONG, eta))
+    g = side_step(np.minimum(curvature, TIGHT / radius), radius, scallop)
+    return float(np.nanmin(g / np.maximum(width, 1e-300)))
+
+
+class _Pass:
+    """A pass as centres of the ball, close together, to ask what is left beside it."""
+
+    def __init__(self, table: _Table, eta: float, radius: float) -> None:
+        point, normal = table(np.linspace(0.0, 1.0, CENTRES), np.array([eta]))
+        self.centres, self.radius = point[0] + radius * normal[0], radius
+        self.tree = cKDTree(self.centres)
+
+    def left(self, points: F64, normals: F64) -> F64:
+        """How far along the normals (n, 3) of places (n, 3), mm, the ball begins; a little over r where it is not."""
+        _, near = self.tree.query(points + self.radius * normals)
+        best = np.full(len(points), 1.01 * self.radius)
+        for k in (-1, 0):
+            a = np.clip(near + k, 0, len(self.centres) - 2)
+            best = np.minimum(best, self._on(points, normals, self.centres[a], self.centres[a + 1]))
+        return best
+
+    def _on(self, points: F64, normals: F64, a: F64, b: F64) -> F64:
+        """The same of a ball that goes straight from a to b (n, 3): where the ray meets its capsule."""
+        best = np.full(len(points), 1.01 * self.radius)
+        t = np.zeros(len(points))
+        d = b - a
+        length2 = np.maximum((d * d).sum(axis=1), 1e-300)
+        for _ in range(4):  # the centre nearest to where the ray meets it, taken anew
+            at = points + t[:, None] * normals
+            s = np.clip(((at - a) * d).sum(axis=1) / length2, 0.0, 1.0)
+            w = a + s[:, None] * d - points
+            along = (w * normals).sum(axis=1)
+            deep = self.radius**2 - (w * w).sum(axis=1) + along * along
+            t = np.where(deep >= 0.0, along - np.sqrt(np.maximum(deep, 0.0)), best)
+        return np.minimum(best, t)
+
+
+def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
+    """The most that is left between two passes, mm."""
+    points, normals = table(np.linspace(0.0, 1.0, ALONG), low + ROWS * (high - low))
+    shape, points, normals = points.shape[:2], points.reshape(-1, 3), normals.reshape(-1, 3)
+    one, two = a.left(points, normals).reshape(shape), b.left(points, normals).reshape(shape)
+    # what is left grows with the square of the way from a pass: between two rows both roots are straight
+    p, q = np.sqrt(np.maximum(one, 0.0)), np.sqrt(np.maximum(two, 0.0))
+    fall = (p[:-1] <= q[:-1]) & (p[1:] >= q[1:])
+    share = (q[:-1] - p[:-1]) / np.maximum((q[:-1] - p[:-1]) - (q[1:] - p[1:]), 1e-300)
+    crossing = np.where(fall, p[:-1] + share * (p[1:] - p[:-1]), 0.0) ** 2
+    return float(max(np.minimum(one, two).max(), crossing.max()))
+
+
+def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
+          scallop: float) -> tuple[float, _Pass]:
+    """The next pass: as far as what is left between the two allows, or the border."""
+    low, high, step = 0.0, math.inf, min(guess, 1.0 - at)
+    kept = None
+    for _ in range(TRIALS):
+        trial = _Pass(table, at + step, radius)
+        left = _worst(table, before, trial, at, at + step)
+        if left <= scallop:
+            low, kept = step, (at + step, trial)
+            if left >= FULL * scallop or at + step >= 1.0:
+                break
+        else:
+            high = step
+        wanted = step * math.sqrt(AIM * scallop / max(left, 1e-3 * scallop))
+        if not low < wanted < high:
+            wanted = 0.5 * (low + high) if high < math.inf else 1.5 * step
+        step = min(wanted, 1.0 - at)
+    if kept is None:  # not even a narrow step keeps it: what is left there is for others
+        kept = (at + step, _Pass(table, at + step, radius))
+    return (1.0 if kept[0] > 1.0 - 1e-9 else kept[0]), kept[1]
