@@ -94,7 +94,7 @@ class Profile:
 
     def parameters(self, way: F64) -> F64:
         """(n,) float64, the parameters at ways (n,) mm."""
-        return np.clip(CubicSpline(self.ways, self.at)(way), self.at[0], self.at[-1])
+        return np.asarray(np.clip(CubicSpline(self.ways, self.at)(way), self.at[0], self.at[-1]))
 
     def centres(self, way: F64, radius: float) -> F64:
         """(n, 3) float64, mm: centres of a ball of a radius (mm) that touches the pass at ways (n,) mm."""
