@@ -85,7 +85,7 @@ class Profile:
     @property
     def ways(self) -> F64:
         """(k + 1,) float64, mm, of the places."""
-        return self.width * np.arange(len(self.at))
+        return np.asarray(self.width * np.arange(len(self.at)))
 
     def pieces(self) -> F64:
         """(k, 6, 4) float64: contact and normal as cubics of the way into each interval."""

@@ -1,0 +1,127 @@
+"""The four sides of a region: which places of its border are to be corners of the unit square.
+
+A border turns by 2 pi in all. Four places are wanted that turn by a right angle each, with little turning left between
+them and opposite sides of like length. Every choice of four from the sharpest places and some evenly along the border
+costs
+
+    sum over corners ((pi/2 - turn) / (pi/2))²  +  sum over what is left (turn / (pi/2))²
+        +  SHAPE (ln² + ln²)  +  ASPECT ln²
+
+with turns outwards counted as they are, turns inwards not at all (a side may have those, a corner may not), and ln of
+the ratios of opposite sides, and of one pair of them to the other. The cheapest is taken. So a triangle gets its fourth
+corner on a side, a pentagon loses its bluntest, a disc is quartered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+
+SHAPE, ASPECT = 0.25, 0.05
+WINDOW = 0.02  # of the border, to each side, over which a turn is measured
+SHARP = np.radians(20.0)
+MOST_SHARP = 14
+EVENLY = 12  # further places to choose from
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Four corners of a closed border.
+
+    at    : (4,) int64, places of the border, counterclockwise, the first side the one with the least number
+    turn  : (4,) float64, rad, by which the border turns there, positive outwards
+    sharp : how many places of the border turn outwards by 20 degrees or more
+    cost  : unitless, of the choice
+    """
+
+    at: np.ndarray
+    turn: F64
+    sharp: int
+    cost: float
+
+    def sides(self, border: F64) -> tuple[F64, F64, F64, F64]:
+        """Bottom, right, top and left, each (k, d) float64 from corner to corner, of a border (n, d)."""
+        n = len(border)
+        out = []
+        for a, b in zip(self.at.tolist(), np.roll(self.at, -1).tolist(), strict=True):
+            out.append(border[np.arange(a, b + 1 if b > a else b + n + 1) % n])
+        return out[0], out[1], out[2], out[3]
+
+
+def find_corners(border: F64) -> Corners:
+    """The corners of a region.
+
+    border : (n, 2) float64, mm, closed, counterclockwise, the first place not repeated; n at least 4
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_border': fewer than four places, none without length, or clockwise.
+    """
+    around = np.vstack([border, border[:1]])
+    step = np.linalg.norm(np.diff(around, axis=0), axis=1)
+    area = 0.5 * float((around[:-1, 0] * around[1:, 1] - around[1:, 0] * around[:-1, 1]).sum())
+    if len(border) < 4 or not (step > 0.0).all() or not area > 0.0:
+        raise GeometryError(f"a border of {len(border)} places and {area:g} mm² is none: four places at least, "
+                            "no two alike, counterclockwise", code="bad_border", measured=area, limit=0.0)
+    way = np.concatenate([[0.0], np.cumsum(step)])
+    turn = _turns(around, way)
+    chosen = _candidates(turn, way)
+    best, cost = None, np.inf
+    at, sharp = way[chosen] / way[-1], turn[chosen]
+    total = float((np.maximum(sharp, 0.0) ** 2).sum())
+    for four in combinations(range(len(chosen)), 4):
+        f = np.array(four)
+        own = sharp[f]
+        here = float((((0.5 * np.pi - own) / (0.5 * np.pi)) ** 2).sum())
+        here += (total - float((np.maximum(own, 0.0) ** 2).sum())) / (0.5 * np.pi) ** 2
+        if here >= cost:
+            continue
+        length = np.diff(np.append(at[f], at[f[0]] + 1.0))
+        here += SHAPE * (np.log(length[0] / length[2]) ** 2 + np.log(length[1] / length[3]) ** 2)
+        here += ASPECT * np.log((length[0] + length[2]) / (length[1] + length[3])) ** 2
+        if here < cost:
+            best, cost = f, here
+    assert best is not None  # the places evenly along the border alone are enough
+    return Corners(chosen[best], turn[chosen[best]], int((turn[chosen] >= SHARP).sum()), float(cost))
+
+
+def _turns(around: F64, way: F64) -> F64:
+    """(n,) float64, rad: by how much the border turns about each place, over a window to both sides of it."""
+    total = way[-1]
+    long = np.concatenate([way[:-1] - total, way, way[1:] + total])
+    tour = np.vstack([around[:-1], around, around[1:]])
+
+    def place(s: F64) -> F64:
+        return np.column_stack([np.interp(s, long, tour[:, c]) for c in (0, 1)])
+
+    s = way[:-1]
+    back, ahead = place(s) - place(s - WINDOW * total), place(s + WINDOW * total) - place(s)
+    return np.arctan2(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], (back * ahead).sum(axis=1))
+
+
+def _candidates(turn: F64, way: F64) -> np.ndarray:
+    """Places to choose from, in order: the sharpest, each of its window, and some evenly along the border."""
+    total = way[-1]
+    out: list[int] = []
+    s = way[:-1]
+    for k in np.argsort(-turn, kind="stable"):
+        if turn[k] < SHARP or len(out) == MOST_SHARP:
+            break
+        apart = np.abs((s[k] - s[out] + 0.5 * total) % total - 0.5 * total) if out else np.array([total])
+        if apart.min() > 1.5 * WINDOW * total:
+            out.append(int(k))
+    first = s[out[0]] if out else 0.0  # so that it does not matter where the border begins
+    evenly = np.searchsorted(s, np.sort((first + np.arange(EVENLY) * total / EVENLY) % total)) % len(s)
+    for k in evenly.tolist():
+        apart = np.abs((s[k] - s[out] + 0.5 * total) % total - 0.5 * total) if out else np.array([total])
+        if apart.min() > WINDOW * total:
+            out.append(k)
+    if len(out) < 4:  # a border of few places
+        out = list(range(len(s)))
+    return np.array(sorted(set(out)))
