@@ -1,0 +1,254 @@
+"""A trimmed region of the parameters of a surface as pieces, each a smooth map of the unit square.
+
+1. Holes are filled: passes go over them, and what has nothing under it is left out where the passes are walked.
+2. A border that turns inwards sharply (an L, a slit) is cut there, straight across to the nearest border: no grid known
+   is free of folds at such a corner (docs/theory/isoparametric.md).
+3. Each piece gets its four corners (``geometry.corners``) and the first of these grids that does not fold: fronts from
+   two sides, fronts blended with Laplace's grid by a quarter, a half, three quarters, Laplace's, and the triangulated
+   piece laid into the square. Where all fold, turns in count that take more of the border, and it is cut there.
+What was filled, cut, tried and not taken is kept with each piece.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+import shapely
+from scipy.spatial import Delaunay
+from shapely.ops import split
+
+from geometry.corners import Corners, find_corners
+from geometry.embedding import embedded, grid_of
+from geometry.errors import GeometryError
+from geometry.fronts import interpolated
+from geometry.gridmap import GridMap
+from geometry.laplace import laplace
+from geometry.mesh import F64
+from geometry.quadgrid import Quad, even, evenness
+
+INWARDS = np.radians(50.0)  # a border that turns in by more is cut there
+NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a turn is measured: first, and if need be
+MOST_CUTS = 24
+BLENDS = (0.25, 0.5, 0.75)
+LEAST_PIECE = 1e-4  # of the region: what is cut off smaller is dust
+
+
+class Method(StrEnum):
+    """How a piece was laid into the unit square."""
+
+    FRONTS = "fronts"
+    BLEND = "blend"
+    LAPLACE = "laplace"
+    EMBEDDED = "embedded"
+
+
+@dataclass(frozen=True, eq=False)
+class Squared:
+    """A piece of a region over the unit square.
+
+    map      : GridMap to (u, v)
+    method   : Method
+    evenness : largest over smallest area of a cell, and distance of neighbouring lines across, unitless
+    corners  : (4, 2) float64, (u, v), counterclockwise from xi = eta = 0
+    notes    : what was filled, cut or not taken, with figures
+    """
+
+    map: GridMap
+    method: Method
+    evenness: tuple[float, float]
+    corners: F64
+    notes: tuple[str, ...]
+
+
+def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int, int] = (31, 41),
+            only: Method | None = None) -> list[Squared]:
+    """The pieces of a region.
+
+    loops : closed borders (k, 2) in (u, v), first place not repeated, the outer one first, either way round
+    scale : mm by 1 of u and of v, so that lengths in the plane are about those on the surface
+    shape : places of a grid along eta and along xi
+    only  : one method, for comparisons
+
+    Returns
+    -------
+    list of Squared
+        Xi runs along the longer sides.
+
+    Raises
+    ------
+    GeometryError
+        Code 'no_square': a piece folds whatever is tried; 'bad_border' for one that is none.
+    """
+    by = np.asarray(scale, dtype=np.float64)
+    notes = [f"{len(loops) - 1} holes filled"] if len(loops) > 1 else []
+    outer = shapely.Polygon(np.asarray(loops[0]) * by)
+    if not outer.is_valid or outer.area <= 0.0:
+        raise GeometryError("a border crosses itself or has no area", code="bad_border",
+                            measured=float(outer.area), limit=0.0, remedy="trim the face again")
+    out, todo = [], [(piece, 0) for piece in _cut(outer, NEAR[0])]
+    while todo:
+        piece, k = todo.pop(0)
+        try:
+            out.append(_laid(piece, by, shape, only, tuple(notes)))
+        except GeometryError as refusal:
+            parts = [piece]
+            while len(parts) == 1:
+                k += 1
+                if refusal.code != "no_square" or k == len(NEAR):
+                    raise
+                parts = _cut(piece, NEAR[k])
+            todo[:0] = [(part, k) for part in parts]
+    if len(out) > 1:
+        cut = f"cut into {len(out)} pieces where the border turns in by more than 50 degrees"
+        out = [replace(piece, notes=(cut, *piece.notes)) for piece in out]
+    return out
+
+
+def _ring(piece: shapely.Polygon) -> F64:
+    """(n, 2) border, mm, counterclockwise, no two places alike."""
+    ring = shapely.get_coordinates(shapely.geometry.polygon.orient(piece).exterior)[:-1]
+    apart = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1)
+    return np.asarray(ring[apart > 1e-9 * piece.length])
+
+
+def _even_ring(piece: shapely.Polygon, spacing: float) -> F64:
+    """The border with places no farther apart than ``spacing`` mm, those it has among them."""
+    ring = _ring(piece)
+    parts = [even(np.array([a, b]), int(np.ceil(np.linalg.norm(b - a) / spacing)) + 1)[:-1]
+             for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+    return np.vstack(parts)
+
+
+def _cut(region: shapely.Polygon, near: float) -> list[shapely.Polygon]:
+    """The region in pieces none of which turns in sharply; at most 24 cuts."""
+    done: list[shapely.Polygon] = []
+    todo = [region]
+    while todo:
+        piece = todo.pop()
+        cut = _chord(piece, near) if len(done) + len(todo) < MOST_CUTS else None
+        parts = [p for p in split(piece, cut).geoms if p.area > LEAST_PIECE * region.area] if cut is not None else []
+        if len(parts) < 2:
+            done.append(piece)
+        else:
+            todo.extend(parts)
+    return done
+
+
+def _chord(piece: shapely.Polygon, near: float) -> shapely.LineString | None:
+    """The shortest of the ways from the sharpest inward turn straight across: on along either side, or between."""
+    ring = _even_ring(piece, 0.25 * near * piece.length)
+    way = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    at = np.concatenate([[0.0], np.cumsum(way)])
+    long = np.concatenate([at[:-1] - at[-1], at, at[1:] + at[-1]])
+    tour = np.vstack([ring, ring, ring, ring[:1]])
+
+    def place(s: F64) -> F64:
+        return np.column_stack([np.interp(s, long, tour[:, c]) for c in (0, 1)])
+
+    back, ahead = ring - place(at[:-1] - near * at[-1]), place(at[:-1] + near * at[-1]) - ring
+    turn = np.arctan2(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], (back * ahead).sum(axis=1))
+    turn = np.where(turn > np.pi - 1e-6, -np.pi, turn)  # the tip of a slit
+    k = int(turn.argmin())
+    if turn[k] > -INWARDS:
+        return None
+    one, two = back[k] / np.linalg.norm(back[k]), -ahead[k] / np.linalg.norm(ahead[k])
+    best = None
+    for heading in (one, two, one + two):
+        length = np.linalg.norm(heading)
+        if length < 1e-6:
+            continue
+        heading = heading / length
+        start = ring[k]
+        beam = shapely.LineString([start + 1e-6 * at[-1] * heading, start + 2.0 * at[-1] * heading])
+        inside = shapely.intersection(beam, piece)
+        first = next((g for g in (inside.geoms if hasattr(inside, "geoms") else [inside])
+                      if g.length > 0 and shapely.Point(start).distance(g) < 1e-5 * at[-1]), None)
+        if first is not None and (best is None or first.length < best[0]):
+            end = start + (first.length + 2e-6 * at[-1]) * heading
+            best = (first.length, shapely.LineString([start - 1e-6 * at[-1] * heading, end]))
+    return None if best is None else best[1]
+
+
+def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method | None,
+          notes: tuple[str, ...]) -> Squared:
+    """One piece over the unit square, by the first grid that does not fold."""
+    m, n = shape
+    ring = _even_ring(piece, piece.length / 400.0)
+    corners = _along_the_longer(find_corners(ring), ring)
+    sides = corners.sides(ring)
+    quad = Quad.of(sides, n, m)
+    tried: list[str] = []
+    for method, blend in ((Method.FRONTS, 0.0), *((Method.BLEND, w) for w in BLENDS), (Method.LAPLACE, 1.0),
+                          (Method.EMBEDDED, 0.0)):
+        if only is not None and method is not only:
+            continue
+        try:
+            grid = _grid(method, blend, quad, piece, sides, shape)
+            mapped = GridMap.of(grid / by)
+        except GeometryError as refusal:
+            tried.append(f"{method}{f' {blend:g}' if method is Method.BLEND else ''}: {refusal}")
+            continue
+        return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / by,
+                       (*notes, *tried))
+    middle = (shapely.get_coordinates(piece.representative_point())[0] / by).tolist()
+    raise GeometryError(f"a piece of a region round uv {middle} folds whatever is tried: {'; '.join(tried)}",
+                        code="no_square", subjects=(f"uv {middle}",), measured=len(tried), limit=0,
+                        remedy="machine it by another strategy")
+
+
+def _along_the_longer(corners: Corners, ring: F64) -> Corners:
+    """The corners turned so that bottom and top are the longer sides."""
+    length = [float(np.linalg.norm(np.diff(s, axis=0), axis=1).sum()) for s in corners.sides(ring)]
+    if length[0] + length[2] >= length[1] + length[3]:
+        return corners
+    return Corners(np.roll(corners.at, -1), np.roll(corners.turn, -1), corners.sharp, corners.cost)
+
+
+def _grid(method: Method, blend: float, quad: Quad, piece: shapely.Polygon, sides: tuple[F64, F64, F64, F64],
+          shape: tuple[int, int]) -> F64:
+    """A grid (m, n, 2), mm, of a piece."""
+    if method is Method.EMBEDDED:
+        places, faces, rows = _triangulated(piece, sides, float(np.sqrt(piece.area)) / 60.0)
+        return grid_of(places, faces, embedded(places, faces, rows), shape[1], shape[0])
+    if method is Method.LAPLACE:
+        return laplace(quad)[0]
+    fronts = interpolated(quad)
+    return fronts if not blend else (1.0 - blend) * fronts + blend * laplace(quad)[0]
+
+
+def _triangulated(piece: shapely.Polygon, sides: tuple[F64, F64, F64, F64],
+                  spacing: float) -> tuple[F64, np.ndarray, tuple[np.ndarray, ...]]:
+    """Places (k, 2) mm, triangles (t, 3) and the places along each side of a piece, about ``spacing`` mm apart.
+
+    No edge joins two places of the border through the piece: where one did, it has a place half way.
+    """
+    border: list[F64] = []
+    rows = []
+    for side in sides:
+        length = np.linalg.norm(np.diff(side, axis=0), axis=1).sum()
+        line = even(side, max(3, int(np.ceil(length / spacing)) + 1))
+        rows.append(np.arange(len(border), len(border) + len(line)))
+        border += list(line[:-1])
+    count, edge = len(border), np.array(border)
+    region = shapely.Polygon(edge)
+    low, high = edge.min(axis=0), edge.max(axis=0)
+    x, y = np.meshgrid(np.arange(low[0], high[0], spacing), np.arange(low[1], high[1], 0.866 * spacing))
+    x[1::2] += 0.5 * spacing
+    lattice = np.column_stack([x.ravel(), y.ravel()])
+    places = np.vstack([edge, lattice[shapely.contains_xy(region.buffer(-0.5 * spacing), *lattice.T)]])
+    while True:
+        faces = Delaunay(places).simplices
+        middle = places[faces].mean(axis=1)
+        faces = faces[shapely.contains_xy(region, *middle.T)]
+        edges, shared = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
+                                  return_counts=True)
+        chords = edges[(edges < count).all(axis=1) & (shared == 2)]
+        if not len(chords):
+            break
+        places = np.vstack([places, places[chords].mean(axis=1)])
+    a, b, c = (places[faces[:, k]] for k in range(3))
+    over = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    faces[over] = faces[over][:, ::-1]
+    return places, faces, tuple(r % count for r in rows)
