@@ -6,8 +6,8 @@ that capsule is the chordal error there, overcut of the nose and stock left alik
     dev(P) = dist(P, segment C1 C2) - r,    C = P + r n
 
 That does not see a pass that bends sideways: by d the capsule leaves the contact only by d² / 2 r, while the ridge to
-the next pass, of height h, grows by d sqrt(h / 2 r). So ways aside count with that factor where a scallop is given. A
-step is as long as the greater of the two, the chordal error, allows. The circular-arc rule takes the curvature at the
+the next pass, of height h, grows by d sqrt(h / 2 r) for each of the two that does. So ways aside count with twice that
+where a scallop is given: the ridge grows by the tolerance at most. A step is as long as the greater of the two, the chordal error, allows. The circular-arc rule takes the curvature at the
 start of a step for that of the whole step, so past an inflection, or where a profile tightens, it leaves more than the
 tolerance.
 """
@@ -155,7 +155,7 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
 
 
 def _aside(radius: float, scallop: float) -> float:
-    return float(np.sqrt(scallop / (2.0 * radius)))
+    return float(np.sqrt(2.0 * scallop / radius))
 
 
 def errors(profile: Profile, ends: F64, radius: float, scallop: float = 0.0) -> F64:

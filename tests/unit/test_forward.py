@@ -93,7 +93,7 @@ def test_a_pass_that_bends_aside_is_followed_for_the_sake_of_the_ridge():
         return (50.0 * np.column_stack([np.cos(turn), np.sin(turn), 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1)))
 
     profile = Profile.of(curve, tolerance)
-    aside = tolerance / np.sqrt(scallop / (2 * RADIUS))
+    aside = tolerance / np.sqrt(2 * scallop / RADIUS)
     assert np.diff(steps(profile, RADIUS, tolerance, scallop))[:-1] == pytest.approx(np.sqrt(8 * 50 * aside), rel=2e-3)
     bare = np.sqrt((RADIUS + tolerance) ** 2 - RADIUS**2)
     assert np.diff(steps(profile, RADIUS, tolerance))[:-1] == pytest.approx(np.sqrt(8 * 50 * bare), rel=5e-3)

@@ -1,0 +1,256 @@
+"""Iso-parametric passes on trimmed surfaces: analogues of a published table, chords on exact surfaces, random trims.
+
+Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]``; without
+a flag all three. What is left is judged by ``verify.removal``, which shares no code with the passes. Seconds are wall
+clock of one run, compiled kernels: laying into the square, passes and steps together.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+import shapely  # noqa: E402
+
+from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
+from geometry.bvh import TriangleTree  # noqa: E402
+from geometry.errors import GeometryError  # noqa: E402
+from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
+from geometry.mesh import F64  # noqa: E402
+from geometry.nurbs import NurbsSurface  # noqa: E402
+from geometry.squaring import Method, Squared, squared  # noqa: E402
+from toolpath.cutter import Cutter  # noqa: E402
+from toolpath.drop_cutter import drop_cutter  # noqa: E402
+from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
+from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
+from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
+from toolpath.sidestep import lay_out as parallel  # noqa: E402
+from verify.removal import Moves, residual_on_normals  # noqa: E402
+
+RADIUS, SCALLOP = 5.0, 0.5
+SIZE = 200.0  # mm
+PLACES = 1000  # of the exact pass in each step
+PAPER = {("I", Method.LAPLACE): (9329, 566), ("I", Method.FRONTS): (9234, 412),
+         ("II", Method.LAPLACE): (9532, 617), ("II", Method.FRONTS): (9379, 461)}
+
+
+@dataclass(frozen=True, eq=False)
+class Trim:
+    """A surface and the border of a region of its parameters; scale, mm by 1 of u and v."""
+
+    surface: NurbsSurface
+    loops: tuple[F64, ...]
+    scale: tuple[float, float]
+
+
+def hills() -> NurbsSurface:
+    """Hollows and hills, about 270 mm by 290 mm."""
+    x, y = np.meshgrid(np.linspace(-40, 240, 7), np.linspace(-40, 260, 7), indexing="ij")
+    z = 12.0 * np.sin(x / 70) * np.cos(y / 60) + 0.0008 * (x - 100) ** 2
+    return NurbsSurface.from_control_points(np.stack([x, y, z], -1), 4)
+
+
+def case(name: str) -> Trim:
+    """I: four smooth sides that swing the same way. II: a bump into it from below, a notch in its top."""
+    t = np.linspace(0.0, 1.0, 401)
+
+    def hill(at: float, wide: float) -> F64:
+        h = np.exp(-(((t - at) / wide) ** 2))
+        return np.asarray(h - h[0] * (1 - t) - h[-1] * t)
+
+    swing = 0.06 * np.sin(np.pi * t)
+    if name == "I":
+        bottom, top = swing, 1.0 + swing
+        right, left = 1.0 + swing, swing
+    else:
+        bottom, top = 0.2 * hill(0.5, 0.12), 1.0 - 0.17 * hill(0.35, 0.1)
+        right, left = 1.0 + swing, -swing
+    sides = [np.column_stack([t, bottom]), np.column_stack([right, t]), np.column_stack([t, top])[::-1],
+             np.column_stack([left, t])[::-1]]
+    surface = hills()
+    low, high = surface.domain
+    border = SIZE * np.vstack([s[:-1] for s in sides])
+    return Trim(surface, (low + (border + 30.0) / 260.0 * (high - low),), (260.0 / (high - low)[0],) * 2)
+
+
+def passes_of(piece: Squared, surface: NurbsSurface, radius: float, scallop: float, chord: float,
+              kept: float) -> tuple[list[F64], float]:
+    """Tips (n, 3) of each pass over a piece, mm, and their length in all; kept : mm of scallop to lay out for."""
+    iso, out, way = IsoSurface(surface, piece.map), [], 0.0
+    for eta in lay_out(iso, radius, kept).tolist():
+        profile = Profile.of(iso.curve(eta), chord)
+        out.append(profile.centres(steps(profile, radius, chord, scallop), radius) - [0.0, 0.0, radius])
+        way += profile.length
+    return out, way
+
+
+def left_by(lines: list[F64], points: F64, normals: F64, radius: float) -> F64:
+    """(n,) mm left on normals after passes, by the verifier."""
+    start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
+    moves = Moves(start, end, np.ones(len(start), np.bool_), np.zeros(len(start), np.int32))
+    return residual_on_normals(points, normals, np.full(len(points), 10.0), moves, [ball(radius)])[0]
+
+
+def places(trim: Trim, spacing: float) -> tuple[F64, F64]:
+    """Points and normals (n, 3) of the region on a lattice of parameters about ``spacing`` mm apart, holes left out."""
+    region = shapely.Polygon(trim.loops[0], [q for q in trim.loops[1:]])
+    low, high = trim.loops[0].min(axis=0), trim.loops[0].max(axis=0)
+    count = np.ceil((high - low) * trim.scale / spacing).astype(int) + 1
+    uv = np.stack(np.meshgrid(*(np.linspace(a, b, c) for a, b, c in zip(low, high, count, strict=True))), -1)
+    uv = uv.reshape(-1, 2)
+    uv = uv[shapely.contains_xy(region, *uv.T)]
+    return trim.surface.points_and_normals(uv)
+
+
+def plane_parallel(trim: Trim) -> tuple[int, float, float]:
+    """Passes in planes along x: how many, their length in mm, and seconds."""
+    spacing = 0.1 * np.sqrt(8.0 * RADIUS * SCALLOP)
+    points, normals = places(trim, spacing)
+    large = steps_for_chord(trim.surface, 0.05)
+    facet_deviation(trim.surface, trim.surface.discretised(*large))
+    tree = TriangleTree(trim.surface.discretised(large[0] / 3.0, large[1] / 3.0))
+    cutter = Cutter.ball(diameter=2.0 * RADIUS, length=20.0)
+    target = Target(points, normals, points + RADIUS * normals - [0.0, 0.0, RADIUS], spacing)
+    begin = time.perf_counter()
+    made = parallel(Swath(Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree), target,
+                          Promise(SCALLOP, SCALLOP, 0.3 * RADIUS, 10.0), 0.0), subdivide=False)
+    way = sum(float(np.linalg.norm(np.diff(q, axis=0), axis=1).sum()) for p in made for q in p.lines)
+    return len(made), way, time.perf_counter() - begin
+
+
+def cases() -> None:
+    """The table of the paper on analogues of its two cases."""
+    print(f"ball of {RADIUS} mm, scallop and chord {SCALLOP} mm; left at chord 0.005 mm, borders included")
+    print(f"{'case':5} {'method':15} {'passes':>6} {'length mm':>10} {'points':>7} {'s':>6} {'area':>6} {'space':>6} "
+          f"{'max left':>9} {'gouge':>7}   paper: mm, s")
+    for name in ("I", "II"):
+        trim = case(name)
+        points, normals = places(trim, 0.7)
+        for method in (Method.LAPLACE, Method.FRONTS, Method.EMBEDDED):
+            begin = time.perf_counter()
+            (piece,) = squared(trim.loops, trim.scale, only=method)
+            lines, way = passes_of(piece, trim.surface, RADIUS, SCALLOP, SCALLOP, SCALLOP)
+            seconds = time.perf_counter() - begin
+            fine, _ = passes_of(piece, trim.surface, RADIUS, SCALLOP, 0.005, SCALLOP - 0.005)
+            left = left_by(fine, points, normals, RADIUS)
+            paper = PAPER.get((name, method))
+            print(f"{name:5} {method:15} {len(lines):6d} {way:10.0f} {sum(len(q) for q in lines):7d} {seconds:6.2f} "
+                  f"{piece.evenness[0]:6.2f} {piece.evenness[1]:6.2f} {left.max():9.4f} {max(-left.min(), 0):7.4f}   "
+                  f"{f'{paper[0]}, {paper[1]}' if paper else '-'}", flush=True)
+        count, way, seconds = plane_parallel(trim)
+        print(f"{name:5} {'plane-parallel':15} {count:6d} {way:10.0f} {'':7} {seconds:6.2f}", flush=True)
+
+
+def exact_errors(iso: IsoSurface, eta: float, t: F64, radius: float) -> F64:
+    """(n - 1,) mm: the greatest |dev| of each step between parameters (n,) at 1000 places of the exact surface."""
+    curve, out = iso.curve(eta), []
+    for a, b in zip(t[:-1].tolist(), t[1:].tolist(), strict=True):
+        p, n = curve(np.linspace(a, b, PLACES))
+        c, d = p[0] + radius * n[0], p[-1] + radius * n[-1] - p[0] - radius * n[0]
+        s = np.clip((p - c) @ d / (d @ d), 0.0, 1.0)
+        out.append(float(np.abs(np.linalg.norm(p - c - s[:, None] * d, axis=1) - radius).max()))
+    return np.array(out)
+
+
+def chords() -> None:
+    """Chordal errors on the exact surface: ours and the circular-arc rule's."""
+    print(f"\nchordal error over the tolerance, {PLACES} places a step, end steps aside")
+    print(f"{'e':>6} {'rule':12} {'steps':>6} {'most':>8} {'mean':>8} {'over 1.001':>10}")
+    trim = case("I")
+    (piece,) = squared(trim.loops, trim.scale)
+    iso = IsoSurface(trim.surface, piece.map)
+    for tolerance in (0.5, 0.05, 0.005):
+        for name in ("ours", "arc"):
+            off: list[F64] = []
+            total = 0
+            for eta in np.linspace(0.0, 1.0, 12).tolist():
+                profile = Profile.of(iso.curve(eta), tolerance)
+                ends = steps(profile, RADIUS, tolerance) if name == "ours" else arc_rule(profile, RADIUS, tolerance)
+                whole = np.diff(ends) < 39.99
+                whole[-1] = False
+                off.append((exact_errors(iso, eta, profile.parameters(ends), RADIUS) / tolerance)[whole])
+                total += len(ends) - 1
+            every = np.concatenate(off)
+            print(f"{tolerance:6} {name:12} {total:6d} {every.max():8.4f} {every.mean():8.4f} "
+                  f"{(every > 1.001).sum():10d}", flush=True)
+
+
+def random_trim(seed: int) -> Trim:
+    """A random surface of 24 mm with a random region of 3 to 8 corners; every third has a hole."""
+    rng = np.random.default_rng(seed)
+    surface = random_surface(seed)
+    low, high = surface.domain
+    n = 3 + seed % 6
+    turn = np.sort((np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n * 2.0 * np.pi)
+    reach = rng.uniform(0.22, 0.46, n)
+    corners = 0.5 + reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    border = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        t = np.linspace(0.0, 1.0, 41)[:-1, None]
+        away = np.array([b[1] - a[1], a[0] - b[0]]) * rng.uniform(-0.12, 0.12)
+        border.append(a + t * (b - a) + np.sin(np.pi * t) * away)
+    loops = [np.vstack(border)]
+    if seed % 3 == 0:
+        t = np.linspace(0.0, 2.0 * np.pi, 41)[:-1]
+        loops.append(0.5 + 0.06 * np.column_stack([np.cos(t), -np.sin(t)]))
+    uv = low + loops[0] * (high - low)
+    d = surface.derivatives(uv)
+    return Trim(surface, tuple(low + q * (high - low) for q in loops),
+                (float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())))
+
+
+def trims(count: int) -> None:
+    """Random trims: a ball that fits, scallop 0.01 mm, chord 0.002 mm."""
+    scallop, chord = 0.01, 0.002
+    print(f"\nrandom trims: ball that fits everywhere, 3 mm at most; scallop {scallop}, chord {chord} mm")
+    print(f"{'seed':>4} {'corners':>7} {'hole':>4} {'pieces':>6} {'methods':24} {'R':>5} {'passes':>6} {'max left':>9} "
+          f"{'gouge':>8} {'s':>6}")
+    worst, deep, failed = 0.0, 0.0, 0
+    for seed in range(count):
+        trim = random_trim(seed)
+        points, normals = places(trim, 0.06)
+        tight = -float(trim.surface.curvature(trim.loops[0])[:, 0].min())
+        uv = np.stack(np.meshgrid(*(np.linspace(a, b, 80) for a, b in zip(*trim.surface.domain, strict=True))), -1)
+        tight = max(tight, -float(np.nanmin(trim.surface.curvature(uv.reshape(-1, 2))[:, 0])), 1e-3)
+        radius = min(3.0, 0.9 / tight)
+        begin = time.perf_counter()
+        try:
+            pieces = squared(trim.loops, trim.scale)
+        except GeometryError as refusal:
+            failed += 1
+            print(f"{seed:4d} {3 + seed % 6:7d} failed: {refusal}")
+            continue
+        lines = [q for piece in pieces
+                 for q in passes_of(piece, trim.surface, radius, scallop, chord, scallop - chord)[0]]
+        seconds = time.perf_counter() - begin
+        left = left_by(lines, points, normals, radius)
+        worst, deep = max(worst, float(left.max())), max(deep, float(-left.min()))
+        print(f"{seed:4d} {3 + seed % 6:7d} {len(trim.loops) - 1:4d} {len(pieces):6d} "
+              f"{' '.join(p.method for p in pieces):24} {radius:5.2f} {len(lines):6d} {left.max():9.5f} "
+              f"{max(-left.min(), 0):8.5f} {seconds:6.2f}", flush=True)
+    print(f"most left {worst:.5f}, deepest gouge {deep:.5f} mm, {failed} failed of {count}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", action="store_true")
+    parser.add_argument("--chords", action="store_true")
+    parser.add_argument("--trims", type=int, default=0)
+    args = parser.parse_args()
+    every = not (args.cases or args.chords or args.trims)
+    if args.cases or every:
+        cases()
+    if args.chords or every:
+        chords()
+    if args.trims or every:
+        trims(args.trims or 50)
+
+
+if __name__ == "__main__":
+    main()
