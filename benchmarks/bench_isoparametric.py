@@ -1,8 +1,8 @@
 """Iso-parametric passes on trimmed surfaces: analogues of a published table, chords on exact surfaces, random trims.
 
-Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]``; without
-a flag all three. What is left is judged by ``verify.removal``, which shares no code with the passes. Seconds are wall
-clock of one run, compiled kernels: laying into the square, passes and steps together.
+Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]``;
+without a flag all three. What is left is judged by ``verify.removal``, which shares no code with the passes. Seconds
+are wall clock of one run, compiled kernels: laying into the square, passes and steps together.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ that capsule is the chordal error there, overcut of the nose and stock left alik
 
 That does not see a pass that bends sideways: by d the capsule leaves the contact only by d² / 2 r, while the ridge to
 the next pass, of height h, grows by d sqrt(h / 2 r) for each of the two that does. So ways aside count with twice that
-where a scallop is given: the ridge grows by the tolerance at most. A step is as long as the greater of the two, the chordal error, allows. The circular-arc rule takes the curvature at the
-start of a step for that of the whole step, so past an inflection, or where a profile tightens, it leaves more than the
-tolerance.
+where a scallop is given: the ridge grows by the tolerance at most. A step is as long as the greater of the two, the
+chordal error, allows. The circular-arc rule takes the curvature at the start of a step for that of the whole step, so
+past an inflection, or where a profile tightens, it leaves more than the tolerance.
 """
 
 from __future__ import annotations
