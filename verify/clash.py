@@ -18,11 +18,13 @@ from verify.stockpass import event_table, free_rapids, gather, noted
 from verify.toolaxes import ToolAxes
 
 FIXTURE_SPACING = 0.25
+DIP = 0.005  # mm: between points p apart a ball of R is in a fixture by p² / 4 R at most before it meets one
 MOST_FIXTURE_POINTS = 1_500_000
 
 
 def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> F64:
-    """Points on the faces of the fixtures where a tool may come near, at most 0.25 mm and half a tool radius apart.
+    """Points on the faces of the fixtures where a tool may come near, at most 0.25 mm apart, and closer
+    for fine tools: half a radius, and so that no ball dips 0.005 mm in between them.
 
     bounds : (2, 3) float64, mm, of the part; a fixture stands down to its underside, or lower where it begins lower
     moves, tools : what is farther from every tip than the longest tool reaches is left out
@@ -46,7 +48,7 @@ def fixture_spacing(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequenc
     """mm between the points of ``fixture_points``; bounds (2, 3) float64, mm."""
     area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in
                (high - low for low, high, _ in _near_boxes(setup, bounds, moves, tools)))
-    least = min((0.5 * t.radius for t in tools), default=FIXTURE_SPACING)
+    least = min((min(0.5 * t.radius, 2.0 * (DIP * t.radius) ** 0.5) for t in tools), default=FIXTURE_SPACING)
     return max(min(FIXTURE_SPACING, least), (area / MOST_FIXTURE_POINTS) ** 0.5)
 
 

@@ -31,6 +31,7 @@ from verify.toolaxes import ToolAxes
 F32 = NDArray[np.float32]
 MOST_NODES = 24_000_000
 TILE = 64
+WHOLE, LEAST_NODES = 0.85, 4.0  # of the end, and nodes: what stands on stock is known no better
 SLAB = 8
 
 
@@ -151,8 +152,9 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     Notes
     -----
     Plunge: the volume that a steep descent takes off within the end-cutting region, over the area that region goes
-    over, is the mean depth it dug, and where in the region it lay says how much deeper its middle is than its rim; so
-    a round end has its full depth, which is told. Both add up over the moves, way made aside works them off at the
+    over (straight down: that part of it which stands on stock then, where that is not all), is the mean depth it dug,
+    and where in the region it lay says how much deeper its middle is than its rim; so a round end has its full depth,
+    which is told. Both add up over the moves, way made aside works them off at the
     slope of a ramp, and what was dug where the region no longer stands is another hole.
     """
     cutters, ends = cutter_table(tools), end_radii(tools)
@@ -160,7 +162,7 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     axes = moves.axes or ToolAxes.upright(len(moves))
     reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
     start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
-    sums, spare = tables_for(threads, (len(moves), 4))
+    sums, spare = tables_for(threads, (len(moves), 5))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
@@ -176,7 +178,11 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce([t[:, 2] for t in sums])
     end = ends[moves.tool]
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
-    over = (np.pi * end**2 + 2.0 * end * aside)[:, None]
+    over = (np.pi * end**2 + 2.0 * end * aside)
+    stands = taken[:, 4] / VOLUME_UNITS
+    # straight down beside an edge only what stands on stock has dug; a few nodes alone do not say how much that is
+    partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > LEAST_NODES * field.step**2)
+    over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 3]] / VOLUME_UNITS / over, end, earned,
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)

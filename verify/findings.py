@@ -68,7 +68,7 @@ def contact_findings(events: F64, feed: NDArray[np.bool_], source: Source, rapid
         out.append(Finding(kind, source.names[source.program[m]], int(source.line[m]), None, None,
                            _point(events[r, 4:7]), depth if kind == FindingKind.PLUNGE else max(depth - clearance, 0.0)
                            if depth > clearance else clearance - depth, limit,
-                           f"T{source.tool[m]}: {text}{_span(lines)}", len(rows)))
+                           f"T{source.tool[m]}: {text}{_span(lines)}", len(rows), near=depth <= clearance))
     return out
 
 
@@ -139,7 +139,8 @@ def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str,
     counts: dict[str, int] = {}
     for f in findings:
         counts[str(f.kind)] = counts.get(str(f.kind), 0) + 1
-    by_grade = sorted(findings, key=lambda f: (rank[f.kind], -abs(f.depth), f.program, f.line, f.face or ""))
+    by_grade = sorted(findings, key=lambda f: (rank[f.kind], f.near, f.depth if f.near else -abs(f.depth), f.program,
+                                               f.line, f.face or ""))
     seen: dict[str, int] = {}
     sure: list[int] = []
     more: list[int] = []

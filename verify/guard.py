@@ -18,6 +18,7 @@ from verify.progress import Report, silent
 GUARD_SPACING = 0.18
 GUARD_MOST = 1_000_000
 EDGE_SPACING = 0.1
+INSET = 1e-3  # mm, of the ends of edges
 SHARP = math.radians(20.0)
 DEPTH_BATCH = 2048  # rays between two reports
 CLOSER_REACH, CLOSER_STEP = 0.15, 0.02
@@ -54,7 +55,7 @@ def guard_notes(mesh: TriangleMesh, left_out: int = 0) -> list[str]:
 
 
 def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:
-    """Points along the sharp convex edges of a mesh, for gouges that slip between surface samples.
+    """Points along the sharp convex edges of a mesh, and its tips, for what slips between surface samples.
 
     Returns points (n, 3) float64 mm, unit bisectors of the two normals (n, 3), and a face number (n,) int32.
     Sharp means more than 20 degrees between the normals.
@@ -77,10 +78,40 @@ def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64
     length = np.linalg.norm(middle, axis=1)
     keep = length > 1e-6
     p, q, middle, a = p[keep], q[keep], middle[keep] / length[keep, None], a[keep]
-    count = np.maximum(np.ceil(np.linalg.norm(q - p, axis=1) / spacing).astype(int), 1)
+    count = np.maximum(np.ceil(np.linalg.norm(q - p, axis=1) / spacing).astype(int), 1) + 1
     row = np.repeat(np.arange(len(p)), count)
-    f = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
-    return p[row] + f[:, None] * (q - p)[row], middle[row], mesh.face_ids[a[row]]
+    f = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)) / (count[row] - 1)
+    # not on the end itself: the ray of a standing edge would run in the face on top, where cuts end
+    f = np.clip(f, *(np.array([[1.0], [-1.0]]) * INSET / np.maximum(np.linalg.norm(q - p, axis=1)[row], 4.0 * INSET)
+                     + np.array([[0.0], [1.0]])))
+    at, up, face = _tips(mesh, same.reshape(-1))
+    return (np.concatenate([p[row] + f[:, None] * (q - p)[row], at]), np.concatenate([middle[row], up]),
+            np.concatenate([mesh.face_ids[a[row]], face]))
+
+
+def _tips(mesh: TriangleMesh, same: NDArray[np.int64]) -> tuple[F64, F64, I32]:
+    """Vertices at which the part comes to a point, as ``convex_edges`` has points: a cone's has no sharp edges.
+
+    same : (v,) int64, number of the place of each vertex
+    """
+    corners, count = same[mesh.faces], int(same.max(initial=-1)) + 1
+    place = np.zeros((count, 3))
+    place[same] = mesh.vertices
+    up = np.zeros((count, 3))
+    for k in range(3):
+        np.add.at(up, corners[:, k], mesh.normals)
+    up /= np.maximum(np.linalg.norm(up, axis=1), 1e-300)[:, None]
+    lean, high = np.ones(count), np.full(count, -np.inf)
+    owner = np.zeros(count, np.int64)
+    for k in range(3):
+        c = corners[:, k]
+        np.minimum.at(lean, c, np.einsum("ij,ij->i", up[c], mesh.normals))
+        for j in (1, 2):
+            away = place[corners[:, (k + j) % 3]] - place[c]
+            np.maximum.at(high, c, np.einsum("ij,ij->i", away, up[c]))
+        owner[c] = np.arange(len(c))
+    tip = np.flatnonzero((lean < math.cos(SHARP)) & (high < 0.0))
+    return place[tip], up[tip], mesh.face_ids[owner[tip]]
 
 
 def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F64, int]:

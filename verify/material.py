@@ -14,7 +14,7 @@ from verify.clash import fixture_points, run_clashes
 from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
 from verify.fitness import top_of_all
-from verify.kernels.stock import FIXTURE, HOLDER, NECK, SHANK
+from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import ProofSetup, StockKind
 from verify.progress import Report, Stages
 from verify.removal import Moves
@@ -53,10 +53,11 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     spacing = stock_spacing(setup, moves, tools)
     if setup.dogleg:
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
-    upright = moves.axes is None
+    upright, dug = moves.axes is None, np.zeros((0, 7))
     if upright:
         run, spacing = _lines(mesh, spacing, moves, tools, setup, threads, stages.span(0.0, 0.6))
         upright = not _undercuts(run, moves, setup)
+        dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # line by line they are known better
         moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
     held = fixture_points(setup, mesh.bounds, moves, tools)
     if upright:
@@ -71,7 +72,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=stages.span(0.7, 1.0))
-        spacing = field.step
+        met, spacing = np.concatenate([met, dug]), field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright)
 
 

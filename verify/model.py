@@ -123,7 +123,8 @@ class Finding:
     line  : 1-based line of the program, 0 where no line is to blame (material that stayed)
     zone, face : ids, or None
     point : mm, where it is worst
-    depth : mm (rad for a plunge angle is in the message), how bad; limit : what would have been allowed
+    depth : mm, how bad; limit : what would have been allowed
+    near  : nothing touches, and the depth is how near it comes
     count : places folded in; area : mm² of samples folded in, 0 where none
     """
 
@@ -138,6 +139,7 @@ class Finding:
     message: str
     count: int = 1
     area: float = 0.0
+    near: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None}
@@ -190,7 +192,7 @@ class FaceProof:
 class Proof:
     """The answer.
 
-    findings : gravest first, at most 200, the 25 gravest of each kind among them; counts : all there are of each kind
+    findings : gravest first, at most 200, the 22 gravest of each kind among them; counts : all there are of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
     line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
     proved   : (n,) bool, inside the budget

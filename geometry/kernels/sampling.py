@@ -2,26 +2,30 @@
 
 Notation
     h          : mm between the lines of the lattice, which lies square to the axis, shifted by ``SHIFT`` h from 0
-    u, v, w    : the two coordinates across the axis and the one along it
+    u, v       : the two coordinates across the axis, turned by the angle whose tangent is the golden section: what is
+                 long and narrow on a part mostly lies along X, Y or Z, and there such a lattice leaves no wide gaps
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from geometry.kernels.options import KERNEL
 
 SHIFT = 0.381966  # of h: edges of parts stand on round numbers, and lattice lines should not
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+COSINE, SINE = 1.0 / math.sqrt(1.0 + GOLDEN**2), GOLDEN / math.sqrt(1.0 + GOLDEN**2)
 OVER = 1e-9  # of h, by which triangles count beyond their edges
 ALIKE = 0.9  # of the largest part of a normal: along such an axis a lattice is laid, too, so that none ends at a seam
 
 
 @njit(**KERNEL)
-def _across(t, axis, u):
-    """First and last v at which the line of this u crosses a triangle (3, 3); first > last where it passes by."""
-    a, b = (axis + 1) % 3, (axis + 2) % 3
+def _across(t, u):
+    """First and last v at which the line of this u crosses a triangle (3, 2); first > last where it passes by."""
+    a, b = 0, 1
     lo, hi = math.inf, -math.inf
     for k in range(3):
         p, q = t[k], t[(k + 1) % 3]
@@ -45,6 +49,7 @@ def lattice_places(triangles, normals, h, out, area, owner):
     Returns how many there are, which may exceed n.
     """
     count = 0
+    turned = np.empty((3, 2))
     for m in range(len(triangles)):
         t, n = triangles[m], normals[m]
         least = ALIKE * max(abs(n[0]), abs(n[1]), abs(n[2]))
@@ -55,17 +60,21 @@ def lattice_places(triangles, normals, h, out, area, owner):
             if not 0.0 < least <= abs(n[axis]):
                 continue
             a, b = (axis + 1) % 3, (axis + 2) % 3
-            low, high = min(t[0, a], t[1, a], t[2, a]), max(t[0, a], t[1, a], t[2, a])
+            for k in range(3):
+                turned[k, 0] = COSINE * t[k, a] + SINE * t[k, b]
+                turned[k, 1] = COSINE * t[k, b] - SINE * t[k, a]
+            low, high = min(turned[0, 0], turned[1, 0], turned[2, 0]), max(turned[0, 0], turned[1, 0], turned[2, 0])
             for i in range(math.ceil(low / h - SHIFT), math.floor(high / h - SHIFT) + 1):
                 u = (i + SHIFT) * h
-                lo, hi = _across(t, axis, u)
+                lo, hi = _across(turned, u)
                 if lo > hi:
                     continue
                 for j in range(math.ceil(lo / h - SHIFT - OVER), math.floor(hi / h - SHIFT + OVER) + 1):
                     if count < len(out):
                         v = (j + SHIFT) * h
-                        out[count, a], out[count, b] = u, v
-                        out[count, axis] = t[0, axis] - (n[a] * (u - t[0, a]) + n[b] * (v - t[0, b])) / n[axis]
+                        x, y = COSINE * u - SINE * v, SINE * u + COSINE * v
+                        out[count, a], out[count, b] = x, y
+                        out[count, axis] = t[0, axis] - (n[a] * (x - t[0, a]) + n[b] * (y - t[0, b])) / n[axis]
                         area[count], owner[count] = h * h / (abs(n[axis]) * laid), m
                     count += 1
     return count

@@ -41,11 +41,21 @@ def body_depth(rho, h, row, grow, slack, off):
 
 
 def cutter_depth(rho, h, tool, grow, slack, off):
-    """The same for the cutting part."""
-    bare = -signed(rho, h, tool).min(axis=-1) + off
-    grown = replace(tool, diameter=tool.diameter + 2.0 * grow)
-    near = -signed(rho, h, grown).min(axis=-1) + off if grow > 0.0 else np.zeros(len(rho))
-    return np.where(bare > slack, grow + bare, np.where(near > slack, np.minimum(near, grow), 0.0))
+    """The same for the cutting part; how near it comes is how much wider it would have to be."""
+    def deep(row, wider):
+        return -signed(rho[row], h[row], replace(tool, diameter=tool.diameter + 2.0 * wider)).min() + off
+
+    out = np.zeros(len(rho))
+    for row, s in enumerate(np.broadcast_to(slack, len(rho)).tolist()):
+        if deep(row, 0.0) > s:
+            out[row] = grow + deep(row, 0.0)
+        elif grow > 0.0 and deep(row, grow) > s:
+            free, hits = 0.0, grow
+            for _ in range(20):
+                wider = 0.5 * (free + hits)
+                free, hits = (free, wider) if deep(row, wider) > s else (wider, hits)
+            out[row] = grow - max(hits - s, 0.0)
+    return out
 
 
 def twin(points, fixed, moves, tool, setup, off):

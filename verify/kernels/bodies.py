@@ -26,6 +26,8 @@ def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bo
     y1 = min(cy1 - 1, math.floor((max(a[1], a[1] + d[1]) + wide - origin[1]) / size))
     low = max(0, math.floor((min(a[2], a[2] + d[2]) + z0 - origin[2]) / size))
     high = min(shape[2] - 1, math.floor((max(a[2], a[2] + d[2]) + z1 - origin[2]) / size))
+    if high < low:
+        return
     plan2 = d[0] * d[0] + d[1] * d[1]
     half = 0.5 * math.sqrt(2.0) * size
     for cx in range(x0, x1 + 1):

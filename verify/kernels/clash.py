@@ -15,7 +15,7 @@ from numba import njit
 from geometry.kernels.options import KERNEL
 from verify.kernels.frustum import contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
-from verify.kernels.profile import carried
+from verify.kernels.profile import beside, carried
 from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse, known_depth
 
 TOUCHING = 1e-3
@@ -56,8 +56,7 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
     bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
     if bare > slack:
         return grow + bare
-    near = -carried(qx, qy, qz, dx, dy, dz, a + grow, r, length) if grow > 0.0 else 0.0
-    return min(near, grow) if near > slack else 0.0
+    return grow - beside(qx, qy, qz, dx, dy, dz, a, r, length, 0.0, grow, slack) if known < grow else 0.0
 
 
 @njit(**KERNEL)

@@ -25,12 +25,13 @@ from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.frustum import contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
-from verify.kernels.profile import carried
+from verify.kernels.profile import beside, carried
 from verify.kernels.rays import gap, plan_distance
 from verify.kernels.stock import CUTTER, _note, _worse, known_depth
 
 LEAST_CUT = 1e-5
-RISE = 0.1  # of the flutes: a tool goes up no further between two looks at its bodies
+RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
+MOST_LOOKS = 128
 VOLUME_UNITS = 1e9
 
 
@@ -80,8 +81,8 @@ def _box(p, z0, z1, wide):
 def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, totals):
     """Lower the nodes of one brick by piece p.
 
-    totals : added to: volume, volume by the end, 1 where stock was touched, and the end's volume times the square of
-             how far from the middle of the end it was, as a share of its radius
+    totals : added to: volume, volume by the end, 1 where stock was touched, the end's volume times the square of
+             how far from the middle of the end it was, as a share of its radius, and the area on which it stands then
 
     Returns the new top and the sectors of the cutter that met stock.
     """
@@ -99,6 +100,9 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                         top = max(top, v)
                         continue
                     d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length), -band)
+                    if steep and 0.0 < d <= h and v > 0.0 and qz - dz <= r:
+                        off = math.sqrt((qx - dx) ** 2 + (qy - dy) ** 2)
+                        totals[4] += h * h * min(max(0.5 + (end_radius - off) / h, 0.0), 1.0)
                     if d < v - LEAST_CUT:
                         field[i, j, k] = d
                         gone = (share(v, h) - share(d, h)) * h * h * h
@@ -187,10 +191,9 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                             if is_cutter:
                                 bare = v - carried(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1], cutter[1], cutter[2])
                                 depth = grow + bare if bare > slack else 0.0
-                                if depth == 0.0 and grow > 0.0:
-                                    near = v - carried(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1] + grow, cutter[1],
-                                                       cutter[2])
-                                    depth = min(near, grow) if near > slack else 0.0
+                                if depth == 0.0 and known_depth(best, code, grow) < grow:
+                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1], cutter[1],
+                                                          cutter[2], v, grow, slack)
                             else:
                                 # the ball of radius v round the node is stock
                                 depth = contact_of_ball(qx, qy, qz, dx, dy, dz, z0, z1, body[2] + grow, body[3] + grow,
@@ -233,6 +236,17 @@ def _beside(seen, z0, z1, wide):
 
 
 @njit(**KERNEL)
+def _look(field, tops, solid, tile, h, origin, p, bodies, first, stop, cutter, seen, feed, free, grow, slack, best):
+    """Find the stock of a tile that neck, shank and holder of a tool take in on piece p."""
+    for b in range(first, stop):
+        extra = 0.0 if feed else -bodies[b, 4] if free else grow - min(grow, bodies[b, 4])
+        if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
+            continue
+        loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter[0] + 1e-9 else TOUCHING
+        _meet(field, tops, solid, tile, h, origin, p, bodies[b], False, cutter, extra, loose, best)
+
+
+@njit(**KERNEL)
 def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, free, steep, tool, cutters,
                ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
     """Work all moves in order through the nodes of one tile, in place.
@@ -241,17 +255,17 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
     free  : (m,) bool, rapids that no clearance is asked of
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
-    taken : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
+    taken : (m, 5) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
             so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went;
             third the sectors of the cutter that met stock, put together bit by bit; fourth what the end does times
-            the square of the share of its radius it is from the middle
+            the square of the share of its radius it is from the middle; fifth 1e-9 mm² of stock right under the end
 
     Returns the number of events found, which may exceed the table.
     """
     tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
     solid = np.zeros(6, np.int64)
     changing = _solid(tops, band, solid)
-    best, piece, totals = np.zeros((16, 5)), np.empty(PIECE), np.zeros(4)
+    best, trial, piece, totals = np.zeros((16, 5)), np.zeros((16, 5)), np.empty(PIECE), np.zeros(5)
     rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
     sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
     cx, cy = origin[0] + tile[0] * h + 0.5 * sx, origin[1] + tile[2] * h + 0.5 * sy
@@ -269,10 +283,19 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         if feed and not is_lift(angle[m], axis[m], starts[m], ends[m]):
-            # flutes that come up past a place must not have cut it when the neck was there: cut and look by turns
+            # flutes that come up past a place must not have cut it when the neck was there: where bodies meet what
+            # stood before the move, cut and look by turns
             rise = (ends[m, 0] - starts[m, 0]) * axis[m, 0] + (ends[m, 1] - starts[m, 1]) * axis[m, 1] \
                 + (ends[m, 2] - starts[m, 2]) * axis[m, 2]
-            n = max(n, math.ceil(rise / (RISE * cutters[k, 2])))
+            if rise > RISE:
+                trial[:] = 0.0
+                for part in range(n):
+                    fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
+                    seen = _seen_tile(piece, cx, cy, cz, rad + band)
+                    _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1],
+                          cutters[k], seen, True, False, 0.0, slack, trial)
+                if trial[:, 0].max() > 0.0:
+                    n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MOST_LOOKS))
         totals[:] = 0.0
         sectors = np.int64(0)
         for part in range(n):
@@ -284,17 +307,13 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
                 sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
             elif near:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
-            for b in range(body_first[k], body_first[k + 1]):
-                extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
-                if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
-                    continue
-                beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
-                _meet(field, tops, solid, tile, h, origin, piece, bodies[b], False, cutters[k], extra,
-                      slack if beside else TOUCHING, best)
+            _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1], cutters[k], seen,
+                  feed, free[m], grow, slack, best)
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
             taken[m, 3] += round(totals[3] * VOLUME_UNITS)
+            taken[m, 4] += round(totals[4] * VOLUME_UNITS)
             taken[m, 2] |= sectors
             cuts += 1
             if cuts % 64 == 0:

@@ -32,14 +32,14 @@ def _rho(s, wx, wy, dx, dy):
 
 
 @njit(cache=True, nogil=True)
-def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, radius, a, r):
+def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
     """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
     if dz == 0.0:
         return min(max(s0, s1), s2)
     if r <= 0.0:
         return s1 if dz > 0.0 else s2
     if a <= 1e-12:
-        w = math.sqrt(max(radius * radius - miss2, 0.0))
+        w = math.sqrt(max(r * r - miss2, 0.0))
         return min(max(s0 - w * dz / math.sqrt(plan * plan + dz * dz) / plan, s1), s2)
     lo, hi = s1, s2
     for _ in range(40):
@@ -62,7 +62,21 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
 
     Returns (inf, 0) where the move passes by.
     """
-    r, a, wide = corner, radius - corner + grow, radius + grow
+    return _lowest(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner)
+
+
+@njit(cache=True, nogil=True)
+def lowest_end(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
+    """Least height over (x, y) of what of a profile, flat to a and round by r, is no farther out than ``wide``.
+
+    inf where that passes by.
+    """
+    return _lowest(x, y, ax, ay, az, dx, dy, dz, wide, a, r)[0]
+
+
+@njit(cache=True, nogil=True)
+def _lowest(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
+    """As ``lowest``, of a profile flat to a and round by r that counts as far as ``wide`` from the axis."""
     wx, wy = x - ax, y - ay
     plan2 = dx * dx + dy * dy
     if plan2 < 1e-18:
@@ -77,7 +91,7 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
     s1, s2 = max(0.0, s0 - half), min(1.0, s0 + half)
     if s1 > s2:
         return INF, 0.0
-    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, wide, a, r)
+    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, a, r)
     return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r), s1
 
 

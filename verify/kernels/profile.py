@@ -32,6 +32,24 @@ def _at(s, qx, qy, qz, dx, dy, dz, a, r, length):
 
 
 @njit(**KERNEL)
+def beside(qx, qy, qz, dx, dy, dz, a, r, length, v, grow, slack):
+    """How wide, mm, a cutting part must be made all round to touch a ball of v.
+
+    ``grow`` where even that takes in no more of it than ``slack``, which what lies under the tip may be.
+    """
+    if v - carried(qx, qy, qz, dx, dy, dz, a + grow, r, length) <= slack:
+        return grow
+    free, hits = 0.0, grow
+    for _ in range(20):
+        wider = 0.5 * (free + hits)
+        if v - carried(qx, qy, qz, dx, dy, dz, a + wider, r, length) > slack:
+            hits = wider
+        else:
+            free = wider
+    return max(hits - slack, 0.0)
+
+
+@njit(**KERNEL)
 def carried(qx, qy, qz, dx, dy, dz, a, r, length):
     """Least signed distance over 0 <= s <= 1 of a point q to a cutting part carried by s D; within 1e-5 mm."""
     plan2 = dx * dx + dy * dy

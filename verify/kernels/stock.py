@@ -15,12 +15,12 @@ from numba import njit
 
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.frustum import contact
-from verify.kernels.heights import INF, _cells, entered, lowest
+from verify.kernels.heights import INF, _cells, entered, lowest, lowest_end
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
 UNDER = 1 << 40  # beside the sectors of ``engaged``
-ARM = 0.05  # mm by which a line must stand over the flutes, and reach into them, to be under an arm
+ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 
 
 @njit(cache=True, nogil=True)
@@ -101,14 +101,12 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                 reach = flat + math.sqrt(over * (2.0 * corner - over))
             if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
                 continue
-            beside = s
             low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
             gone = height[i, j] - low
             if gone <= 1e-9:
                 continue
             if height[i, j] > a[2] + s * d[2] + length + 1e-9:
-                under = under or (height[i, j] > a[2] + beside * d[2] + length + ARM and
-                                  wx * wx + wy * wy < (radius - ARM) * abs(radius - ARM))
+                under = under or wx * wx + wy * wy < (radius - ARM) * abs(radius - ARM)
                 continue
             height[i, j] = low
             cut = cut or gone > 1e-6
@@ -118,7 +116,10 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                                        step)
             if not steep:
                 continue
-            if lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, 0.0, 0.0)[0] < INF:
+            # what the flank took before the end came over the line was not dug
+            over = low + gone - lowest_end(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner)
+            gone = min(gone, over)
+            if gone > 0.0:
                 paid = earned - since[i - i0, j - j0]
                 since[i - i0, j - j0] = earned
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
