@@ -98,3 +98,10 @@ def test_engagement_under_the_arm_counts():
     """1.5 mm wide of 12: 41 degrees."""
     found = proved(program("X5.5 Y-25", "G1 X4.5 F400", "G1 Y25"), max_engaged={2: np.radians(30.0)})
     assert any(f.kind == "engagement" for f in found.findings)
+
+
+@pytest.mark.parametrize("way", [(), (*CUT, "G0 X5.5", "Y-25", "X30")], ids=["alone", "after the slot"])
+def test_a_plunge_beside_the_edge_is_as_deep_whatever_the_slot_cutter_did_before(way):
+    plunge = ["G0 Z20", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-24.1 Y0", "Z1", "G1 Z-4 F100", "G1 Z1", "G0 Z20"]
+    found = proved(program(*way)[:-3] + plunge + ["M5", "M30", "%"], faces=())
+    assert [f.depth for f in found.findings if f.kind == "plunge"] == pytest.approx([4.5], abs=1e-6)
