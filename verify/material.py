@@ -72,7 +72,9 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=stages.span(0.7, 1.0))
-        met, spacing = np.concatenate([met, dug]), field.step
+        known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
+        run = replace(run, events=np.concatenate([run.events[~known], dug]))
+        spacing = field.step
     return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright)
 
 
