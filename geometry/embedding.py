@@ -10,13 +10,16 @@ Belyaev and Seidel 2004): still positive, still no fold, and what bulges inwards
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
+from scipy.spatial import Delaunay
 
 from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64, TriangleMesh
 from geometry.nearest import nearest
+from geometry.quadgrid import even
 
 MOST_ROUNDS = 20
 LEAST_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
@@ -63,6 +66,47 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
                             measured=float(flat.min()), limit=0.0,
                             remedy="split the edges that join two places of one side")
     return best
+
+
+def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarray, tuple[np.ndarray, ...]]:
+    """A plane region as triangles that ``embedded`` takes.
+
+    sides   : bottom, right, top and left, (k, 2) float64, mm, each going on where the last one ends
+    spacing : mm, about, between places
+
+    Returns
+    -------
+    Places (k, 2) float64, mm, triangles (t, 3) int, counterclockwise, and the places along each side. No edge joins two
+    places of the border through the region: where one did, it has a place half way.
+    """
+    border: list[F64] = []
+    rows = []
+    for side in sides:
+        length = np.linalg.norm(np.diff(side, axis=0), axis=1).sum()
+        line = even(side, max(3, int(np.ceil(length / spacing)) + 1))
+        rows.append(np.arange(len(border), len(border) + len(line)))
+        border += list(line[:-1])
+    count, edge = len(border), np.array(border)
+    region = shapely.Polygon(edge)
+    low, high = edge.min(axis=0), edge.max(axis=0)
+    x, y = np.meshgrid(np.arange(low[0], high[0], spacing), np.arange(low[1], high[1], 0.866 * spacing))
+    x[1::2] += 0.5 * spacing
+    lattice = np.column_stack([x.ravel(), y.ravel()])
+    places = np.vstack([edge, lattice[shapely.contains_xy(region.buffer(-0.5 * spacing), *lattice.T)]])
+    while True:
+        faces = Delaunay(places).simplices
+        middle = places[faces].mean(axis=1)
+        faces = faces[shapely.contains_xy(region, *middle.T)]
+        edges, shared = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
+                                  return_counts=True)
+        chords = edges[(edges < count).all(axis=1) & (shared == 2)]
+        if not len(chords):
+            break
+        places = np.vstack([places, places[chords].mean(axis=1)])
+    a, b, c = (places[faces[:, k]] for k in range(3))
+    over = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    faces[over] = faces[over][:, ::-1]
+    return places, faces, tuple(r % count for r in rows)
 
 
 def grid_of(vertices: F64, faces: np.ndarray, laid: F64, n: int, m: int) -> F64:

@@ -16,11 +16,10 @@ from enum import StrEnum
 
 import numpy as np
 import shapely
-from scipy.spatial import Delaunay
 from shapely.ops import split
 
 from geometry.corners import Corners, find_corners
-from geometry.embedding import embedded, grid_of
+from geometry.embedding import embedded, grid_of, triangulated
 from geometry.errors import GeometryError
 from geometry.fronts import interpolated
 from geometry.gridmap import GridMap
@@ -210,45 +209,9 @@ def _grid(method: Method, blend: float, quad: Quad, piece: shapely.Polygon, side
           shape: tuple[int, int]) -> F64:
     """A grid (m, n, 2), mm, of a piece."""
     if method is Method.EMBEDDED:
-        places, faces, rows = _triangulated(piece, sides, float(np.sqrt(piece.area)) / 60.0)
+        places, faces, rows = triangulated(sides, float(np.sqrt(piece.area)) / 60.0)
         return grid_of(places, faces, embedded(places, faces, rows), shape[1], shape[0])
     if method is Method.LAPLACE:
         return laplace(quad)[0]
     fronts = interpolated(quad)
     return fronts if not blend else (1.0 - blend) * fronts + blend * laplace(quad)[0]
-
-
-def _triangulated(piece: shapely.Polygon, sides: tuple[F64, F64, F64, F64],
-                  spacing: float) -> tuple[F64, np.ndarray, tuple[np.ndarray, ...]]:
-    """Places (k, 2) mm, triangles (t, 3) and the places along each side of a piece, about ``spacing`` mm apart.
-
-    No edge joins two places of the border through the piece: where one did, it has a place half way.
-    """
-    border: list[F64] = []
-    rows = []
-    for side in sides:
-        length = np.linalg.norm(np.diff(side, axis=0), axis=1).sum()
-        line = even(side, max(3, int(np.ceil(length / spacing)) + 1))
-        rows.append(np.arange(len(border), len(border) + len(line)))
-        border += list(line[:-1])
-    count, edge = len(border), np.array(border)
-    region = shapely.Polygon(edge)
-    low, high = edge.min(axis=0), edge.max(axis=0)
-    x, y = np.meshgrid(np.arange(low[0], high[0], spacing), np.arange(low[1], high[1], 0.866 * spacing))
-    x[1::2] += 0.5 * spacing
-    lattice = np.column_stack([x.ravel(), y.ravel()])
-    places = np.vstack([edge, lattice[shapely.contains_xy(region.buffer(-0.5 * spacing), *lattice.T)]])
-    while True:
-        faces = Delaunay(places).simplices
-        middle = places[faces].mean(axis=1)
-        faces = faces[shapely.contains_xy(region, *middle.T)]
-        edges, shared = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
-                                  return_counts=True)
-        chords = edges[(edges < count).all(axis=1) & (shared == 2)]
-        if not len(chords):
-            break
-        places = np.vstack([places, places[chords].mean(axis=1)])
-    a, b, c = (places[faces[:, k]] for k in range(3))
-    over = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    faces[over] = faces[over][:, ::-1]
-    return places, faces, tuple(r % count for r in rows)
