@@ -1,14 +1,16 @@
 """Iso-parametric passes on trimmed surfaces: analogues of a published table, chords on exact surfaces, random trims.
 
-Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]``;
-without a flag all three. What is left is judged by ``verify.removal``, which shares no code with the passes. Seconds
-are wall clock of one run, compiled kernels: laying into the square, passes and steps together.
+Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]
+[--demo] [--wheel FOLDER]``; without a flag all but the last. What is left is judged by ``verify.removal``, which shares
+no code with the passes. Seconds are wall clock of one run, compiled kernels: laying into the square, passes and steps.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,17 +21,25 @@ import numpy as np  # noqa: E402
 import shapely  # noqa: E402
 
 from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
+from examples.family import make_part  # noqa: E402
 from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
+from geometry.facepatches import read_patches  # noqa: E402
 from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
+from geometry.frames import Placement  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
+from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.squaring import Method, Squared, squared  # noqa: E402
+from geometry.trim import trim_faces  # noqa: E402
+from service.convert import parse_setup  # noqa: E402
+from service.prepare import prepare  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
+from toolpath.locations import FREE, lifted, tips  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
 
@@ -237,19 +247,93 @@ def trims(count: int) -> None:
     print(f"most left {worst:.5f}, deepest gouge {deep:.5f} mm, {failed} failed of {count}")
 
 
+def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, title: str) -> None:
+    """Every face of every wall of a part by an upright ball, its own passes against the whole part."""
+    setup = parse_setup(json.dumps(given))
+    ready = prepare(step, setup, lambda _stage, _share: None)
+    part = ready.views[0].part
+    numbers = sorted({f for w in ready.decomposition.walls for f in w.faces})
+    at = setup.placement
+    where = Placement(origin=tuple(at.origin_mm), z_axis=tuple(at.z_axis), x_axis=tuple(at.x_axis))
+    patches = read_patches(step, numbers, placement=where, solid=setup.part.solid)
+    trimmed = trim_faces(part, numbers, lambda p, _n, _f: np.zeros(len(p), np.int64), 1e3)[0]
+    tree, tool = TriangleTree(part.mesh), ball(radius)
+    cutter = Cutter.of(tool)
+
+    def limit(xy: F64) -> F64:
+        return drop_cutter(tree, cutter, xy)
+
+    print(f"\n{title}: {len(numbers)} wall faces, ball of {radius} mm upright, scallop {scallop}, chord {chord} mm")
+    print(f"{'face':>5} {'pieces':>6} {'methods':16} {'passes':>6} {'mm':>7} {'raised':>6} {'touched':>7} {'p99':>8} "
+          f"{'max left':>9} {'over h':>7} {'gouge':>8} {'s':>6}")
+    everywhere = sample_surface(part.mesh, 30.0, seed=3)
+    for patch in trimmed:
+        face, own = patches[patch.face], part.mesh.face_ids == patch.face
+        begin = time.perf_counter()
+        loops = tuple(face.parameters(q) for q in patch.loops)
+        d = face.surface.derivatives(loops[0])
+        scale = (float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean()))
+        try:
+            pieces = squared(loops, scale)
+            lines, way, raised = [], 0.0, 0
+            for piece in pieces:
+                iso = IsoSurface(face.surface, piece.map)
+                for eta in lay_out(iso, radius, scallop - chord).tolist():
+                    profile = Profile.of(iso.curve(eta), chord)
+                    ends = steps(profile, radius, chord, scallop)
+                    line, up = lifted(profile, ends, tool, limit, chord, 0.1 * scallop)
+                    lines.append(line)
+                    way, raised = way + profile.length, raised + up
+        except GeometryError as refusal:
+            print(f"F{patch.face:<4} failed: {refusal}")
+            continue
+        seconds = time.perf_counter() - begin
+        s = with_surface_normals(sample_surface(part.mesh, 400.0, seed=2, triangles=np.flatnonzero(own)), part.mesh)
+        tip = tips(s.points, s.normals, tool)
+        touched = limit(np.ascontiguousarray(tip[:, :2])) <= tip[:, 2] + 0.002
+        for share in (0.5, 1.0):  # as the planner counts reach
+            away = tips(s.points + share * 0.1 * scallop * s.normals, s.normals, tool)
+            touched |= limit(np.ascontiguousarray(away[:, :2])) <= away[:, 2] + FREE
+        left = left_by(lines, s.points[touched], s.normals[touched], radius)
+        deep = left_by(lines, everywhere.points, everywhere.normals, radius)
+        print(f"F{patch.face:<4} {len(pieces):6d} {' '.join(p.method for p in pieces):16} {len(lines):6d} {way:7.0f} "
+              f"{raised:6d} {touched.mean():7.3f} {np.quantile(left, 0.99):8.4f} {left.max():9.4f} "
+              f"{(left > scallop).mean():7.4f} {max(-deep.min(), -left.min(), 0):8.4f} {seconds:6.1f}", flush=True)
+
+
+def demo_faces() -> None:
+    """The walls of the demo part."""
+    made = make_part(0, "demo")
+    with tempfile.TemporaryDirectory() as folder:
+        step, *_ = made.write(folder)
+        faces(Path(step), made.setup, 0.5, 0.01, 0.002, "demo part")
+
+
+def wheel_faces(parts: Path) -> None:
+    """The blades of the compressor wheel."""
+    given = json.loads((Path(__file__).resolve().parents[1] / "examples/setups/kj66_compressor_wheel.json").read_text())
+    faces(parts / "imp_kj66_compressor_wheel.step", given, 1.0, 0.05, 0.005, "compressor wheel")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", action="store_true")
     parser.add_argument("--chords", action="store_true")
     parser.add_argument("--trims", type=int, default=0)
+    parser.add_argument("--demo", action="store_true")
+    parser.add_argument("--wheel", type=Path, help="folder of the parts by others")
     args = parser.parse_args()
-    every = not (args.cases or args.chords or args.trims)
+    every = not (args.cases or args.chords or args.trims or args.demo or args.wheel)
     if args.cases or every:
         cases()
     if args.chords or every:
         chords()
     if args.trims or every:
         trims(args.trims or 50)
+    if args.demo or every:
+        demo_faces()
+    if args.wheel:
+        wheel_faces(args.wheel)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 
 SHAPE, ASPECT = 0.25, 0.05
-WINDOW = 0.02  # of the border, to each side, over which a turn is measured
+NARROW, WINDOW = 0.004, 0.02  # of the border, to each side, over which a turn is measured: corners, and rounded ones
 SHARP = np.radians(20.0)
 MOST_SHARP = 14
 EVENLY = 12  # further places to choose from
@@ -70,10 +70,9 @@ def find_corners(border: F64) -> Corners:
         raise GeometryError(f"a border of {len(border)} places and {area:g} mm² is none: four places at least, "
                             "no two alike, counterclockwise", code="bad_border", measured=area, limit=0.0)
     way = np.concatenate([[0.0], np.cumsum(step)])
-    turn = _turns(around, way)
-    chosen = _candidates(turn, way)
+    chosen, sharp = _candidates(around, way)
     best, cost = None, np.inf
-    at, sharp = way[chosen] / way[-1], turn[chosen]
+    at = way[chosen] / way[-1]
     total = float((np.maximum(sharp, 0.0) ** 2).sum())
     for four in combinations(range(len(chosen)), 4):
         f = np.array(four)
@@ -88,11 +87,11 @@ def find_corners(border: F64) -> Corners:
         if here < cost:
             best, cost = f, here
     assert best is not None  # the places evenly along the border alone are enough
-    return Corners(chosen[best], turn[chosen[best]], int((turn[chosen] >= SHARP).sum()), float(cost))
+    return Corners(chosen[best], sharp[best], int((sharp >= SHARP).sum()), float(cost))
 
 
-def _turns(around: F64, way: F64) -> F64:
-    """(n,) float64, rad: by how much the border turns about each place, over a window to both sides of it."""
+def _turns(around: F64, way: F64, window: float) -> F64:
+    """(n,) float64, rad: by how much the border turns about each place, over a share of it to both sides."""
     total = way[-1]
     long = np.concatenate([way[:-1] - total, way, way[1:] + total])
     tour = np.vstack([around[:-1], around, around[1:]])
@@ -101,27 +100,37 @@ def _turns(around: F64, way: F64) -> F64:
         return np.column_stack([np.interp(s, long, tour[:, c]) for c in (0, 1)])
 
     s = way[:-1]
-    back, ahead = place(s) - place(s - WINDOW * total), place(s + WINDOW * total) - place(s)
+    back, ahead = place(s) - place(s - window * total), place(s + window * total) - place(s)
     return np.arctan2(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], (back * ahead).sum(axis=1))
 
 
-def _candidates(turn: F64, way: F64) -> np.ndarray:
-    """Places to choose from, in order: the sharpest, each of its window, and some evenly along the border."""
-    total = way[-1]
+def _candidates(around: F64, way: F64) -> tuple[np.ndarray, F64]:
+    """Places to choose from, in order, and by how much the border turns there, rad.
+
+    The sharpest first: by the narrow window, so that the two corners of a narrow end are two; then those that only the
+    wide one sees, which are rounded; then some evenly along the border.
+    """
+    total, s = way[-1], way[:-1]
     out: list[int] = []
-    s = way[:-1]
-    for k in np.argsort(-turn, kind="stable"):
-        if turn[k] < SHARP or len(out) == MOST_SHARP:
-            break
-        apart = np.abs((s[k] - s[out] + 0.5 * total) % total - 0.5 * total) if out else np.array([total])
-        if apart.min() > 1.5 * WINDOW * total:
-            out.append(int(k))
+    value: list[float] = []
+
+    def apart(k: int) -> float:
+        return float(np.abs((s[k] - s[out] + 0.5 * total) % total - 0.5 * total).min()) if out else float(total)
+
+    for window in (NARROW, WINDOW):
+        turn = _turns(around, way, window)
+        for k in np.argsort(-turn, kind="stable").tolist():
+            if turn[k] < SHARP or len(out) == MOST_SHARP:
+                break
+            if apart(k) > 1.5 * window * total:
+                out.append(k)
+                value.append(float(turn[k]))
     first = s[out[0]] if out else 0.0  # so that it does not matter where the border begins
     evenly = np.searchsorted(s, np.sort((first + np.arange(EVENLY) * total / EVENLY) % total)) % len(s)
-    for k in evenly.tolist():
-        apart = np.abs((s[k] - s[out] + 0.5 * total) % total - 0.5 * total) if out else np.array([total])
-        if apart.min() > WINDOW * total:
+    spare = evenly.tolist() if len(s) > 3 * EVENLY else range(len(s))
+    for k in spare:
+        if apart(k) > (WINDOW * total if len(s) > 3 * EVENLY else 0.0):
             out.append(k)
-    if len(out) < 4:  # a border of few places
-        out = list(range(len(s)))
-    return np.array(sorted(set(out)))
+            value.append(float(turn[k]))
+    order = np.argsort(out)
+    return np.array(out)[order], np.array(value)[order]

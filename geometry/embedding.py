@@ -58,6 +58,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
         best, least = laid, total
         weight = weight / stretch[end]
     flat = _turn(best, faces)
+    flat = np.where(np.isfinite(flat), flat, -np.inf)
     if flat.min() <= LEAST_TURN * np.abs(flat).mean():
         worst = int(flat.argmin())
         at = vertices[faces[worst]].mean(axis=0)

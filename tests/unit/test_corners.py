@@ -33,6 +33,15 @@ def test_a_rectangle_has_its_corners():
     assert found.sharp == 4 and found.turn == pytest.approx(np.pi / 2)
 
 
+def test_a_ribbon_has_both_corners_of_its_narrow_ends():
+    """52 mm by 1.7 mm, bent: the ends are narrower than the wider window."""
+    t = np.linspace(0, 1, 81)
+    low = np.column_stack([52 * t, 2 * np.sin(5 * t)])
+    b = border(np.vstack([low, (low + [0, 1.7])[::-1]]))
+    places = b[find_corners(b).at]
+    assert same(places, [low[0], low[-1], low[-1] + [0, 1.7], low[0] + [0, 1.7]], 1e-6)
+
+
 def test_a_triangle_gets_its_fourth_corner_on_a_side():
     places, found = corners_of([(0, 0), (20, 0), (10, 9)])
     assert found.sharp == 3

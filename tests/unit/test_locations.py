@@ -1,0 +1,83 @@
+"""Tips from contacts for ball, bull nose and flat, along any axis, and passes raised over what stands in the way."""
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import TriangleMesh
+from geometry.toolbody import ToolBody
+from tests.hand_parts import box_mesh
+from toolpath.cutter import Cutter
+from toolpath.drop_cutter import drop_cutter
+from toolpath.forward import Profile, steps
+from toolpath.locations import lifted, tips
+
+TOOLS = {name: ToolBody("T1", 1, 6.0, corner, 20.0, 6.0, 30.0, 6.0, 40.0)
+         for name, corner in (("ball", 3.0), ("bull", 1.0), ("flat", 0.0))}
+
+
+def signed(point, tip, axis, tool):
+    """Signed distance of a place to a standing cutting part."""
+    w = point - tip
+    h = w @ axis
+    rho = np.linalg.norm(w - h * axis)
+    x, y = rho - (tool.radius - tool.corner_radius), tool.corner_radius - h
+    out = np.hypot(max(x, 0.0), max(y, 0.0)) if x > 0 or y > 0 else max(x, y)
+    return out - tool.corner_radius
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_a_tool_touches_its_contact_and_no_place_of_the_plane_there(name):
+    rng = np.random.default_rng(4)
+    tool = TOOLS[name]
+    for _ in range(60):
+        contact, normal, axis = rng.normal(size=3) * 20, rng.normal(size=3), rng.normal(size=3)
+        normal, axis = normal / np.linalg.norm(normal), axis / np.linalg.norm(axis)
+        if normal @ axis < 0.05 or normal @ axis > 0.99:
+            continue
+        tip = tips(contact[None], normal[None], tool, axis)[0]
+        assert signed(contact, tip, axis, tool) == pytest.approx(0.0, abs=1e-9)
+        a = np.cross(normal, axis)
+        b = np.cross(normal, a)
+        for t in rng.uniform(-4, 4, (40, 2)):
+            assert signed(contact + t[0] * a + t[1] * b - 1e-9 * normal, tip, axis, tool) > -1e-7
+
+
+def test_a_flat_on_a_level_place_is_not_guessed():
+    up = np.array([[0.0, 0.0, 1.0]])
+    assert np.isnan(tips(np.zeros((1, 3)), up, TOOLS["flat"])).any()
+    assert tips(np.zeros((1, 3)), up, TOOLS["ball"]) == pytest.approx(np.zeros((1, 3)))
+
+
+def level_pass(length=30.0):
+    return Profile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))),
+                      0.001)
+
+
+def test_a_pass_is_raised_over_a_block_on_its_way_and_nowhere_else():
+    tool = TOOLS["ball"]
+    floor = TriangleMesh([[-50, -50, 0], [80, -50, 0], [80, 50, 0], [-50, 50, 0]], [[0, 1, 2], [0, 2, 3]])
+    block = box_mesh([14.0, -2.0, 0.0], [16.0, 2.0, 1.5])
+    both = TriangleMesh(np.vstack([floor.vertices, block.vertices]),
+                        np.vstack([floor.faces, block.faces + len(floor.vertices)]))
+    tree, cutter = TriangleTree(both), Cutter.of(tool)
+
+    def limit(xy):
+        return drop_cutter(tree, cutter, xy)
+
+    profile = level_pass()
+    made, raised = lifted(profile, steps(profile, 3.0, 0.002), tool, limit, 0.002)
+    assert raised
+    x = np.linspace(0.0, 30.0, 4001)
+    high = np.interp(x, made[:, 0], made[:, 2])
+    true = np.maximum(limit(np.column_stack([x, 0 * x])), 0.0)
+    assert high == pytest.approx(true, abs=0.01)
+    assert (high[np.abs(x - 15.0) > 6.0] == 0.0).all() and high.max() == pytest.approx(1.5, abs=1e-3)
+
+
+def test_a_free_pass_keeps_its_locations():
+    tool = TOOLS["ball"]
+    profile = level_pass()
+    ends = steps(profile, 3.0, 0.002)
+    made, raised = lifted(profile, ends, tool, lambda xy: np.full(len(xy), -np.inf), 0.002)
+    assert not raised and made[:, 0] == pytest.approx(ends) and len(made) == len(ends)
