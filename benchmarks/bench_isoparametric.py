@@ -282,7 +282,7 @@ def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, 
                     profile = Profile.of(iso.curve(eta), chord)
                     ends = steps(profile, radius, chord, scallop)
                     line, up = lifted(profile, ends, tool, limit, chord, 0.1 * scallop)
-                    lines.append(line)
+                    lines += line
                     way, raised = way + profile.length, raised + up
         except GeometryError as refusal:
             print(f"F{patch.face:<4} failed: {refusal}")

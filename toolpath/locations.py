@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.follow import Limit
+from toolpath.follow import STEEPEST, Limit
 from toolpath.forward import Profile
-from toolpath.levels import thinned
+from toolpath.levels import thinned, true_runs
 
 FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
 LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does
@@ -44,7 +44,7 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None) -> 
 
 
 def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
-           off: float = 0.0) -> tuple[F64, bool]:
+           off: float = 0.0) -> tuple[list[F64], bool]:
     """The tips of a pass, upright, moved off the surface or raised where the part stands over them.
 
     profile   : Profile of the pass; ends (n,) float64, mm, the ways at which it is located
@@ -55,22 +55,26 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
 
     Returns
     -------
-    (k, 3) float64, mm, and whether anything was raised: then the way follows the limit there, and what it leaves at
-    those contacts is for others.
+    Pieces (k, 3) float64, mm, and whether anything was raised: then the way follows the limit there, and what it leaves
+    at those contacts is for others. Where the limit is over a radius higher, or jumps, the pass is broken.
     """
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
     way = np.unique(np.concatenate([ends, profile.ways, looks]))
     made, high = _against(profile, way, tool, limit, off)
     over = _ended(high > made[:, 2] + FREE)
     if not over.any():
-        return made[np.isin(way, ends)], False
+        return [made[np.isin(way, ends)]], False
     more = [np.linspace(a, b, int(np.ceil((b - a) / FINE)) + 1)
             for a, b, both in zip(way[:-1], way[1:], over[:-1] & over[1:], strict=True) if both]
     # what is not raised keeps its own places
     way = np.unique(np.concatenate([way[np.isin(way, ends) | over], *more]))
     made, high = _against(profile, way, tool, limit, off)
-    made[:, 2] = np.where(high > made[:, 2] + FREE, high, made[:, 2])
-    return thinned(made, tolerance), True
+    rise = np.where(high > made[:, 2] + FREE, high - made[:, 2], 0.0)
+    made[:, 2] += rise
+    step = np.abs(np.diff(rise)) <= STEEPEST * np.diff(way)  # of what is raised; the pass itself may be as steep as it is
+    kept = rise <= tool.radius
+    runs = true_runs(step & kept[1:] & kept[:-1])
+    return [thinned(made[i:j + 1], tolerance) for i, j in runs], True
 
 
 def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:

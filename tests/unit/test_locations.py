@@ -66,7 +66,7 @@ def test_a_pass_is_raised_over_a_block_on_its_way_and_nowhere_else():
         return drop_cutter(tree, cutter, xy)
 
     profile = level_pass()
-    made, raised = lifted(profile, steps(profile, 3.0, 0.002), tool, limit, 0.002)
+    (made,), raised = lifted(profile, steps(profile, 3.0, 0.002), tool, limit, 0.002)
     assert raised
     x = np.linspace(0.0, 30.0, 4001)
     high = np.interp(x, made[:, 0], made[:, 2])
@@ -79,5 +79,16 @@ def test_a_free_pass_keeps_its_locations():
     tool = TOOLS["ball"]
     profile = level_pass()
     ends = steps(profile, 3.0, 0.002)
-    made, raised = lifted(profile, ends, tool, lambda xy: np.full(len(xy), -np.inf), 0.002)
+    (made,), raised = lifted(profile, ends, tool, lambda xy: np.full(len(xy), -np.inf), 0.002)
     assert not raised and made[:, 0] == pytest.approx(ends) and len(made) == len(ends)
+
+
+def test_a_pass_is_broken_at_a_wall_it_cannot_climb():
+    def limit(xy):
+        return np.where(np.abs(xy[:, 0] - 15.0) < 4.0, 20.0, -np.inf)
+
+    profile = level_pass()
+    pieces, raised = lifted(profile, steps(profile, 3.0, 0.002), TOOLS["ball"], limit, 0.002)
+    assert raised and len(pieces) == 2
+    assert pieces[0][-1, 0] == pytest.approx(11.0, abs=0.03) and pieces[1][0, 0] == pytest.approx(19.0, abs=0.03)
+    assert all((p[:, 2] == 0.0).all() for p in pieces)
