@@ -21,6 +21,7 @@ from toolpath.levels import thinned, true_runs
 FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
 LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does
 OFFS = (0.25, 0.5, 1.0)  # of the way a tip may stand off
+ROUNDS = 6  # a move under the limit is halved so often, and then left out
 FREE = 1e-4  # mm, by which the part may stand over a tip and count as the surface itself
 
 
@@ -68,13 +69,36 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
             for a, b, both in zip(way[:-1], way[1:], over[:-1] & over[1:], strict=True) if both]
     # what is not raised keeps its own places
     way = np.unique(np.concatenate([way[np.isin(way, ends) | over], *more]))
+    made, rise = _raised(profile, way, tool, limit, off)
+    for _ in range(ROUNDS):
+        under = _under(made, rise, limit, 0.5 * tolerance)
+        if not under.any():
+            break
+        between = 0.5 * (way[1:] + way[:-1])[under]
+        tip, up = _raised(profile, between, tool, limit, off)
+        order = np.argsort(np.concatenate([way, between]), kind="stable")
+        way, rise = np.concatenate([way, between])[order], np.concatenate([rise, up])[order]
+        made = np.concatenate([made, tip])[order]
+    whole = (rise <= tool.radius) & np.isfinite(rise)
+    steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
+    runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, 0.5 * tolerance))
+    return [thinned(made[i:j + 1], 0.5 * tolerance) for i, j in runs], True
+
+
+def _raised(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
+    """Tips (n, 3) at ways (n,), raised to the limit, and by how much (n,); mm."""
     made, high = _against(profile, way, tool, limit, off)
     rise = np.where(high > made[:, 2] + FREE, high - made[:, 2], 0.0)
-    made[:, 2] += rise
-    step = np.abs(np.diff(rise)) <= STEEPEST * np.diff(way)  # of what is raised; the pass itself may be as steep as it is
-    kept = rise <= tool.radius
-    runs = true_runs(step & kept[1:] & kept[:-1])
-    return [thinned(made[i:j + 1], tolerance) for i, j in runs], True
+    return made + rise[:, None] * np.array([0.0, 0.0, 1.0]), rise
+
+
+def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.bool_]:
+    """(n - 1,) bool: moves beside a raised place whose middle is under the limit by more than the tolerance."""
+    middle = 0.5 * (made[1:] + made[:-1])
+    look = (rise[1:] > 0.0) | (rise[:-1] > 0.0)
+    out = np.zeros(len(middle), np.bool_)
+    out[look] = limit(np.ascontiguousarray(middle[look, :2])) > middle[look, 2] + tolerance
+    return out
 
 
 def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
