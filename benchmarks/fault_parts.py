@@ -220,7 +220,7 @@ def _rough_wave(s: Script, solid: Pulled, size: tuple[float, float, float, float
         s.go((row, 0.0, ht), normal=UP)
         s.go((row, side * out, ht))
     s.zone(None)
-    steps = np.concatenate([np.linspace(ht, 0.6, math.ceil((ht - 0.6) / 1.1) + 1)[1:], np.arange(0.35, bottom, -0.17)])
+    steps = np.concatenate([np.linspace(ht, 0.6, math.ceil((ht - 0.6) / 1.1) + 1)[1:], np.arange(0.35, bottom, -0.14)])
     for z in steps.tolist():
         free = np.append(need <= z, False)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], free]).astype(int)))

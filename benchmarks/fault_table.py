@@ -92,7 +92,8 @@ def judged(planted: Planted) -> tuple[bool, bool, bool, float, str]:
 
 
 def clean(part: str, seed: int) -> list[str]:
-    """What proof and twin find in a clean case: nothing, if both are right. What the twin finds too, it says."""
+    """What proof and twin find in a clean case: nothing, if both are right. What the twin finds too, it says; of
+    plunges it knows nothing."""
     case = PARTS[part](seed)
     proof, twin, s = proof_of(case), twin_of(case), case.scored.samples
     out, depth = [], twin.gouge().depth
@@ -102,7 +103,8 @@ def clean(part: str, seed: int) -> list[str]:
             row = np.linalg.norm(s.points - f.point, axis=1).argmin()[None]
             left = float(twin.left(s.points[row], s.normals[row])[0])
         real = left > case.setup.scallop_height
-        out.append(f"{'true' if real else 'FALSE'}: {part} {seed}: {f.kind} line {f.line}: {f.message}"
+        word = "true" if real else "unjudged" if str(f.kind) == "plunge" else "FALSE"
+        out.append(f"{word}: {part} {seed}: {f.kind} line {f.line}: {f.message}"
                    + (f"; the twin says {left:.4f}" if real else ""))
     return out + ([f"the twin finds a gouge of {depth:.4f} mm: {part} {seed}"] if depth > CLEAN else [])
 

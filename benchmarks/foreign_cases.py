@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.fault_case import as_part
 from benchmarks.foreign_twin import SPACING, envelope
@@ -103,6 +104,17 @@ class Foreign:
             return np.array(b, dtype=np.float64).reshape(2, 3)
         x, y, z, r, height = b
         return np.array([[x - r, y - r, z], [x + r, y + r, z + height]])
+
+    def filled(self, first: F64, h: float, shape: tuple[int, int, int]) -> NDArray[np.bool_]:
+        """Which of the points ``h`` mm apart from (3,) mm on lie in the blank."""
+        b = self.blank
+        x, y, z = (first[c] + h * np.arange(shape[c]) for c in range(3))
+        low, high = self.box
+        inside = [(v >= low[c]) & (v <= high[c]) for c, v in enumerate((x, y, z))]
+        plan = inside[0][:, None] & inside[1][None, :]
+        if len(b) == 5:
+            plan &= np.hypot(x[:, None] - b[0], y[None, :] - b[1]) <= b[3]
+        return np.asarray(plan[:, :, None] & inside[2])
 
     @cached_property
     def setup(self) -> ProofSetup:

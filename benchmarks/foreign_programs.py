@@ -4,8 +4,8 @@ Run from the root of the checkout: ``python benchmarks/foreign_programs.py [NAME
 part it is right for (``foreign_cases``). The twin stands the tool at poses 5 µm apart: no pose may reach the part, and
 lines on which a rapid, a neck, a shank or a holder meets stock, or a descent is too steep, are noted in a stock of its
 own. A line of the table: moves, seconds of the proof, geometric findings by kind, how they lie to the lines of the twin
-(``both`` agree; ``alone`` is a finding no line of the twin bears out, ``missed`` a line no finding names), volume by
-both, and remarks on the text, which are no geometry. The part is then raised: cuts of known depth must be found.
+(``alone`` is a finding no line of the twin bears out, nor of a finer one, ``missed`` a line no finding names), volume
+by both, and remarks on the text, which are no geometry. The part is then raised: cuts of known depth must be found.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
 from benchmarks.foreign_cases import (  # noqa: E402
     CASES,
@@ -45,6 +46,7 @@ from verify.prove import prove  # noqa: E402
 
 SAMPLES = 400_000
 RAISED = 0.04  # mm
+FINER, NEAR = 0.4, 0.3  # of a step; mm
 BODY = (FindingKind.COLLISION, FindingKind.RUBBING)
 GEOMETRIC = (*BODY, FindingKind.GOUGE, FindingKind.RAPID, FindingKind.PLUNGE, FindingKind.LIMIT)
 _SPAN = re.compile(r", lines (\d+) to (\d+)$")
@@ -90,13 +92,9 @@ def run_twin(case: Foreign, moves: Paths, heights: F64, grid: tuple[F64, float])
     box = case.box
     after = (case.bodies, case.setup.clearance_rapid)
     if case.leaning:
-        h = case.points
-        counts = np.round((box[1] - box[0]) / h).astype(int)
-        stock = np.ones(tuple(counts.tolist()), np.bool_)
-        first = box[0] + 0.5 * h
-        if len(case.blank) == 5:
-            x, y = (first[c] + h * np.arange(counts[c]) - case.blank[c] for c in (0, 1))
-            stock[np.hypot(x[:, None], y[None, :]) > case.blank[3]] = False
+        h, first = case.points, box[0] + 0.5 * case.points
+        nx, ny, nz = np.round((box[1] - box[0]) / h).astype(int).tolist()
+        stock = case.filled(first, h, (nx, ny, nz))
         leaning(stock, first, h, moves.start, moves.end, moves.turns, moves.feed, case.cutter, *after, case.spacing,
                 rapid, body, cut)
     else:
@@ -133,6 +131,43 @@ def compare(proof: Proof, twin: Verdict) -> tuple[list[Finding], dict[FindingKin
     return alone, missed
 
 
+def finer(case: Foreign, moves: Paths, alone: Sequence[Finding]) -> list[Finding]:
+    """Those of the findings alone that a finer twin does not bear out either: of plunges one of all the stock, whose
+    nodes lie FINER of a step apart, and of what tools that lean meet one of the NEAR mm round the finding's place."""
+    out = []
+    for f in alone:
+        until = int(np.flatnonzero(moves.line <= lines_of(f)[1])[-1]) + 1
+        if case.leaning and f.kind in (FindingKind.RAPID, *BODY):
+            hit = _leaning_at(case, moves, until, np.asarray(f.point), f.kind)
+        elif not case.leaning and f.kind == FindingKind.PLUNGE:
+            hit = _dug(case, moves, until)
+        else:
+            hit = np.zeros(until, np.bool_)
+        if not (hit & (moves.line[:until] >= lines_of(f)[0])).any():
+            out.append(f)
+    return out
+
+
+def _dug(case: Foreign, moves: Paths, until: int) -> NDArray[np.bool_]:
+    """(until,) bool, the moves that plunge by the finer twin."""
+    step, box = FINER * case.step, case.box
+    nx, ny = (np.floor((box[1, :2] - box[0, :2]) / step).astype(int) + 1).tolist()
+    mark, dug, cut = np.zeros(until, np.int8), np.zeros(until), np.zeros(until)
+    upright(np.full((nx, ny), box[1, 2]), box[0, :2], step, moves.start[:until], moves.end[:until], moves.feed[:until],
+            case.cutter, case.end, np.zeros((0, 5)), case.setup.clearance_rapid, SPACING, mark, mark, dug, cut)
+    return dug > case.setup.plunge_skin * case.diameter
+
+
+def _leaning_at(case: Foreign, moves: Paths, until: int, place: F64, kind: FindingKind) -> NDArray[np.bool_]:
+    """(until,) bool, the moves by which points round (3,) mm are met."""
+    h, n = 0.1 * NEAR, 21
+    rapid, body, cut = np.zeros(until, np.int8), np.zeros(until, np.int8), np.zeros(until)
+    stock, first = case.filled(place - NEAR, h, (n, n, n)), place - NEAR
+    leaning(stock, first, h, moves.start[:until], moves.end[:until], moves.turns[:until], moves.feed[:until],
+            case.cutter, case.bodies, case.setup.clearance_rapid, SPACING, rapid, body, cut)
+    return np.asarray(rapid > 0 if kind == FindingKind.RAPID else body > 0)
+
+
 def prove_case(case: Foreign, text: str, part: Part, samples: int = SAMPLES) -> Proof:
     """The proof of one sample, at so many scored points that no zone answers for."""
     spread = sample_surface(part.mesh, samples / float(part.mesh.areas.sum()), seed=7)
@@ -151,6 +186,7 @@ def run(case: Foreign, root: Path, samples: int = SAMPLES) -> Result:
     seconds = time.perf_counter() - began
     twin = run_twin(case, moves, heights, (origin, step))
     alone, missed = compare(proof, twin)
+    alone = finer(case, moves, alone)
     again = prove_case(case, text, part_of(heights + RAISED, origin, step, case.box[0, 2]), samples)
     size = case.box[1] - case.box[0]
     left = machined_stock([(case.name, text)], part, [case.tool], case.setup, max(float(size.max()) / 250, 0.01),

@@ -46,6 +46,10 @@ class Bodies:
             out[k] = max(out[k], np.hypot(np.maximum(own[:, 2], own[:, 3]), own[:, 1]).max(initial=0.0))
         return np.asarray(out)
 
+    def width(self, cutters: F64) -> float:
+        """mm: how far the widest of the assemblies reaches from its axis; cutters (k, 3) as ``cutter_table``."""
+        return float(max(cutters[:, 0].max(initial=0.0), self.rows[:, 2:4].max(initial=0.0)))
+
 
 def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float, float, float, int]]:
     neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter

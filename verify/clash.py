@@ -18,22 +18,26 @@ from verify.stockpass import event_table, free_rapids, gather, noted
 from verify.toolaxes import ToolAxes
 
 FIXTURE_SPACING = 0.25
-DIP = 0.005  # mm: between points p apart a ball of R is in a fixture by p² / 4 R at most before it meets one
+DIP = 0.005  # mm a ball may be in a fixture, between its points, before it meets one
 MOST_FIXTURE_POINTS = 1_500_000
 
 
-def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> F64:
+def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> tuple[F64, float]:
     """Points on the faces of the fixtures where a tool may come near, at most 0.25 mm apart, and closer
     for fine tools: half a radius, and so that no ball dips 0.005 mm in between them.
 
     bounds : (2, 3) float64, mm, of the part; a fixture stands down to its underside, or lower where it begins lower
     moves, tools : what is farther from every tip than the longest tool reaches is left out
 
-    Returns (n, 3) float64, mm: tops, sides and undersides, edges and corners included. Wider apart where that would
-    take over 1.5 million points (see ``fixture_spacing``).
+    Returns
+    -------
+    points : (n, 3) float64, mm: tops, sides and undersides, edges and corners included
+    dip    : mm a ball of any of the tools' radii may be in a face before it meets a point; more than 0.005 only where
+             points so close would be over 1.5 million
     """
     boxes = _near_boxes(setup, bounds, moves, tools)
-    spacing = fixture_spacing(setup, bounds, moves, tools)
+    radii = [t.radius for t in tools]
+    spacing = _fixture_spacing(boxes, radii)
     out = [np.zeros((0, 3))]
     for low, high, under in boxes:
         x, y, z = (np.linspace(a, b, max(2, int(np.ceil((b - a) / spacing)) + 1))
@@ -41,15 +45,20 @@ def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence
         out.extend(_sheet(x, y, np.array([v])) for v in (high[2], under))
         out.extend(_sheet(x, np.array([v]), z) for v in (low[1], high[1]))
         out.extend(_sheet(np.array([v]), y, z) for v in (low[0], high[0]))
-    return np.concatenate(out)
+    return np.concatenate(out), max((_dip(r, spacing) for r in radii), default=0.0) if boxes else 0.0
 
 
-def fixture_spacing(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> float:
-    """mm between the points of ``fixture_points``; bounds (2, 3) float64, mm."""
-    area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in
-               (high - low for low, high, _ in _near_boxes(setup, bounds, moves, tools)))
-    least = min((min(0.5 * t.radius, 2.0 * (DIP * t.radius) ** 0.5) for t in tools), default=FIXTURE_SPACING)
+def _fixture_spacing(boxes: Sequence[tuple[F64, F64, float]], radii: Sequence[float]) -> float:
+    """mm between the points of ``fixture_points``; boxes as ``_near_boxes`` gives them."""
+    area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in (high - low for low, high, _ in boxes))
+    least = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
+                default=FIXTURE_SPACING)
     return max(min(FIXTURE_SPACING, least), (area / MOST_FIXTURE_POINTS) ** 0.5)
+
+
+def _dip(radius: float, spacing: float) -> float:
+    """mm a ball is in a face when it meets the corner of a square of points it came down in the middle of."""
+    return radius - float(max(radius * radius - 0.5 * spacing * spacing, 0.0)) ** 0.5
 
 
 def _near_boxes(setup: ProofSetup, bounds: F64, moves: Moves,
@@ -57,9 +66,13 @@ def _near_boxes(setup: ProofSetup, bounds: F64, moves: Moves,
     """Lower and upper corner and underside of the fixtures, cut to where a tool may come."""
     if len(moves) == 0 or not setup.fixtures:
         return []
-    far = float(Bodies.of(tools, setup).reach(cutter_table(tools)).max()) + setup.clearance_rapid
-    ways = np.concatenate([moves.start, moves.end])
-    lower, upper = ways.min(axis=0) - far, ways.max(axis=0) + far
+    cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
+    below = above = aside = float(bodies.reach(cutters).max())
+    if moves.axes is None:
+        below, aside = 0.0, bodies.width(cutters)
+    ways, near = np.concatenate([moves.start, moves.end]), setup.clearance_rapid
+    lower = ways.min(axis=0) - np.array([aside, aside, below]) - near
+    upper = ways.max(axis=0) + np.array([aside, aside, above]) + near
     out = []
     for f in setup.fixtures:
         low, high = np.asarray(f, dtype=np.float64)

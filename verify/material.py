@@ -22,7 +22,7 @@ from verify.stock import blank, run_bodies, run_stock
 from verify.stockpass import StockPass, end_radii, free_rapids
 from verify.toolaxes import ToolAxes
 
-LINES_APART, NODES_APART = 1.4, 0.6  # radii of the finest end between lines, and between nodes
+LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,13 @@ class Contacts:
     run     : StockPass; its events hold those of the part as well, the deeper first
     spacing : mm between the lines or nodes of the stock
     upright : whether those were lines of one height
+    dip     : mm a ball may be in a fixture, between the points looked at, before it is seen
     """
 
     run: StockPass
     spacing: float
     upright: bool
+    dip: float
 
 
 def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -59,7 +61,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         upright = not _undercuts(run, moves, setup)
         dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # line by line they are known better
         moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
-    held = fixture_points(setup, mesh.bounds, moves, tools)
+    held, dip = fixture_points(setup, mesh.bounds, moves, tools)
     if upright:
         met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 0.8))
         met, lost = _with_points(met, lost, points, ~moves.feed, False, moves, tools, setup, threads)
@@ -75,7 +77,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
-    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright)
+    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright, dip)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -102,7 +104,8 @@ def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:
 def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) -> float:
     """mm wanted between lines or nodes of the stock: what the setup says, or what the finest end that cuts still meets.
 
-    A square lattice has a line in every circle of 1 / sqrt 2 of its spacing; nodes are to lie closer.
+    A square lattice has a line in every circle of 1 / sqrt 2 of its spacing. Lines lie twice as close and nodes closer
+    still, as an end may come down on a rest that is narrower than itself.
     """
     used = np.unique(moves.tool[moves.feed])
     share = LINES_APART if moves.axes is None else NODES_APART

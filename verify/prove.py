@@ -14,6 +14,7 @@ from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
 from verify.blank import stock_on_normals
+from verify.clash import DIP
 from verify.dogleg import box_findings
 from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
@@ -104,6 +105,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     notes.extend(cuts.notes)
     notes.extend(f"T{t.number} is so fine that it may plunge unseen: the stock is looked at {met.spacing:.3f} mm apart"
                  for t in fine)
+    if met.dip > DIP + 1e-9:
+        notes.append(f"a ball may be {met.dip:.3f} mm in a fixture before it is seen: so much of it is not looked "
+                     "at closer; give them as smaller boxes where tools go")
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),

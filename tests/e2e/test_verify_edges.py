@@ -167,3 +167,13 @@ def test_a_lost_decimal_point_far_below_the_part_is_told(turn):
     told, _ = found(["G0 X0 Y0", "Z1", "G1 Z-3000 F300", "X2", "Z5"], part=slab(-3, 3, 3, -6, 0),
                     setup=ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0), turn=turn)
     assert any(f.kind == "collision" for f in told)
+
+
+@BOTH
+def test_fixtures_too_large_to_look_at_closely_are_told(turn):
+    wide, small = (np.array([[12.0, -0.5 * far, -20], [far, 0.5 * far, 0]]) for far in (900.0, 30.0))
+    lines = ["G1 X0 Y0 Z-5 F900", "X800 Y200", "X800 Y-200"]
+    for box, told in ((wide, True), (small, False)):
+        hits, proof = found(lines, setup=replace(BOX, fixtures=(box,)), turn=turn)
+        assert any("mm in a fixture before it is seen" in n for n in proof.notes) == told
+        assert any(f.kind == "collision" for f in hits)
