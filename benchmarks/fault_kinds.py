@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.fault_case import Case, Mode, Step, place_words, to_joints, tool_axis
 from benchmarks.fault_reading import Way, read_way
@@ -287,17 +288,15 @@ def _slides(way: Way) -> F64:
     return np.where(centre[keep, None], to_joints(at[:, :3], np.radians(at[:, 3:])), at[:, :3])
 
 
-def _near(case: Case, zone: str, steps: list[Step], most: int) -> tuple[F64, F64]:
-    """Samples of a zone within 4 mm of some steps, at most so many: places and normals (n, 3), mm and unit."""
+def _near(case: Case, zone: str, steps: list[Step]) -> NDArray[np.int64]:
+    """(n,) the rows of the samples of a zone within 4 mm of some steps."""
     s, own = case.scored.samples, case.scored.zone == case.zones.index(zone) + 1
     at = np.array([p.tip for p in steps])
     path = np.vstack([a + np.linspace(0, 1, 30)[:, None] * (b - a) for a, b in zip(at[:-1], at[1:], strict=True)])
     rows = np.flatnonzero(own)
     path = path[::max(1, len(path) // 300)]
     gap = np.min([np.linalg.norm(s.points[rows] - p, axis=1) for p in path], axis=0)
-    rows = rows[gap < 4.0]
-    rows = rows[::max(1, len(rows) // most)]
-    return s.points[rows], s.normals[rows]
+    return rows[gap < 4.0]
 
 
 def _run(case: Case, rng: np.random.Generator) -> tuple[str, list[Step]]:
@@ -309,10 +308,14 @@ def _run(case: Case, rng: np.random.Generator) -> tuple[str, list[Step]]:
 
 
 def _left(bad: Case, zone: str, steps: list[Step]) -> Planted:
-    points, normals = _near(bad, zone, steps, 900)
-    if len(points) == 0:
+    twin, s, rows = twin_of(bad), bad.scored.samples, _near(bad, zone, steps)
+    if len(rows) == 0:
         raise Redraw("nobody looks there")
-    most = float(twin_of(bad).left(points, normals).max())
+    few = rows[::max(1, len(rows) // 900)]
+    left = twin.left(s.points[few], s.normals[few])
+    deep = s.points[few[np.argsort(-left)[:20]]]
+    close = rows[(np.linalg.norm(s.points[rows][:, None] - deep, axis=2) < 0.4).any(axis=1)]
+    most = max(float(left.max()), float(twin.left(s.points[close], s.normals[close]).max()))
     if most < LEAST_LEFT:
         raise Redraw(f"no {LEAST_LEFT} mm are left by it")
     return Planted(bad, ("residual",), None, most, zone)

@@ -33,30 +33,6 @@ def in_cutter(rho, h, radius, corner, length, upright):
 
 
 @njit(cache=True, nogil=True)
-def touch(tips, axes, points, shapes, cutter, upright):
-    """Deepest point of (n, 3) in the shapes (k, 5), or in the cutter (3,) where k is 0, for poses (m, 3) and (m, 3).
-
-    shapes : z0, z1, r0, r1 mm, and whether only the way aside counts
-
-    Returns (m,) depth, mm, and (m,) index of the point.
-    """
-    best, which = np.zeros(len(tips)), np.zeros(len(tips), np.int64)
-    for m in range(len(tips)):
-        for i in range(len(points)):
-            h, rho = _seen(points[i], tips[m], axes[m])
-            if len(shapes) == 0:
-                # over a tool along Z everything stands in its way, however long the flutes are
-                d = in_cutter(rho, h, cutter[0], cutter[1], 1e9 if upright else cutter[2], upright)
-                if d > best[m]:
-                    best[m], which[m] = d, i
-            for k in range(len(shapes)):
-                d = _in_shape(shapes[k], h, rho)
-                if d > best[m]:
-                    best[m], which[m] = d, i
-    return best, which
-
-
-@njit(cache=True, nogil=True)
 def _in_shape(shape, h, rho):
     z0, z1 = shape[0], shape[1]
     if not z0 < h < z1:
@@ -98,19 +74,35 @@ def taken_at(points, tips, axes, moves, cutter, out):
 
 
 @njit(cache=True, nogil=True)
-def touch_standing(tips, axes, moves, points, gone, shapes):
-    """As ``touch`` for shapes, of places that no move up to that of the pose has taken; moves (m,), gone (n,)."""
+def touch_standing(tips, axes, moves, points, gone, shapes, cutter, upright):
+    """As ``touch``, of places that no move up to that of the pose has taken; moves (m,), gone (n,)."""
     best, which = np.zeros(len(tips)), np.zeros(len(tips), np.int64)
     for m in range(len(tips)):
         for i in range(len(points)):
             if gone[i] <= moves[m]:
                 continue
             h, rho = _seen(points[i], tips[m], axes[m])
+            d = -1.0
+            if len(shapes) == 0:
+                # over a tool along Z everything stands in its way, however long the flutes are
+                d = in_cutter(rho, h, cutter[0], cutter[1], 1e9 if upright else cutter[2], upright)
             for k in range(len(shapes)):
-                d = _in_shape(shapes[k], h, rho)
-                if d > best[m]:
-                    best[m], which[m] = d, i
+                d = max(d, _in_shape(shapes[k], h, rho))
+            if d > best[m]:
+                best[m], which[m] = d, i
     return best, which
+
+
+@njit(cache=True, nogil=True)
+def touch(tips, axes, points, shapes, cutter, upright):
+    """Deepest point of (n, 3) in the shapes (k, 5), or in the cutter (3,) where k is 0, for poses (m, 3) and (m, 3).
+
+    shapes : z0, z1, r0, r1 mm, and whether only the way aside counts
+
+    Returns (m,) depth, mm, and (m,) index of the point.
+    """
+    moves, gone = np.zeros(len(tips), np.int64), np.ones(len(points), np.int64)
+    return touch_standing(tips, axes, moves, points, gone, shapes, cutter, upright)
 
 
 @njit(cache=True, nogil=True)

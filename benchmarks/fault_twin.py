@@ -91,7 +91,8 @@ class Twin:
             poses = self.way.poses(rows, step)
             points = points[in_blank(points, self.case.setup)]
             points = points[taken_in(points, poses.tip, poses.axis, shapes)]
-            best, which = touch_standing(poses.tip, poses.axis, poses.move, points, self._gone(points), shapes)
+            best, which = touch_standing(poses.tip, poses.axis, poses.move, points, self._gone(points), shapes,
+                                         np.zeros(3), False)
             if best.max(initial=0.0) <= 0.0:
                 return depth, where
             per_move, where = self._by_line(depth, poses.move, best), points[which[np.argmax(best)]]
@@ -180,20 +181,22 @@ class Twin:
         if upright:  # whatever stands over the end of the tool is in its way
             low, high = np.append(low[:2] + 0.3, low[2] + margin), np.append(high[:2] - body.flute_length, high[2])
             high[2] = self.case.blank_top
-        points, step = _grid(low, high, max(0.25, float(np.cbrt(np.prod(high - low) / 400_000)))), 0.0
+        points = _grid(low, high, max(0.25, float(np.cbrt(np.prod(high - low) / 400_000))))
         skin = points[in_blank(points - [0.0, 0.0, 0.3], self.case.setup) & ~in_blank(points, self.case.setup)]
         points = np.vstack([points, np.column_stack([skin[:, :2], np.full(len(skin), self.case.blank_top - 1e-6)])])
-        most, where = -1.0, np.zeros(3)
+        most, where, apart = -1.0, np.zeros(3), 0.25
         for fine in (0.08, 0.02, 0.0):
             points = points[self.standing(points, line)]
             best, which = touch(poses.tip, poses.axis, points, np.zeros((0, 5)), cutter, upright)
             if best.max(initial=0.0) <= 0.0:
                 break
-            most, where = float(best.max()), points[which[np.argmax(best)]]
-            step = 3.5 * fine
+            deep = np.argsort(-best, kind="stable")
+            deep = deep[best[deep] > best.max() - 1.2 * apart]
+            most, where, step = float(best[deep[0]]), points[which[deep[0]]], 3.5 * fine
             if fine:
-                points = _grid(where - step, where + step, fine / 2)
-                poses = self.way.poses(rows, 0.03)
+                seeds = thinned(points[which[deep]], max(apart, 0.05))[:60]
+                points = np.vstack([_grid(p - step, p + step, fine / 2) for p in seeds])
+                poses, apart = self.way.poses(rows, 0.03), fine / 2
         return Found(most, frozenset([line]), tuple(np.round(where, 3).tolist()))
 
     def left(self, points: F64, normals: F64) -> F64:
@@ -247,9 +250,9 @@ def coarse_cloud(mesh: TriangleMesh) -> F64:
 
 
 def thinned(points: F64, size: float) -> F64:
-    """One of the points (n, 3), mm, of each cell of ``size`` mm."""
+    """The first of the points (n, 3), mm, of each cell of ``size`` mm, in their order."""
     _, first = np.unique(np.floor(points / size).astype(np.int64), axis=0, return_index=True)
-    return points[first]
+    return points[np.sort(first)]
 
 
 def blank_box(setup: ProofSetup) -> F64:

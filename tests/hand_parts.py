@@ -163,6 +163,26 @@ def as_part(mesh: TriangleMesh) -> Part:
     return Part(mesh, faces, (), mesh.volume, mesh.bounds, "mm", 0.001, 0.1, 0.0, (), "0" * 64)
 
 
+def prism(profile, fans, wide: float) -> Part:
+    """A closed ring in X and Z along Y from -wide to wide; faces 1.. along it, then the two ends.
+
+    fans : triangles of the ring's points that fill it
+    """
+    n = len(profile)
+    v = [(x, y, z) for y in (-wide, wide) for x, z in profile]
+    faces, ids = [], []
+    for k in range(n):
+        a, b = k, (k + 1) % n
+        faces += [(a, b + n, b), (a, a + n, b + n)]
+        ids += [k + 1] * 2
+    for q in fans:
+        faces += [q, (q[0] + n, q[2] + n, q[1] + n)]
+        ids += [n + 1, n + 2]
+    mesh = TriangleMesh(np.array(v, float), np.array(faces, np.int32), np.array(ids, np.int32))
+    assert mesh.volume > 0
+    return as_part(mesh)
+
+
 def box_mesh(lower, upper) -> TriangleMesh:
     """A closed box, face id 0."""
     m = terraces([lower[0], upper[0]], [lower[1], upper[1]], [[upper[2]]], lower[2])

@@ -25,17 +25,16 @@ ALIKE = 0.9  # of the largest part of a normal: along such an axis a lattice is 
 @njit(**KERNEL)
 def _across(t, u):
     """First and last v at which the line of this u crosses a triangle (3, 2); first > last where it passes by."""
-    a, b = 0, 1
     lo, hi = math.inf, -math.inf
     for k in range(3):
         p, q = t[k], t[(k + 1) % 3]
-        if p[a] == q[a]:
-            if p[a] == u:
-                lo, hi = min(lo, p[b], q[b]), max(hi, p[b], q[b])
+        if p[0] == q[0]:
+            if p[0] == u:
+                lo, hi = min(lo, p[1], q[1]), max(hi, p[1], q[1])
             continue
-        s = (u - p[a]) / (q[a] - p[a])
+        s = (u - p[0]) / (q[0] - p[0])
         if 0.0 <= s <= 1.0:
-            v = p[b] + s * (q[b] - p[b])
+            v = p[1] + s * (q[1] - p[1])
             lo, hi = min(lo, v), max(hi, v)
     return lo, hi
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from geometry.mesh import TriangleMesh
-from geometry.part import FaceInfo, Part
 from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment, ToolBody
+from tests.hand_parts import as_part, prism
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.prove import prove
 
@@ -17,28 +17,6 @@ BOTH = pytest.mark.parametrize("turn", [None, np.eye(3)], ids=["lines", "field"]
 HEAD = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z40"]
 BARE = ProofSetup(margin=0.0, uncertainty=0.0)
 SLOPE = math.tan(math.radians(30.0))
-
-
-def part_of(v, faces, ids):
-    mesh = TriangleMesh(np.array(v, float), np.array(faces, np.int32), np.array(ids, np.int32))
-    assert mesh.volume > 0
-    infos = tuple(FaceInfo(k, "plane", 1.0, False, 0.0, 0.0) for k in sorted(set(ids)))
-    return Part(mesh, infos, (), mesh.volume, mesh.bounds, "mm", 0.001, 0.1, 0.0, (), "0" * 64)
-
-
-def prism(profile, fans, wide):
-    """A profile in X and Z along Y from -wide to wide; faces 1.. along it, then the two ends."""
-    n = len(profile)
-    v = [(x, y, z) for y in (-wide, wide) for x, z in profile]
-    faces, ids = [], []
-    for k in range(n):
-        a, b = k, (k + 1) % n
-        faces += [(a, b + n, b), (a, a + n, b + n)]
-        ids += [k + 1] * 2
-    for q in fans:
-        faces += [q, (q[0] + n, q[2] + n, q[1] + n)]
-        ids += [n + 1, n + 2]
-    return part_of(v, faces, ids)
 
 
 def slab(x0, x1, wide, z0, z1):
@@ -152,7 +130,8 @@ def test_a_long_narrow_groove_where_nobody_scores_is_told(turn, depth):
 @pytest.mark.parametrize("depth", [0.02, 0.1])
 def test_the_tip_of_a_pyramid_counts(turn, depth):
     corners = [(-3.9, -3.88, -4), (4.1, -3.88, -4), (4.1, 4.12, -4), (-3.9, 4.12, -4), (0.1, 0.12, 0)]
-    pyramid = part_of(corners, [(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)], [1, 1, 2, 3, 4, 5])
+    faces = [(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
+    pyramid = as_part(TriangleMesh(np.array(corners, float), np.array(faces, np.int32), np.array([1, 1, 2, 3, 4, 5])))
     held = ToolBody("T1", 1, 4.0, 0.0, 10.0, 3.8, 15.0, 4.0, 20.0, (HolderSegment(20.0, 20.0, 20.0),))
     over = depth_of("collision", ["G0 X-8 Y-30", f"Z{-20 - depth}", "G1 Y30 F500"], tool=held, part=pyramid,
                     setup=BARE, turn=turn)

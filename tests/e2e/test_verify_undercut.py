@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.part import FaceInfo, Part
 from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment, ToolBody
+from tests.hand_parts import prism
 from tests.pocket_case import line_of, text
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.prove import prove
@@ -17,30 +16,9 @@ MILL = ToolBody("T1", 1, 10.0, 0.0, 12.0, 9.8, 20.0, 10.0, 40.0)
 SLOT = ToolBody("T2", 2, 12.0, 0.0, 3.0, 6.0, 25.0, 6.0, 40.0, (HolderSegment(20.0, 20.0, 20.0),))
 SETUP = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, rapid_feed=5000.0)
 PROFILE = [(-20, -10), (20, -10), (20, -6), (-2, -6), (-2, -3), (0, -3), (0, 0), (-20, 0)]  # X, Z
-QUADS = [(0, 1, 2, 3), (0, 3, 4, 7), (4, 5, 6, 7)]
-
-
-def bracket() -> Part:
-    """An arm 2 mm out over a slot 3 mm high, 30 mm long in Y; faces 1..8 along the profile, 9 and 10 the ends."""
-    ring = np.array(PROFILE, float)
-    n = len(ring)
-    v = np.array([(x, y, z) for y in (-15.0, 15.0) for x, z in ring])
-    faces, ids = [], []
-    for k in range(n):
-        a, b = k, (k + 1) % n
-        faces += [(a, b + n, b), (a, a + n, b + n)]
-        ids += [k + 1] * 2
-    for q in QUADS:
-        faces += [(q[0], q[1], q[2]), (q[0], q[2], q[3])]
-        faces += [(q[0] + n, q[2] + n, q[1] + n), (q[0] + n, q[3] + n, q[2] + n)]
-        ids += [9, 9, 10, 10]
-    mesh = TriangleMesh(v, np.array(faces, np.int32), np.array(ids, np.int32))
-    infos = tuple(FaceInfo(f, "plane", float(mesh.areas[mesh.face_ids == f].sum()), False, 0.0, 0.0)
-                  for f in range(1, 11))
-    return Part(mesh, infos, (), mesh.volume, mesh.bounds, "mm", 0.001, 0.1, 0.0, (), "0" * 64)
-
-
-PART = bracket()
+FANS = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 7), (4, 5, 6), (4, 6, 7)]
+PART = prism(PROFILE, FANS, 15.0)
+"""An arm 2 mm out over a slot 3 mm high, 30 mm long in Y; faces 1..8 along the profile, 9 and 10 the ends."""
 
 
 def scored(faces: tuple[int, ...]) -> ScoredSamples:

@@ -62,21 +62,12 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
 
     Returns (inf, 0) where the move passes by.
     """
-    return _lowest(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner)
+    return lowest_within(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner)
 
 
 @njit(cache=True, nogil=True)
-def lowest_end(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
-    """Least height over (x, y) of what of a profile, flat to a and round by r, is no farther out than ``wide``.
-
-    inf where that passes by.
-    """
-    return _lowest(x, y, ax, ay, az, dx, dy, dz, wide, a, r)[0]
-
-
-@njit(cache=True, nogil=True)
-def _lowest(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
-    """As ``lowest``, of a profile flat to a and round by r that counts as far as ``wide`` from the axis."""
+def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
+    """As ``lowest``, of what of a profile, flat to a and round by r, is no farther out than ``wide``."""
     wx, wy = x - ax, y - ay
     plan2 = dx * dx + dy * dy
     if plan2 < 1e-18:

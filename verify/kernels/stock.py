@@ -15,7 +15,7 @@ from numba import njit
 
 from verify.kernels.engaged import LEAST_DEPTH, sector_bits
 from verify.kernels.frustum import contact
-from verify.kernels.heights import INF, _cells, entered, lowest, lowest_end
+from verify.kernels.heights import INF, _cells, entered, lowest, lowest_within
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
@@ -117,7 +117,8 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
-            over = low + gone - lowest_end(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner)
+            end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner)
+            over = low + gone - end
             gone = min(gone, over)
             if gone > 0.0:
                 paid = earned - since[i - i0, j - j0]
