@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 
 from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
@@ -22,6 +22,7 @@ from geometry.nearest import nearest
 from geometry.quadgrid import even
 
 MOST_ROUNDS = 20
+ROUNDS = 12  # of putting places on edges between two places of the border
 LEAST_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
 
 
@@ -94,16 +95,19 @@ def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarra
     x[1::2] += 0.5 * spacing
     lattice = np.column_stack([x.ravel(), y.ravel()])
     places = np.vstack([edge, lattice[shapely.contains_xy(region.buffer(-0.5 * spacing), *lattice.T)]])
-    while True:
+    for _ in range(ROUNDS):
         faces = Delaunay(places).simplices
         middle = places[faces].mean(axis=1)
         faces = faces[shapely.contains_xy(region, *middle.T)]
         edges, shared = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
                                   return_counts=True)
         chords = edges[(edges < count).all(axis=1) & (shared == 2)]
-        if not len(chords):
+        middle = places[chords].mean(axis=1)
+        # one that is there already was the corner of a triangle without area
+        middle = middle[cKDTree(places).query(middle)[0] > 1e-6 * spacing]
+        if not len(middle):
             break
-        places = np.vstack([places, places[chords].mean(axis=1)])
+        places = np.vstack([places, middle])
     a, b, c = (places[faces[:, k]] for k in range(3))
     over = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     faces[over] = faces[over][:, ::-1]

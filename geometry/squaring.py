@@ -32,6 +32,8 @@ NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a tur
 MOST_CUTS = 24
 BLENDS = (0.25, 0.5, 0.75)
 LEAST_PIECE = 1e-4  # of the region: what is cut off smaller is dust
+TAIL = 0.03  # of the region: a piece that small may be left out where it folds
+THIN = (0.004, 0.008)  # of the border: a tail no wider than twice that
 
 
 class Method(StrEnum):
@@ -73,7 +75,8 @@ def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int
     Returns
     -------
     list of Squared
-        Xi runs along the longer sides.
+        Xi runs along the longer sides. Pieces and thin tails of under 3 % of the area that fold whatever is tried are
+        left out, and the others say so.
 
     Raises
     ------
@@ -86,23 +89,47 @@ def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int
     if not outer.is_valid or outer.area <= 0.0:
         raise GeometryError("a border crosses itself or has no area", code="bad_border",
                             measured=float(outer.area), limit=0.0, remedy="trim the face again")
-    out, todo = [], [(piece, 0) for piece in _cut(outer, NEAR[0])]
+    out: list[Squared] = []
+    left = 0.0
+    todo = [(piece, 0) for piece in _cut(outer, NEAR[0])]
     while todo:
         piece, k = todo.pop(0)
         try:
             out.append(_laid(piece, by, shape, only, tuple(notes)))
         except GeometryError as refusal:
-            parts = [piece]
-            while len(parts) == 1:
-                k += 1
-                if refusal.code != "no_square" or k == len(NEAR):
-                    raise
-                parts = _cut(piece, NEAR[k])
+            if refusal.code != "no_square":
+                raise
+            if piece.area < TAIL * outer.area:
+                left += piece.area
+                continue
+            parts, k = _smaller(piece, k)
+            if not parts:
+                raise
+            left += piece.area - sum(part.area for part in parts)
             todo[:0] = [(part, k) for part in parts]
+    if left > LEAST_PIECE * outer.area:
+        tails = f"thin tails of {left:.3g} mm², which fold whatever is tried, are left out"
+        out = [replace(piece, notes=(tails, *piece.notes)) for piece in out]
     if len(out) > 1:
         cut = f"cut into {len(out)} pieces where the border turns in by more than 50 degrees"
         out = [replace(piece, notes=(cut, *piece.notes)) for piece in out]
     return out
+
+
+def _smaller(piece: shapely.Polygon, k: int) -> tuple[list[shapely.Polygon], int]:
+    """A piece that folds without its thin tails, or cut where it turns in over more of its border than NEAR[k]; none
+    where there is neither; and the new k."""
+    for thin in THIN:
+        wide = thin * piece.length
+        body = piece.buffer(-wide, join_style="mitre").buffer(wide, join_style="mitre", mitre_limit=10.0)
+        bodies = [p for p in getattr(body, "geoms", [body]) if p.area > TAIL * piece.area]
+        if bodies and 1e-6 < 1.0 - sum(p.area for p in bodies) / piece.area < TAIL:
+            return bodies, k
+    for more in range(k + 1, len(NEAR)):
+        parts = _cut(piece, NEAR[more])
+        if len(parts) > 1:
+            return parts, more
+    return [], k
 
 
 def _ring(piece: shapely.Polygon) -> F64:
@@ -191,9 +218,9 @@ def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method 
             continue
         return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / by,
                        (*notes, *tried))
-    middle = (shapely.get_coordinates(piece.representative_point())[0] / by).tolist()
-    raise GeometryError(f"a piece of a region round uv {middle} folds whatever is tried: {'; '.join(tried)}",
-                        code="no_square", subjects=(f"uv {middle}",), measured=len(tried), limit=0,
+    middle = (shapely.get_coordinates(piece.representative_point())[0] / by).round(4).tolist()
+    raise GeometryError(f"a piece of a region round uv {middle} folds whatever is tried",
+                        code="no_square", subjects=(f"uv {middle}",), measured=tried, limit=0,
                         remedy="machine it by another strategy")
 
 

@@ -27,6 +27,7 @@ from output.stepnc_words import (
     region_outline,
     setup_words,
     stock_box,
+    to_and_fro,
 )
 from output.text import step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -190,11 +191,15 @@ class _Arm:
         return self.tools[tool.number]
 
     def _strategy(self, step: Workingstep) -> int:
-        """For information: the planes the passes lie in, tolerance, scallop and side step."""
-        add, normal = self.file.add, pass_plane_normal(step)
+        """For information: the planes or parameters the passes run along, tolerance, scallop and side step."""
+        add = self.file.add
         tolerances = add(f"TOLERANCES({real(step.chordal_tolerance, 6)},{real(step.scallop_height, 6)})")
-        plane = add(f"DIRECTION('normal of the pass planes',{reals(normal, 6)})")
-        mode = ".ZIGZAG." if step.strategy == "zigzag" else ".FORWARD."
+        mode = ".ZIGZAG." if to_and_fro(step) else ".FORWARD."
         cut = ".CLIMB." if step.climb else ".CONVENTIONAL."
         side = real(step.side_step) if step.side_step > 0.0 else "$"
+        if step.strategy == "isoparametric":
+            along = add(f"DIRECTION('along the passes in parameters',{reals((1.0, 0.0, 0.0), 6)})")
+            across = add(f"DIRECTION('across the passes in parameters',{reals((0.0, 1.0, 0.0), 6)})")
+            return add(f"UV_STRATEGY({mode},{cut},#{tolerances},{side},#{along},#{across})")
+        plane = add(f"DIRECTION('normal of the pass planes',{reals(pass_plane_normal(step), 6)})")
         return add(f"PLANE_CL_STRATEGY({mode},{cut},#{tolerances},{side},#{plane})")

@@ -26,6 +26,14 @@ def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
     return (float(np.cos(angle)), float(np.sin(angle)), 0.0)
 
 
+def to_and_fro(step: Workingstep) -> bool:
+    """Whether passes are walked to and fro: those along the borders of faces where most go against the one before."""
+    if step.strategy != "isoparametric":
+        return step.strategy == "zigzag"
+    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is Motion.CUT]).reshape(-1, 3)
+    return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
+
+
 def region_outline(step: Workingstep) -> I64:
     """The outline of a step at its top, closed, at least three different points: (k, 3) int64 grid points."""
     outline = np.asarray(step.outline, dtype=np.float64)

@@ -8,7 +8,7 @@ found nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,14 @@ from service.preview import draw_preview
 from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Side, file_name, in_first_frame, in_setup_frame, nc_program
+from service.trimmed import trimmed_faces
 from service.version import VERSION
 from toolpath.family import Target
-from toolpath.plan import CutData, Plan, PlanSettings, plan_job
+from toolpath.motion import RAPID_MM_MIN
+from toolpath.plan import Plan, plan_job
+from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
+from toolpath.strategies.isoparametric import TrimmedFace
 from toolpath.strategies.zigzag import Pattern
 from verify.model import Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
@@ -73,10 +77,11 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     ready = prepare(part_path, setup, progress)
     scored = score(ready)
     checks = scored.checks(ready)
+    trimmed = trimmed_faces(part_path, ready) if setup.operations.finishing else {}
     sides: list[Side] = []
     for k, view in enumerate(ready.views):
         share = _Share(progress, k, len(ready.views))
-        sides.append(_side(ready, view, checks, sum(len(s.made.steps) for s in sides), share))
+        sides.append(_side(ready, view, checks, trimmed, sum(len(s.made.steps) for s in sides), share))
     made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
     zone, given_up = scored.without(made, ready.zones)
     first = ready.views[0]
@@ -122,14 +127,15 @@ class _Share:
         self.progress(stage, self.low + self.width * share)
 
 
-def _side(ready: Prepared, view: View, checks: list[Target], steps: int, share: _Share) -> Side:
+def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[TrimmedFace]], steps: int,
+          share: _Share) -> Side:
     """Plan and write the zones of one access, from the whole blank; the proof has what the accesses before leave."""
     stock = planning_stock(ready, view)
     settings = plan_settings(ready, view, stock)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                    lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1)
+                    lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1, trimmed=trimmed)
     share.tell("write", 0.99)
     work = workplan(ready, view, made, settings)
     return Side(view, made, work, write_linuxcnc(work) if made.steps else "")
@@ -276,7 +282,7 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=s.machine.rapid_mm_min or reporting.RAPID_MM_MIN, work_offset=_access(ready, view).work_offset,
+        rapid_feed=s.machine.rapid_mm_min or RAPID_MM_MIN, work_offset=_access(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
         gauge_length={body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
                       body.stickout + sum(h.length for h in body.holder)

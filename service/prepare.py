@@ -98,9 +98,13 @@ def clearances(setup: Setup) -> Clearances:
 
 def load(path: Path, setup: Setup) -> Part:
     """The part of a STEP file in the setup frame."""
+    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup))
+
+
+def placement_of(setup: Setup) -> Placement:
+    """The setup frame in the coordinates of the file."""
     p = setup.placement
-    placement = Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
-    return read_part(path, placement=placement, solid=setup.part.solid, chord=mesh_chord(setup))
+    return Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
 
 
 def obstacle_mesh(part: Part, setup: Setup) -> TriangleMesh:

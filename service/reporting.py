@@ -14,14 +14,14 @@ from schemas.setup import Setup, setup_sha256
 from service import advice, offers
 from service.prepare import Prepared, clearances
 from service.version import VERSION
+from toolpath.finish import ZonePlan
 from toolpath.motion import Motion, Workingstep
-from toolpath.plan import Plan, ZonePlan
+from toolpath.plan import Plan
 from verify.model import Proof
 from zones.regions import Labels
 from zones.remainder import Remainder, explain
 from zones.zoning import ZoneArea, is_open
 
-RAPID_MM_MIN = 10000.0
 REMAINDER_FLOOR_MM2 = 0.005
 ZONES_KEYS = ("part", "walls", "connections", "channels", "mcz", "cutting_planes", "machinable_area_mm2",
               "machinable_by_role_mm2", "zones", "remainder", "proposal")
@@ -228,7 +228,7 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
                    rejected=[*out["rejected"], *plan.rejected])
     if mine:
         out.update(cutting_length_mm=r(sum(map(cutting_length, mine)), 1), step=mine[0].id,
-                   machining_time_s=r(sum(map(step_time, mine)), 1), steps=[s.id for s in mine])
+                   machining_time_s=r(sum(s.seconds for s in mine), 1), steps=[s.id for s in mine])
     if result is not None:
         out["scallop_mm"] |= {"p50": r(result.scallop_p50, 5), "p99": r(result.scallop_p99, 5),
                               "max": r(result.scallop_max, 5)}
@@ -243,20 +243,11 @@ def cutting_length(step: Workingstep) -> float:
                      if t.motion is Motion.CUT))
 
 
-def step_time(step: Workingstep) -> float:
-    """Time of a step at its feeds, rapids at ``RAPID_MM_MIN``, s."""
-    total = 0.0
-    for t in step.trajectories:
-        length = float(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum())
-        total += 60.0 * length / (RAPID_MM_MIN if t.motion is Motion.RAPID else t.feed)
-    return total
-
-
 def _step(step: Workingstep) -> dict[str, Any]:
     return {"id": step.id, "name": step.name, "zone": step.zone, "tool": step.tool.id, "operation": step.operation,
             "strategy": step.strategy, "faces": faces(step.faces), "spindle_rpm": r(step.spindle_rpm, 1),
             "feed_mm_min": r(step.feed, 1), "side_step_mm": r(step.side_step),
-            "cutting_length_mm": r(cutting_length(step), 1), "machining_time_s": r(step_time(step), 1),
+            "cutting_length_mm": r(cutting_length(step), 1), "machining_time_s": r(step.seconds, 1),
             "points": int(sum(len(t.points) for t in step.trajectories))}
 
 

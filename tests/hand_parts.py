@@ -17,8 +17,11 @@ from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.toolbody import HolderSegment, ToolBody
 from toolpath.family import Target
 from toolpath.motion import Motion
-from toolpath.plan import CutData, Plan, PlanSettings, plan_job
+from toolpath.plan import Plan, plan_job
+from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
+from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.zigzag import Pattern
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
 from zones.planview import ChannelPlan
@@ -263,10 +266,11 @@ class Case:
 def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.02, chord: float = 0.004,
               allowance: float = 0.0, climb: bool = True, either: bool = False, roughing: bool = True,
               near_net: bool = True, faces: set[int] | None = None, fixtures: tuple = (), density: float = 30.0,
-              step_down: float = 0.3, spare: float = 1.0) -> Case:
+              step_down: float = 0.3, spare: float = 1.0, trimmed: tuple[TrimmedFace, ...] = (),
+              pattern: Pattern = Pattern.AUTO) -> Case:
     """Zones and plan of a part; ``step_down`` in tool diameters, ``fixtures`` as (lower, upper) boxes.
 
-    ``spare`` is what a block of stock stands wider than the part, mm.
+    ``spare`` is what a block of stock stands wider than the part, mm; ``trimmed`` are its exact faces, if any.
     """
     part = as_part(mesh)
     tree = TriangleTree(mesh)
@@ -284,10 +288,12 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     stock = StockMap.around(tree, mesh.bounds, 1.0, 0.12) if near_net else StockMap.box(tree, lo, hi, 0.12)
     before = StockMap(stock.lattice, stock.top.copy())
     floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0
-    settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either)
+    settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either,
+                            pattern)
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
     checks = [Target(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
-    plan = plan_job(zones, checks, fields, cut, stock, settings)
+    plan = plan_job(zones, checks, fields, cut, stock, settings,
+                    trimmed={z.id: [f for f in trimmed if f.face in z.faces] for z in zones})
     return Case(part, tree, samples, view, fields, zones, settings, before, plan)
 
 

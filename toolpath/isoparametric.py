@@ -57,18 +57,19 @@ def side_step(curvature: F64, radius: float, scallop: float) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class IsoSurface:
-    """A surface over the unit square."""
+    """A surface over the unit square; ``turned``: xi is the grid's eta."""
 
     surface: NurbsSurface
     grid: GridMap
+    turned: bool = False
 
     def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
         """Places (p, 3) mm and unit normals (p, 3) at xi and eta, both (p,)."""
-        return self.surface.points_and_normals(self._inside(self.grid(xi, eta)))
+        return self.surface.points_and_normals(self._inside(self._uv(xi, eta)))
 
-    def curve(self, eta: float) -> Curve:
-        """The pass at eta, as ``toolpath.forward`` takes it."""
-        return lambda xi: self.contact(xi, np.full(len(xi), eta))
+    def curve(self, eta: float, low: float = 0.0, high: float = 1.0) -> Curve:
+        """The pass at eta from one xi to another, as ``toolpath.forward`` takes it."""
+        return lambda t: self.contact(low + (high - low) * t, np.full(len(t), eta))
 
     def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:
         """How the surface lies across a pass at xi and eta, both (p,).
@@ -80,8 +81,8 @@ class IsoSurface:
 
         The way square to the direction (u', v') is (-(F u' + G v'), E u' + F v').
         """
-        uv = self._inside(self.grid(xi, eta))
-        along, over = self.grid.tangents(xi, eta)
+        uv = self._inside(self._uv(xi, eta))
+        along, over = self.grid.tangents(eta, xi)[::-1] if self.turned else self.grid.tangents(xi, eta)
         first, second = self.surface.forms(uv)
         e, f, g = first.T
         u, v = -(f * along[:, 0] + g * along[:, 1]), e * along[:, 0] + f * along[:, 1]
@@ -89,6 +90,9 @@ class IsoSurface:
         curvature = (second[:, 0] * u * u + 2.0 * second[:, 1] * u * v + second[:, 2] * v * v) / size
         inner = e * u * over[:, 0] + f * (u * over[:, 1] + v * over[:, 0]) + g * v * over[:, 1]
         return np.abs(inner) / np.sqrt(size), curvature
+
+    def _uv(self, xi: F64, eta: F64) -> F64:
+        return self.grid(eta, xi) if self.turned else self.grid(xi, eta)
 
     def _inside(self, uv: F64) -> F64:
         return np.clip(uv, *self.surface.domain)

@@ -7,11 +7,13 @@ the lattice, so their distance is right to one lattice step, and every move is t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import (
@@ -208,6 +210,20 @@ def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Half-open ranges [a, b) of indices with consecutive True values of flags (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def serving(lines: Sequence[Line], tips: F64, reach: float, spacing: float, overrun: float, link: float) -> list[Line]:
+    """Lines as far as they come within ``reach`` mm of some tips, and ``overrun`` mm more.
+
+    tips    : (n, 2) float64, mm, looked at in plan, or (n, 3)
+    spacing : mm between places along a line that are looked at; link : mm, gaps up to that are walked through
+    """
+    tree, k = cKDTree(tips), tips.shape[1]
+    out: list[Line] = []
+    for line in lines:
+        way = Line(dense(line.points, spacing), line.closed)
+        out.extend(pieces_where(way, tree.query(way.points[:, :k])[0] <= reach, overrun, link))
+    return out
 
 
 def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: float) -> list[Line]:

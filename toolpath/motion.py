@@ -9,8 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+
+RAPID_MM_MIN = 10000.0  # of a machine that does not say
 
 
 class Motion(StrEnum):
@@ -36,6 +40,11 @@ class Trajectory:
     points: F64
     feed: float
 
+    @property
+    def length(self) -> float:
+        """mm."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
 
 @dataclass(frozen=True, eq=False)
 class Workingstep:
@@ -46,7 +55,7 @@ class Workingstep:
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
     operation : 'roughing' or 'finishing'
-    strategy  : 'layers', 'zlevel', 'floor', 'zigzag', 'one_way', 'spiral'
+    strategy  : 'layers', 'zlevel', 'floor', 'zigzag', 'one_way', 'spiral', 'isoparametric'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     """
@@ -68,3 +77,8 @@ class Workingstep:
     top: float
     bottom: float
     climb: bool = True
+
+    @property
+    def seconds(self) -> float:
+        """Time at its feeds, rapids at ``RAPID_MM_MIN``, without acceleration."""
+        return sum(60.0 * t.length / (RAPID_MM_MIN if t.motion is Motion.RAPID else t.feed) for t in self.trajectories)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from geometry.mesh import F64
@@ -36,6 +38,12 @@ class ResidualMap:
             key = c[:, 1] * self.ncx + c[:, 0]
         self.items = np.argsort(key, kind="stable")
         self.starts = np.searchsorted(key[self.items], np.arange(self.ncx * self.ncy + 1))
+
+    def copied(self) -> ResidualMap:
+        """The same, to be lowered on its own."""
+        out = copy.copy(self)
+        out.residual = self.residual.copy()
+        return out
 
     def cut(self, path: F64, tool: ToolBody) -> None:
         """Lower the residual by one polyline of tips (m, 3), mm."""

@@ -6,6 +6,7 @@ safety: the proof reads the finished program with a model of its own (``verify``
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -59,6 +60,16 @@ class StockMap:
         y = lat.y0 + step * np.arange(lat.ny)
         inside = ((y >= lower[1]) & (y <= upper[1]))[:, None] & ((x >= lower[0]) & (x <= upper[0]))[None, :]
         return cls(lat, np.where(inside, upper[2], -np.inf), None, _in_cells(tree, lat))
+
+    def copied(self) -> StockMap:
+        """The same stock, to be cut on its own."""
+        out = copy.copy(self)
+        out.top, out.cover, out._pooled = self.top.copy(), self.cover.copy(), self._pooled.copy()
+        return out
+
+    def become(self, other: StockMap) -> None:
+        """Take over what a copy of this has come to."""
+        self.top, self.cover, self._pooled = other.top, other.cover, other._pooled
 
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""

@@ -20,7 +20,8 @@ from verify.reader import read_program
 SHARED = Path(__file__).parents[2].parent / "shared"
 CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
-JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40)}
+JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40),
+        "along borders": lambda: plan(step(1, BALL, "isoparametric"))}
 
 
 def flat_step():

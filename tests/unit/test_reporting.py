@@ -9,8 +9,8 @@ import pytest
 
 from service import reporting
 from tests.synthetic_plan import BALL, step
+from toolpath.finish import ZonePlan
 from toolpath.motion import Motion, Trajectory
-from toolpath.plan import ZonePlan
 
 
 def cut(length: float, feed: float) -> tuple[Trajectory, ...]:

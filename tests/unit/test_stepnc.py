@@ -105,6 +105,18 @@ def test_arm_units_signs_and_tool_bodies():
     assert text.count("PLANE_CL_STRATEGY(.ZIGZAG.") == 1
 
 
+def test_passes_along_the_borders_of_faces_are_told_by_parameters():
+    """One pass alone goes forward; each against the one before it is to and fro."""
+    along = np.array([[0.0, 0, 5], [10, 0, 5]])
+    one_way, both_ways = ([Trajectory(Motion.CUT, p, 600.0) for p in ways] for ways in
+                          ([along, along + [0.0, 1, 0]], [along, along[::-1] + [0.0, 1, 0]]))
+    for cuts, mode in ((one_way, "FORWARD"), (both_ways, "ZIGZAG")):
+        link = Trajectory(Motion.CONNECT, np.array([cuts[0].points[-1], cuts[1].points[0]]), 600.0)
+        job = plan(step(1, BALL, "isoparametric", trajectories=(cuts[0], link, cuts[1])))
+        text = write_stepnc_arm(job)
+        assert text.count(f"UV_STRATEGY(.{mode}.,.CLIMB.,") == 1 and "PLANE_CL_STRATEGY" not in text
+
+
 def test_arm_workplan_starts_with_a_rapid_and_ids_are_unique():
     text = write_stepnc_arm(plan())
     data = instances(text)

@@ -8,14 +8,13 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target
-from toolpath.levels import Line, dense, pieces_where
+from toolpath.levels import Line, dense, pieces_where, serving
 from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
@@ -67,14 +66,9 @@ class Layout:
 
     def near(self, failing: NDArray[np.int64]) -> list[Line]:
         """The lines as far as they serve some samples of the area (indices): a side step round their tips."""
-        tips = cKDTree(self.swath.target.tips[failing, :2])
-        out: list[Line] = []
-        for line in self.lines:
-            way = Line(dense(line.points, self.swath.target.spacing), line.closed)
-            served = tips.query(way.points[:, :2])[0] <= self.side_step
-            promise = self.swath.promise
-            out.extend(pieces_where(way, served, promise.overrun, promise.link))
-        return out
+        target, promise = self.swath.target, self.swath.promise
+        return serving(self.lines, target.tips[failing, :2], self.side_step, target.spacing, promise.overrun,
+                       promise.link)
 
     def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
         """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.

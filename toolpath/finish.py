@@ -1,0 +1,319 @@
+"""The finish of one zone: its strategy, walked round by round until nothing is left, and the choice between two.
+
+The passes of a zone are laid out by formula and then measured at the zone's samples; where more is left than
+the budget allows, passes are put in between, only there, each time half as far apart. So the narrowest spot
+never sets the step for a whole zone.
+
+A pass is left out where shank or holder would meet stock that other zones still have to take off.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.toolbody import ToolBody
+from toolpath.border import beyond
+from toolpath.family import Promise, Target
+from toolpath.isoparametric import side_step
+from toolpath.levels import Line, serving
+from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
+from toolpath.motion import Motion, Workingstep
+from toolpath.residual import ResidualMap
+from toolpath.settings import CutData, PlanSettings
+from toolpath.stock import SKIN, StockMap
+from toolpath.strategies import floor, isoparametric, spot, zigzag, zlevel
+from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.zigzag import Pattern
+from zones.machinable import Form
+from zones.reach import TipField
+from zones.zoning import ZoneArea
+
+LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest
+CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
+LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
+PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
+REFINEMENTS = 4
+BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
+WORTH_A_TRY = 1.15  # of the way of the usual passes: iso-parametric ones that are more are not walked
+
+
+@dataclass(frozen=True, eq=False)
+class ZonePlan:
+    """What was planned for a zone.
+
+    step     : id of its first finishing workingstep, None where nothing could be planned
+    side_step: mm between passes as laid out
+    passes   : cutting passes between links, of all its workingsteps
+    left     : (k,) indices into the zone's checks that the planner's own measure finds above the budget
+    rejected : other patterns with their figures
+    """
+
+    zone: ZoneArea
+    step: str | None
+    strategy: str
+    side_step: float
+    passes: int
+    left: NDArray[np.int64]
+    rejected: tuple[dict[str, object], ...] = ()
+
+
+class Finish:
+    """The finish of one zone: walked once, and again where stock was in the way that is gone since.
+
+    zone, checks, field, cut, stock, settings : as ``plan_job`` has them; faces : of the zone, exact and trimmed
+    """
+
+    def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
+                 settings: PlanSettings, faces: Sequence[TrimmedFace] = ()) -> None:
+        self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
+        self.given = len(checks.points)
+        if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
+            r = field.tool.corner_radius or field.tool.radius
+            checks = checks.joined(beyond(field, checks, settings.lift, BORDER_SHARE * math.sqrt(
+                8.0 * settings.scallop_height * r), zone.faces))
+        self.checks = checks
+        self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
+                                    margin=1.5 * settings.scallop_height)
+        self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points))
+        self.faces = faces
+        self.step: str | None = None
+        self.passes = 0
+        self.met = np.zeros(len(checks.points), np.bool_)
+        self.walked: set[bytes] = set()
+
+    def walk(self, step_id: str) -> list[Workingstep]:
+        """The workingstep of the zone; none where no pass is walked.
+
+        Where passes along the borders of its faces are not much more way than the usual ones, both are walked, each
+        until no more than the scallop is left, and the faster one stays.
+        """
+        every = np.ones(len(self.checks.points), np.bool_)
+        other, refused = self._along_borders()
+        if other is None:
+            self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
+            return self._rounds(step_id, every)
+        tries = [self._copied(self.strategy), self._copied(other)]
+        made = [t._rounds(step_id, every) for t in tries]
+        left = [int((t.residual.residual[:self.given] > self.settings.scallop_height).sum()) for t in tries]
+        seconds = [sum(step.seconds for step in steps) for steps in made]
+        best = int(bool(made[1]) and left[1] <= left[0] and seconds[1] < seconds[0])
+        if left[1] > left[0] and not best:
+            why: dict[str, object] = {"reason": "more samples are left above the scallop", "value": left[1],
+                                      "limit": left[0]}
+        else:
+            why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[1 - best], 1),
+                   "limit": round(seconds[best], 1)}
+        stock, taken = self.stock, tries[best]
+        stock.become(taken.stock)
+        rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[1 - best].strategy.name, **why})
+        self.__dict__.update(taken.__dict__ | {"stock": stock, "strategy": replace(taken.strategy, rejected=rejected)})
+        return made[best]
+
+    def _along_borders(self) -> tuple[_Strategy | None, tuple[dict[str, object], ...]]:
+        """Passes along the borders of the faces, None where there are none worth a try, and why."""
+        settings, usual, steep = self.settings, self.strategy, self.zone.form is Form.STEEP
+        asked = not steep and settings.pattern is not Pattern.AUTO
+        if not self.faces or asked or not isoparametric.suits(self.field.tool) or self.zone.form is Form.LEVEL:
+            return None, ()
+        every, scallop = np.arange(len(self.checks.points)), LAID_SHARE * settings.scallop_height
+        link = LINK_S * self.cut.feed / 60.0  # between passes that end elsewhere than the next begins
+        way = sum(line.length + (0.0 if line.closed or not steep else link)
+                  for lines in usual.rounds(0, every) for line in lines)
+        level = float(side_step(np.zeros(1), self.field.tool.corner_radius, scallop)[0])
+        least = self.given * self.checks.spacing**2 / level
+        if least > WORTH_A_TRY * way:
+            return None, (_not_taken("more way even on a plane, links counted, mm", least, way),)
+        chord = 0.5 * settings.chordal_tolerance
+        found = isoparametric.course(self.faces, self.checks, self.field, scallop, chord, steep)
+        refused: tuple[dict[str, object], ...] = tuple(
+            {"strategy": isoparametric.NAME, "reason": reason} for reason in found.refused)
+        if not found.groups:
+            return None, refused
+        there = found.way + (link * sum(len(group) for group in found.groups) if steep else 0.0)
+        if there > WORTH_A_TRY * way:
+            return None, (*refused, _not_taken("more way, links counted, mm", there, way))
+        made = isoparametric.laid(found, self.field, scallop, chord, settings.lift)
+
+        def rounds(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+            if k or not len(failing):
+                return usual.rounds(k, failing)
+            if len(failing) == len(every):
+                return made
+            tips, over = self.checks.tips[failing], 0.3 * self.field.tool.radius
+            return [serving(lines, tips, 1.5 * found.side_step, self.checks.spacing, over, over) for lines in made]
+
+        return _Strategy(isoparametric.NAME, found.side_step, rounds, not steep, usual.rejected), refused
+
+    def _copied(self, strategy: _Strategy) -> Finish:
+        """This finish with another strategy, to be walked on its own."""
+        out = copy.copy(self)
+        out.residual, out.stock = self.residual.copied(), self.stock.copied()
+        out.met, out.walked, out.strategy = self.met.copy(), set(self.walked), strategy
+        return out
+
+    def walk_again(self, step_id: str, least: float) -> list[Workingstep]:
+        """A workingstep for samples with more than ``least`` mm left at which stock was in the way that is gone now."""
+        k = np.flatnonzero(self.met & (self.residual.residual > least))
+        freed = np.zeros(len(self.met), np.bool_)
+        freed[k] = ~self.stock.meets_bodies(self.checks.tips[k], self.field.discs)
+        return self._rounds(step_id, freed)
+
+    def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
+        """All rounds for the samples ``wanted``, as one workingstep."""
+        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings))
+        budget = PASS_SHARE * self.settings.scallop_height
+        failing = np.flatnonzero(wanted & (self.residual.residual > budget))
+        for k in range(REFINEMENTS + 2):
+            if not len(failing):
+                break
+            for lines in self._groups(k, failing):
+                self._add(linker, lines, k)
+            failing = np.flatnonzero(wanted & (self.residual.residual > budget))
+        self.met[failing] = self.stock.meets_bodies(self.checks.tips[failing], self.field.discs)
+        if not linker.passes:
+            return []
+        zone, name = self.zone, self.strategy.name
+        self.step, self.passes = self.step or step_id, self.passes + linker.passes
+        faces = " ".join(f"F{f}" for f in zone.faces[:12])
+        return [step_of(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing",
+                      name, self.field.tool, self.cut, self.strategy.side_step, linker, self.settings)]
+
+    def plan(self) -> ZonePlan:
+        """What became of the zone."""
+        left = np.flatnonzero(self.residual.residual[:self.given] > self.settings.scallop_height)
+        return ZonePlan(self.zone, self.step, self.strategy.name, self.strategy.side_step, self.passes, left,
+                        self.strategy.rejected)
+
+    def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        if k > REFINEMENTS:
+            return [spot.touches(self.field, self.checks.tips[failing])]
+        return self.strategy.rounds(k, failing)
+
+    def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
+        """Walk lines of round k and measure them."""
+        tool, settings, name = self.field.tool, self.settings, self.strategy.name
+        thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
+        skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
+        ordered = self.strategy.ordered and k <= REFINEMENTS
+        if not ordered:
+            lines = nearest_order(lines, linker.at, settings.either_way)
+        for line in lines:
+            if not self.strategy.ordered:
+                line = turned(line, settings)
+            key = (np.round(line.points, 5) + 0.0).tobytes()
+            if key in self.walked:  # what it left, it leaves again
+                continue
+            before, last = len(linker.trajectories), 0
+            for layer in zigzag.skimmed(line, self.stock, tool, skin, slope):
+                last = len(linker.trajectories)
+                linker.add(layer, thin)
+            cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
+            for points in cuts:
+                self.residual.cut(points, tool)
+            whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
+            if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
+                self.walked.add(key)
+
+
+def _not_taken(reason: str, value: float, limit: float) -> dict[str, object]:
+    return {"strategy": isoparametric.NAME, "reason": reason, "value": round(value, 1), "limit": round(limit, 1)}
+
+
+def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
+    """Whether a zone is finished by a flat end that stands on it."""
+    return zone.form is Form.LEVEL and tool.radius > tool.corner_radius
+
+
+Rounds = Callable[[int, NDArray[np.int64]], list[list[Line]]]
+"""Lines of round k for the samples (indices into the zone's checks) that still need some."""
+
+
+@dataclass(frozen=True)
+class _Strategy:
+    """Name, distance between passes in mm, rounds, whether lines come in their order of machining, and what was
+    considered and not taken."""
+
+    name: str
+    side_step: float
+    rounds: Rounds
+    ordered: bool
+    rejected: tuple[dict[str, object], ...] = ()
+
+
+def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
+              settings: PlanSettings) -> _Strategy:
+    """How a zone is finished."""
+    tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
+    cusp = CUSP_SHARE * settings.scallop_height
+    if zone.form is Form.STEEP:
+        step = zlevel.level_step(tool, normals, cusp, cut.step_down)
+
+        def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+            tips = checks.tips[failing]
+            if k == 0:
+                levels, window = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
+            else:
+                window = step / 2.0 ** k
+                levels = zlevel.lowest_of_groups(tips[:, 2], window)
+            return zlevel.waterlines(field, tips, levels, 1.001 * window, chord)
+
+        return _Strategy("zlevel", step, waterlines, False)
+    if _has_floor(zone, tool):
+
+        def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+            return floor.planes(field, checks.tips[failing], chord, k) if k <= floor.MOST_FINER else []
+
+        return _Strategy("floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
+    promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
+                      LINK_S * cut.feed / 60.0)
+    layout = zigzag.laid(field, checks, promise, settings.pattern, settings.climb or settings.either_way)
+
+    def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        if k:
+            return [layout.between(k, failing)]
+        return [list(layout.lines) if len(failing) == len(checks.points) else layout.near(failing)]
+
+    return _Strategy(str(layout.pattern), layout.side_step, dragged, True, tuple(
+        {"strategy": str(other), "reason": "more way, links counted", "value": round(way, 1),
+         "limit": round(layout.way, 1)} for other, way in layout.rejected))
+
+
+def _once(strategy: _Strategy, count: int) -> _Strategy:
+    """The strategy with the first round for all samples kept: it is asked for its way, and walked."""
+    kept: list[list[list[Line]]] = []
+
+    def rounds(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        if k or len(failing) < count:
+            return strategy.rounds(k, failing)
+        if not kept:
+            kept.append(strategy.rounds(k, failing))
+        return kept[0]
+
+    return replace(strategy, rounds=rounds)
+
+
+def turned(line: Line, settings: PlanSettings) -> Line:
+    """A line in climb order, the other way where the setup wants conventional milling."""
+    return line if settings.climb or settings.either_way else line.reversed()
+
+
+def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
+    return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.clearance, settings.rapid_floor,
+                   settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance)
+
+
+def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,
+          tool: ToolBody, cut: CutData, side_step: float, linker: Linker, settings: PlanSettings) -> Workingstep:
+    faces = tuple(sorted({f for z in zones for f in z.faces}))
+    tips = np.vstack([z.tips for z in zones])
+    lo, hi = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
+    outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
+    return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
+                       settings.scallop_height, settings.chordal_tolerance, linker.finish(), outline,
+                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb)

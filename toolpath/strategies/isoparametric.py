@@ -1,0 +1,215 @@
+"""Passes that follow the borders of trimmed faces, as papers/000 lays them out, kept off the whole part.
+
+A face is laid over the unit square as a whole, so that neighbouring zones go on in each other's passes and the border
+of what a tool reaches, which is known to the spacing of samples only, bends none; each zone walks what serves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from dataclasses import field as fresh
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
+from geometry.squaring import Squared, squared
+from geometry.toolbody import ToolBody
+from toolpath.family import Target
+from toolpath.forward import Profile, steps
+from toolpath.isoparametric import IsoSurface, lay_out
+from toolpath.levels import Line, true_runs
+from toolpath.locations import lifted
+from zones.reach import TipField
+
+NAME = "isoparametric"
+LEAST_AREA = 1.0  # of r²: a face smaller than that is left to passes in between
+ALONG = 129  # places along a pass at which it is asked what it serves
+LATTICE = 9  # places each way at which the rise of both families of passes is looked at
+LEVEL_GAIN = 0.5  # of the rise along the longer sides: what less there must be along the shorter to go there instead
+OVERRUN = 0.3  # radii of the corner a pass goes on past the last place it serves
+
+
+@dataclass(frozen=True, eq=False)
+class TrimmedFace:
+    """A face on its exact surface.
+
+    face    : number of the face
+    surface : NurbsSurface, mm, access frame, its normal out of the material
+    loops   : (k, 2) float64 each, parameters of the surface, closed, the outer one first
+    area    : mm²
+    """
+
+    face: int
+    surface: NurbsSurface
+    loops: tuple[F64, ...]
+    area: float
+    _laid: dict[tuple[float, ...], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict, repr=False)
+
+    @cached_property
+    def pieces(self) -> list[Squared]:
+        """The pieces of it over the unit square; a GeometryError where one folds whatever is tried."""
+        d = self.surface.derivatives(self.loops[0])
+        scale = float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())
+        return squared(self.loops, scale)
+
+    def passes(self, radius: float, scallop: float, steep: bool) -> list[tuple[IsoSurface, F64]]:
+        """Each piece with the eta of its passes; radius, scallop : mm; steep : passes go the more level way."""
+        key = radius, scallop, float(steep)
+        if key not in self._laid:
+            pieces = [IsoSurface(self.surface, p.map) for p in self.pieces]
+            pieces = [_leveller(p) for p in pieces] if steep else pieces
+            self._laid[key] = [(iso, lay_out(iso, radius, scallop)) for iso in pieces]
+        return self._laid[key]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A piece of a pass: eta, and from which xi to which; ``turned``: walked from the greater xi to the less."""
+
+    iso: IsoSurface
+    eta: float
+    low: float
+    high: float
+    turned: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What passes over trimmed faces would be.
+
+    groups    : stretches of each piece of a face, pass after pass
+    way       : mm the tool goes along all of them
+    side_step : mm between neighbouring passes, the usual one
+    refused   : why faces have none, in words
+    """
+
+    groups: tuple[tuple[Stretch, ...], ...]
+    way: float
+    side_step: float
+    refused: tuple[str, ...]
+
+
+def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallop: float, chord: float,
+           steep: bool) -> Course:
+    """The passes of faces as far as they serve what is to be cut.
+
+    target  : Target; passes go where its points are
+    field   : TipField of the tool
+    scallop : mm, what may be left between passes, the chordal error aside
+    chord   : mm, chordal tolerance of a pass
+    steep   : a wall: passes go the more level way, the stock on their right; else to and fro, along the longer sides
+    """
+    radius = field.tool.corner_radius + field.allowance
+    near = cKDTree(target.points)
+    groups: list[tuple[Stretch, ...]] = []
+    apart: list[float] = []
+    refused: list[str] = []
+    way = 0.0
+    for face in faces:
+        if face.area < LEAST_AREA * radius**2:
+            continue
+        try:
+            passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), steep)
+        except GeometryError as refusal:
+            refused.append(f"F{face.face}: {refusal.message}")
+            continue
+        for iso, etas in passes:
+            own, step, length = _served(iso, etas, near, target.spacing, radius, steep)
+            if own:
+                groups.append(own)
+                apart.append(step)
+                way += length
+    return Course(tuple(groups), way, float(np.median(apart)) if apart else 0.0, tuple(refused))
+
+
+def _served(iso: IsoSurface, etas: F64, near: cKDTree, spacing: float, radius: float,
+            steep: bool) -> tuple[tuple[Stretch, ...], float, float]:
+    """The stretches of all passes that come near places, mm between passes, and mm the tool goes."""
+    xi = np.linspace(0.0, 1.0, ALONG)
+    along, across = np.meshgrid(xi, etas)
+    place, normal = (v.reshape(len(etas), ALONG, 3) for v in iso.contact(along.ravel(), across.ravel()))
+    step = float(np.median(np.linalg.norm(np.diff(place, axis=0), axis=2))) if len(etas) > 1 else spacing
+    size = np.linalg.norm(np.diff(place, axis=1), axis=2)
+    wanted = near.query(place.reshape(-1, 3))[0].reshape(len(etas), ALONG) <= np.maximum(
+        step + 0.5 * spacing, np.median(size))
+    out: list[Stretch] = []
+    total = 0.0
+    for k, eta in enumerate(etas.tolist()):
+        at = np.concatenate([[0.0], np.cumsum(size[k])])
+        turned = _against(place[k], normal[k]) if steep else bool(k % 2)
+        mine: list[Stretch] = []
+        moved = np.linalg.norm(np.diff(place[k] + radius * normal[k], axis=0), axis=1)
+        gone = np.concatenate([[0.0], np.cumsum(moved)])
+        for low, high in _spans(at, wanted[k], OVERRUN * radius):
+            a, b = np.interp([low, high], at, xi).tolist()
+            mine.append(Stretch(iso, eta, a, b, turned))
+            total += float(np.diff(np.interp([low, high], at, gone))[0])
+        out += reversed(mine) if turned else mine
+    return tuple(out), step, total
+
+
+def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[float, float]]:
+    """From where to where along ways (n,) mm something is wanted, ``overrun`` mm more at both ends, joined."""
+    out: list[tuple[float, float]] = []
+    for i, j in true_runs(wanted):
+        low, high = max(at[max(i - 1, 0)] - overrun, 0.0), min(at[min(j, len(at) - 1)] + overrun, at[-1])
+        if out and low <= out[-1][1]:
+            low = out.pop()[0]
+        if high > low:
+            out.append((float(low), float(high)))
+    return out
+
+
+def laid(planned: Course, field: TipField, scallop: float, chord: float, lift: float) -> list[list[Line]]:
+    """The lines of a course, group by group, kept above the whole part.
+
+    lift : mm, up to which a tip may stand off the surface along its normal; the others as for ``course``
+    """
+    tool, spare = field.tool, field.allowance
+    grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
+    out = []
+    for group in planned.groups:
+        lines: list[Line] = []
+        for s in group:
+            profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord)
+            ends = steps(profile, grown.corner_radius, chord, scallop)
+            made = [Line(p + [0.0, 0.0, spare], False)
+                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift)[0]
+                    if len(p) > 1]
+            lines += [line.reversed() for line in reversed(made)] if s.turned else made
+        out.append(lines)
+    return out
+
+
+def suits(tool: ToolBody) -> bool:
+    """Whether a tool can take such passes: what is left between them is the corner's."""
+    return tool.corner_radius > 0.0
+
+
+def _leveller(iso: IsoSurface) -> IsoSurface:
+    """The surface with passes along the longer sides, or along the others where they are far more level."""
+    other = replace(iso, turned=True)
+    return other if _rise(other) < LEVEL_GAIN * _rise(iso) else iso
+
+
+def _rise(iso: IsoSurface) -> float:
+    """How steeply the passes go up or down: mm a mm, on average."""
+    at = np.linspace(0.0, 1.0, LATTICE)
+    xi, eta = np.meshgrid(at, at)
+    place = iso.contact(xi.ravel(), eta.ravel())[0].reshape(LATTICE, LATTICE, 3)
+    step = np.diff(place, axis=1)
+    return float(np.abs(step[..., 2]).sum() / max(np.linalg.norm(step, axis=2).sum(), 1e-12))
+
+
+def _against(place: F64, normal: F64) -> bool:
+    """Whether a pass along a wall, contacts and normals (n, 3), has its free side on the right: material has to be
+    there."""
+    way = np.diff(place[:, :2], axis=0)
+    free = 0.5 * (normal[1:, :2] + normal[:-1, :2])
+    return float((way[:, 0] * free[:, 1] - way[:, 1] * free[:, 0]).sum()) < 0.0
