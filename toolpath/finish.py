@@ -311,7 +311,7 @@ def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,
             tool: ToolBody, cut: CutData, side_step: float, linker: Linker, settings: PlanSettings) -> Workingstep:
-    """The workingstep of what a linker has walked for some zones; side_step in mm, the rest as ``Workingstep`` has it."""
+    """The workingstep of what a linker walked for some zones; side_step in mm, the rest as ``Workingstep`` has it."""
     faces = tuple(sorted({f for z in zones for f in z.faces}))
     tips = np.vstack([z.tips for z in zones])
     lo, hi = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
