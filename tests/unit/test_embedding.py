@@ -18,6 +18,21 @@ def rectangle(width, height):
     return t * x, x + t * y, x + y - t * x, y - t * y
 
 
+RAGGED = [(21.15, 2.07), (20.83, 1.8), (20.06, 1.96), (19.73, 1.83), (19.23, 2.07), (19.13, 1.99), (18.66, 1.92),
+          (17.58, 1.78), (17.43, 2.0), (17.7, 2.51), (17.57, 2.89), (17.72, 3.49), (17.53, 3.97), (17.92, 4.41),
+          (17.62, 4.75), (17.7, 4.89), (17.46, 5.5), (17.69, 5.66), (17.49, 5.97), (17.61, 6.75), (17.81, 6.86)]
+
+
+def test_a_ragged_border_ends():
+    """Between two of its places an edge kept asking for a middle that was there already, without end."""
+    ring = np.array(RAGGED)
+    even_ring = np.vstack([np.linspace(a, b, 21)[:-1] for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)])
+    sides = [np.take(even_ring, np.arange(a, b + 1), axis=0, mode="wrap") for a, b in
+             ((0, 140), (140, 160), (160, 400), (400, 420))]
+    places, faces, _ = triangulated(tuple(sides), 0.05)
+    assert (turns(places, faces) > -1e-12).all() and faces.max() < len(places)
+
+
 def turns(laid, faces):
     a, b, c = (laid[faces[:, k]] for k in range(3))
     return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
