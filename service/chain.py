@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from geometry.errors import SetupError
+from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
 from output.linuxcnc import write_linuxcnc
 from output.model import StockBox, Workplan
@@ -75,9 +76,15 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress)
+    trimmed: Mapping[str, Sequence[TrimmedFace]] = {}
+    if setup.operations.finishing:
+        try:
+            trimmed = trimmed_faces(part_path, ready)
+        except CamError as refusal:  # the part itself is read, and other strategies do without
+            warning = f"no passes along the borders of faces: {refusal.message}"
+            ready = replace(ready, warnings=(*ready.warnings, warning))
     scored = score(ready)
     checks = scored.checks(ready)
-    trimmed = trimmed_faces(part_path, ready) if setup.operations.finishing else {}
     sides: list[Side] = []
     for k, view in enumerate(ready.views):
         share = _Share(progress, k, len(ready.views))

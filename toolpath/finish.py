@@ -119,7 +119,8 @@ class Finish:
         """Passes along the borders of the faces, None where there are none worth a try, and why."""
         settings, usual, steep = self.settings, self.strategy, self.zone.form is Form.STEEP
         asked = not steep and settings.pattern is not Pattern.AUTO
-        if not self.faces or asked or not isoparametric.suits(self.field.tool) or self.zone.form is Form.LEVEL:
+        suited = isoparametric.suits(self.field.tool) and self.zone.form is not Form.LEVEL and not asked
+        if not (suited and self.faces and len(self.checks.points)):
             return None, ()
         every, scallop = np.arange(len(self.checks.points)), LAID_SHARE * settings.scallop_height
         link = LINK_S * self.cut.feed / 60.0  # between passes that end elsewhere than the next begins
@@ -131,14 +132,14 @@ class Finish:
             return None, (_not_taken("more way even on a plane, links counted, mm", least, way),)
         chord = 0.5 * settings.chordal_tolerance
         found = isoparametric.course(self.faces, self.checks, self.field, scallop, chord, steep)
-        refused: tuple[dict[str, object], ...] = tuple(
-            {"strategy": isoparametric.NAME, "reason": reason} for reason in found.refused)
+        refused = _refused(found.refused)
         if not found.groups:
             return None, refused
         there = found.way + (link * sum(len(group) for group in found.groups) if steep else 0.0)
         if there > WORTH_A_TRY * way:
             return None, (*refused, _not_taken("more way, links counted, mm", there, way))
-        made = isoparametric.laid(found, self.field, scallop, chord, settings.lift)
+        made, failed = isoparametric.laid(found, self.field, scallop, chord, settings.lift)
+        refused = (*refused, *_refused(failed))
 
         def rounds(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
             if k or not len(failing):
@@ -219,6 +220,10 @@ class Finish:
             whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
             if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
                 self.walked.add(key)
+
+
+def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:
+    return tuple({"strategy": isoparametric.NAME, "reason": reason} for reason in reasons)
 
 
 def _not_taken(reason: str, value: float, limit: float) -> dict[str, object]:

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.spatial import cKDTree
 
+from geometry.errors import GeometryError
 from geometry.gridmap import GridMap
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
@@ -111,6 +112,9 @@ class _Table:
             at = np.linspace(0.0, 1.0, count)
             xi, eta = np.meshgrid(at, at)
             point, normal = iso.contact(xi.ravel(), eta.ravel())
+            if not (np.isfinite(point).all() and np.isfinite(normal).all()):
+                raise GeometryError("a surface has a place without a normal, as at a pole", code="bad_pass",
+                                    remedy="machine it by another strategy")
             values = np.column_stack([point, normal]).reshape(count, count, 6)
             self.splines = [RectBivariateSpline(at, at, values[:, :, c]) for c in range(6)]
             between = 0.5 * (at[1::2] + at[:-1:2])
@@ -129,6 +133,11 @@ def lay_out(iso: IsoSurface, radius: float, scallop: float) -> F64:
     """The passes, (k,) float64, eta from 0 to 1: both borders, and as few between them as the scallop allows.
 
     radius, scallop : mm
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_pass': the normal is not known everywhere.
     """
     out, step = [0.0], None
     table = _Table(iso, scallop)

@@ -56,7 +56,7 @@ def test_passes_leave_no_more_than_the_scallop_and_never_gouge(a, b, allowance):
     points, normals = samples_on(mesh, face, everywhere)
     target = Target(points, normals, points, 60.0**-0.5)
     found = course([face], target, field, SCALLOP, CHORD, False)
-    lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002) for line in group]
+    lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for line in group]
     left = left_by(lines, points, normals, body) - allowance
     assert left.max() <= SCALLOP and left.min() > -CHORD
     assert left.max() > 0.5 * SCALLOP
@@ -70,7 +70,7 @@ def test_passes_go_where_there_is_something_to_cut():
     points, normals = samples_on(mesh, face, lambda x, y: x < -1.0)
     target = Target(points, normals, points, 60.0**-0.5)
     found = course([face], target, field, SCALLOP, CHORD, False)
-    lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002) for line in group]
+    lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for line in group]
     assert left_by(lines, points, normals, body).max() <= SCALLOP
     assert max(line.points[:, 0].max() for line in lines) < 1.5
     assert found.way == pytest.approx(sum(Line(line.points, False).length for line in lines), rel=0.1)
@@ -82,7 +82,7 @@ def test_passes_on_a_wall_have_the_material_on_their_right():
     points, normals = samples_on(mesh, face, lambda x, y: y > 4.0)
     found = course([face], Target(points, normals, points, 60.0**-0.5), field, SCALLOP, CHORD, True)
     assert found.groups
-    for line in (one for group in laid(found, field, SCALLOP, CHORD, 0.002) for one in group):
+    for line in (one for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for one in group):
         assert np.ptp(line.points[:, 2]) < 0.01  # level: along x
         assert line.points[-1, 0] < line.points[0, 0]  # the wall is at greater y, which going to less x is on the right
 
@@ -93,6 +93,19 @@ def test_what_folds_is_named():
     target = Target(np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.zeros((1, 3)), 0.1)
     found = course([knot], target, field_of(mesh, ball(3.0)), SCALLOP, CHORD, False)
     assert not found.groups and found.refused[0].startswith("F7: ")
+
+
+def test_a_face_with_a_pole_is_named_and_the_plan_goes_on():
+    """Control points of one side in one place: there the surface has no normal."""
+    mesh, face = bowl(0.05, -0.03)
+    net = face.surface.control.copy()
+    net[:, 0] = net[1, 0]
+    knots = face.surface.knots_u
+    pole = TrimmedFace(2, NurbsSurface(net, knots, knots, (3, 3)), face.loops, face.area)
+    case = plan_part(mesh, [ball(3.0)], scallop=SCALLOP, chord=CHORD, faces={2}, trimmed=(pole,))
+    plan = max(case.plan.zones, key=lambda z: len(z.zone.samples))
+    assert plan.strategy != isoparametric.NAME
+    assert any(str(r["reason"]).startswith("F2: ") for r in plan.rejected)
 
 
 @pytest.mark.parametrize(("a", "b", "loop"), [(0.05, -0.03, SQUARE), (0.08, 0.05, SQUARE), (0.03, 0.03, DISC)])

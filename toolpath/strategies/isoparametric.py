@@ -166,25 +166,30 @@ def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[flo
     return out
 
 
-def laid(planned: Course, field: TipField, scallop: float, chord: float, lift: float) -> list[list[Line]]:
-    """The lines of a course, group by group, kept above the whole part.
+def laid(planned: Course, field: TipField, scallop: float, chord: float,
+         lift: float) -> tuple[list[list[Line]], tuple[str, ...]]:
+    """The lines of a course, group by group, kept above the whole part, and why stretches have none, in words.
 
     lift : mm, up to which a tip may stand off the surface along its normal; the others as for ``course``
     """
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
-    out = []
+    out, refused = [], []
     for group in planned.groups:
         lines: list[Line] = []
         for s in group:
-            profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord)
-            ends = steps(profile, grown.corner_radius, chord, scallop)
+            try:
+                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord)
+                ends = steps(profile, grown.corner_radius, chord, scallop)
+            except GeometryError as refusal:  # passes in between will have to do there
+                refused.append(refusal.message)
+                continue
             made = [Line(p + [0.0, 0.0, spare], False)
                     for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift)[0]
                     if len(p) > 1]
             lines += [line.reversed() for line in reversed(made)] if s.turned else made
         out.append(lines)
-    return out
+    return out, tuple(dict.fromkeys(refused))
 
 
 def suits(tool: ToolBody) -> bool:
