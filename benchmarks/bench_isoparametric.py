@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 import shapely  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
 from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
 from examples.family import make_part  # noqa: E402
@@ -26,21 +27,21 @@ from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
 from geometry.facepatches import read_patches  # noqa: E402
 from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
-from geometry.frames import Placement  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.squaring import Method, Squared, squared  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
-from service.prepare import prepare  # noqa: E402
+from service.prepare import placement_of, prepare  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
-from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
+from toolpath.isoparametric import Flank, IsoSurface, lay_out  # noqa: E402
 from toolpath.locations import FREE, lifted, tips  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
+from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
 
 RADIUS, SCALLOP = 5.0, 0.5
@@ -247,43 +248,50 @@ def trims(count: int) -> None:
     print(f"most left {worst:.5f}, deepest gouge {deep:.5f} mm, {failed} failed of {count}")
 
 
+def entered(lines: list[F64], points: F64, radius: float, rows: NDArray[np.int64]) -> float:
+    """The deepest that any of some places (rows of points) lies in a ball along passes, mm; 0 for none.
+
+    That is how far the ball would have to step aside: along the normal of a place beside a sharp edge it is far more.
+    """
+    start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
+    start, d, deep = start + [0.0, 0.0, radius], end - start, 0.0
+    for p in points[rows]:
+        s = np.clip(((p - start) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-300), 0.0, 1.0)
+        deep = max(deep, radius - float(np.linalg.norm(p - start - s[:, None] * d, axis=1).min()))
+    return deep
+
+
 def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, title: str) -> None:
     """Every face of every wall of a part by an upright ball, its own passes against the whole part."""
     setup = parse_setup(json.dumps(given))
     ready = prepare(step, setup, lambda _stage, _share: None)
     part = ready.views[0].part
     numbers = sorted({f for w in ready.decomposition.walls for f in w.faces})
-    at = setup.placement
-    where = Placement(origin=tuple(at.origin_mm), z_axis=tuple(at.z_axis), x_axis=tuple(at.x_axis))
-    patches = read_patches(step, numbers, placement=where, solid=setup.part.solid)
+    patches = read_patches(step, numbers, placement=placement_of(setup), solid=setup.part.solid)
     trimmed = trim_faces(part, numbers, lambda p, _n, _f: np.zeros(len(p), np.int64), 1e3)[0]
-    tree, tool = TriangleTree(part.mesh), ball(radius)
-    cutter = Cutter.of(tool)
+    tree, tool, off = TriangleTree(part.mesh), ball(radius), max(0.1 * scallop, 1.5 * part.chord)
+    cutter, flank = Cutter.of(tool), Flank(radius, radius)
 
     def limit(xy: F64) -> F64:
         return drop_cutter(tree, cutter, xy)
 
-    print(f"\n{title}: {len(numbers)} wall faces, ball of {radius} mm upright, scallop {scallop}, chord {chord} mm")
-    print(f"{'face':>5} {'pieces':>6} {'methods':16} {'passes':>6} {'mm':>7} {'raised':>6} {'touched':>7} {'p99':>8} "
+    print(f"\n{title}: {len(numbers)} wall faces, ball of {radius} mm upright, scallop {scallop}, chord {chord} mm; "
+          f"tips may stand off by {off:.4f} mm")
+    print(f"{'face':>5} {'pieces':>6} {'methods':16} {'passes':>6} {'lines':>6} {'mm':>7} {'touched':>7} {'p99':>8} "
           f"{'max left':>9} {'over h':>7} {'gouge':>8} {'s':>6}")
     everywhere = sample_surface(part.mesh, 30.0, seed=3)
     for patch in trimmed:
-        face, own = patches[patch.face], part.mesh.face_ids == patch.face
+        exact, own = patches[patch.face], part.mesh.face_ids == patch.face
+        face = TrimmedFace(patch.face, exact.surface, tuple(exact.parameters(q) for q in patch.loops), patch.area)
         begin = time.perf_counter()
-        loops = tuple(face.parameters(q) for q in patch.loops)
-        d = face.surface.derivatives(loops[0])
-        scale = (float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean()))
         try:
-            pieces = squared(loops, scale)
-            lines, way, raised = [], 0.0, 0
-            for piece in pieces:
-                iso = IsoSurface(face.surface, piece.map)
-                for eta in lay_out(iso, radius, scallop - chord).tolist():
+            lines, way, count = [], 0.0, 0
+            for iso, etas in face.passes(radius, scallop - chord - off, flank):
+                for eta in etas.tolist():
                     profile = Profile.of(iso.curve(eta), chord)
-                    ends = steps(profile, radius, chord, scallop)
-                    line, up = lifted(profile, ends, tool, limit, chord, 0.1 * scallop)
+                    line, _ = lifted(profile, steps(profile, radius, chord, scallop), tool, limit, chord, off)
                     lines += line
-                    way, raised = way + profile.length, raised + up
+                    way, count = way + profile.length, count + 1
         except GeometryError as refusal:
             print(f"F{patch.face:<4} failed: {refusal}")
             continue
@@ -292,13 +300,18 @@ def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, 
         tip = tips(s.points, s.normals, tool)
         touched = limit(np.ascontiguousarray(tip[:, :2])) <= tip[:, 2] + 0.002
         for share in (0.5, 1.0):  # as the planner counts reach
-            away = tips(s.points + share * 0.1 * scallop * s.normals, s.normals, tool)
+            away = tips(s.points + share * off * s.normals, s.normals, tool)
             touched |= limit(np.ascontiguousarray(away[:, :2])) <= away[:, 2] + FREE
+        if not touched.any():
+            print(f"F{patch.face:<4} {patch.area:.3g} mm2, no sample of which the tool touches")
+            continue
         left = left_by(lines, s.points[touched], s.normals[touched], radius)
-        deep = left_by(lines, everywhere.points, everywhere.normals, radius)
-        print(f"F{patch.face:<4} {len(pieces):6d} {' '.join(p.method for p in pieces):16} {len(lines):6d} {way:7.0f} "
-              f"{raised:6d} {touched.mean():7.3f} {np.quantile(left, 0.99):8.4f} {left.max():9.4f} "
-              f"{(left > scallop).mean():7.4f} {max(-deep.min(), -left.min(), 0):8.4f} {seconds:6.1f}", flush=True)
+        rest = left_by(lines, everywhere.points, everywhere.normals, radius)
+        deep = max(entered(lines, s.points[touched], radius, np.argsort(left)[:40]),
+                   entered(lines, everywhere.points, radius, np.argsort(rest)[:40]))
+        print(f"F{patch.face:<4} {len(face.pieces):6d} {' '.join(p.method for p in face.pieces):16} {count:6d} "
+              f"{len(lines):6d} {way:7.0f} {touched.mean():7.3f} {np.quantile(left, 0.99):8.4f} {left.max():9.4f} "
+              f"{(left > scallop).mean():7.4f} {deep:8.4f} {seconds:6.1f}", flush=True)
 
 
 def demo_faces() -> None:

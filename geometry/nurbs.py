@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
+from numpy.typing import ArrayLike
 
 from geometry.arrays import finite_points
 from geometry.errors import GeometryError
+from geometry.kernels.nurbs import surface_values
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Parameters may lie outside of the knots by this share of their range: they have been through someone's rounding.
@@ -27,8 +27,6 @@ SLACK = 1e-9
 # The two tangents of a place with a normal: neither shorter than this share of the size of the net by the range of
 # the parameter, nor their angle less than this (rad). Poles of spheres and tips of cones fail it.
 SINGULAR = 1e-9
-# Points that are gathered with their control points at once, so that memory does not grow with their number.
-BLOCK = 1 << 13
 MOST_FACETS = 20_000_000
 
 
@@ -116,7 +114,7 @@ class NurbsSurface:
         Raises GeometryError (``bad_array``; ``outside_domain`` for parameters outside of the domain).
         """
         at = self._inside(uv)
-        return _divided(self._value(at, 0, 0), self._value(at, 0, 0, weight=True))
+        return _divided(self._value(at, 0, 0))
 
     def derivatives(self, uv: ArrayLike) -> SurfaceDerivatives:
         """Points with first and second derivatives; parameters and errors are those of ``points``.
@@ -124,10 +122,11 @@ class NurbsSurface:
         Returns SurfaceDerivatives, mm by units of the parameters.
         """
         at = self._inside(uv)
-        a, au, av, auu, auv, avv = (self._value(at, i, j) for i, j in _WAYS)
+        ways = [self._value(at, i, j) for i, j in _WAYS]
         if self.weights is None:
-            return SurfaceDerivatives(a, au, av, auu, auv, avv)
-        w, wu, wv, wuu, wuv, wvv = (self._value(at, i, j, weight=True) for i, j in _WAYS)
+            return SurfaceDerivatives(*ways)
+        a, au, av, auu, auv, avv = (way[:, :3] for way in ways)
+        w, wu, wv, wuu, wuv, wvv = (way[:, 3:] for way in ways)
         s = a / w
         su, sv = (au - wu * s) / w, (av - wv * s) / w
         return SurfaceDerivatives(s, su, sv, (auu - 2.0 * wu * su - wuu * s) / w,
@@ -150,9 +149,8 @@ class NurbsSurface:
         a, au, av = (self._value(at, i, j) for i, j in _WAYS[:3])
         if self.weights is None:
             return a, self._across(au, av)
-        w, wu, wv = (self._value(at, i, j, weight=True) for i, j in _WAYS[:3])
-        s = a / w
-        return s, self._across((au - wu * s) / w, (av - wv * s) / w)
+        s = _divided(a)
+        return s, self._across(*((way[:, :3] - way[:, 3:] * s) / a[:, 3:] for way in (au, av)))
 
     def forms(self, uv: ArrayLike) -> tuple[F64, F64]:
         """First and second fundamental form; parameters and errors are those of ``points``.
@@ -260,9 +258,9 @@ class NurbsSurface:
 
     @cached_property
     def _nets(self) -> dict[tuple[int, int], tuple[F64, F64, F64, tuple[int, int]]]:
-        """By number of derivatives in u and v: homogeneous control points, knots and orders of that derivative."""
-        w = np.ones(self.control.shape[:2]) if self.weights is None else self.weights
-        plain = np.concatenate([self.control * w[..., None], w[..., None]], axis=2)
+        """By number of derivatives in u and v: control points, homogeneous with weights, knots and orders of it."""
+        w = self.weights
+        plain = self.control if w is None else np.concatenate([self.control * w[..., None], w[..., None]], axis=2)
         nets = {(0, 0): (plain, self.knots_u, self.knots_v, self.orders)}
         for i, j in _WAYS[1:]:
             axis = 0 if i else 1
@@ -271,19 +269,11 @@ class NurbsSurface:
             nets[i, j] = net, knots[0], knots[1], (order, orders[1]) if i else (orders[0], order)
         return nets
 
-    def _value(self, uv: F64, i: int, j: int, weight: bool = False) -> F64:
-        """A derivative in homogeneous coordinates: the first three, or the weight alone as (p, 1)."""
+    def _value(self, uv: F64, i: int, j: int) -> F64:
+        """A derivative at parameters (p, 2): (p, 3), or (p, 4) homogeneous where the surface has weights."""
         net, knots_u, knots_v, orders = self._nets[i, j]
-        if weight and self.weights is None:
-            return np.full((len(uv), 1), 1.0 if (i, j) == (0, 0) else 0.0)
-        net = net[..., 3:] if weight else net[..., :3]
         out = np.empty((len(uv), net.shape[2]))
-        for first in range(0, len(uv), BLOCK):
-            rows = slice(first, first + BLOCK)
-            at_u, by_u = _basis(uv[rows, 0], knots_u, orders[0])
-            at_v, by_v = _basis(uv[rows, 1], knots_v, orders[1])
-            near = net[at_u[:, :, None], at_v[:, None, :]]
-            out[rows] = np.einsum("pa,pac->pc", by_u, np.einsum("pb,pabc->pac", by_v, near))
+        surface_values(net, knots_u, knots_v, orders[0], orders[1], uv, out)
         return out
 
     def _inside(self, uv: ArrayLike) -> F64:
@@ -312,18 +302,12 @@ def open_uniform_knots(count: int, order: int) -> F64:
 _WAYS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 
 
-def _divided(values: F64, weight: F64) -> F64:
-    return values / weight
+def _divided(values: F64) -> F64:
+    return values if values.shape[1] == 3 else values[:, :3] / values[:, 3:]
 
 
 def _dots(*pairs: tuple[F64, F64]) -> F64:
     return np.column_stack([np.einsum("pi,pi->p", a, b) for a, b in pairs])
-
-
-def _basis(at: F64, knots: F64, order: int) -> tuple[NDArray[np.intp], F64]:
-    """The ``order`` basis functions that are not zero at each parameter: their numbers and their values."""
-    design = BSpline.design_matrix(at, knots, order - 1)
-    return design.indices.reshape(-1, order), design.data.reshape(-1, order)
 
 
 def _differentiated(net: F64, knots: F64, order: int, axis: int) -> tuple[F64, F64, int]:

@@ -25,7 +25,7 @@ from geometry.fronts import interpolated
 from geometry.gridmap import GridMap
 from geometry.laplace import laplace
 from geometry.mesh import F64
-from geometry.quadgrid import Quad, even, evenness
+from geometry.quadgrid import Quad, evenness
 
 INWARDS = np.radians(50.0)  # a border that turns in by more is cut there
 NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a turn is measured: first, and if need be
@@ -142,9 +142,11 @@ def _ring(piece: shapely.Polygon) -> F64:
 def _even_ring(piece: shapely.Polygon, spacing: float) -> F64:
     """The border with places no farther apart than ``spacing`` mm, those it has among them."""
     ring = _ring(piece)
-    parts = [even(np.array([a, b]), int(np.ceil(np.linalg.norm(b - a) / spacing)) + 1)[:-1]
-             for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
-    return np.vstack(parts)
+    edge = np.roll(ring, -1, axis=0) - ring
+    count = np.ceil(np.linalg.norm(edge, axis=1) / spacing).astype(np.int64)
+    first = np.repeat(np.arange(len(ring)), count)
+    share = (np.arange(len(first)) - (np.cumsum(count) - count)[first]) / count[first]
+    return np.asarray(ring[first] + share[:, None] * edge[first])
 
 
 def _cut(region: shapely.Polygon, near: float) -> list[shapely.Polygon]:

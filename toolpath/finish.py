@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
-from toolpath.isoparametric import side_step
+from toolpath.isoparametric import Flank, side_step
 from toolpath.levels import Line, serving
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
@@ -127,11 +127,13 @@ class Finish:
         way = sum(line.length + (0.0 if line.closed or not steep else link)
                   for lines in usual.rounds(0, every) for line in lines)
         level = float(side_step(np.zeros(1), self.field.tool.corner_radius, scallop)[0])
+        level = max(level, usual.side_step) if steep else level
         least = self.given * self.checks.spacing**2 / level
         if least > WORTH_A_TRY * way:
             return None, (_not_taken("more way even on a plane, links counted, mm", least, way),)
         chord = 0.5 * settings.chordal_tolerance
-        found = isoparametric.course(self.faces, self.checks, self.field, scallop, chord, steep)
+        found = isoparametric.course(self.faces, self.checks, self.field, scallop, chord,
+                                     self._flank() if steep else None)
         refused = _refused(found.refused)
         if not found.groups:
             return None, refused
@@ -150,6 +152,10 @@ class Finish:
             return [serving(lines, tips, 1.5 * found.side_step, self.checks.spacing, over, over) for lines in made]
 
         return _Strategy(isoparametric.NAME, found.side_step, rounds, not steep, usual.rejected), refused
+
+    def _flank(self) -> Flank:
+        tool = self.field.tool
+        return Flank(tool.radius + self.field.allowance, min(self.cut.step_down, tool.flute_length - tool.corner_radius))
 
     def _copied(self, strategy: _Strategy) -> Finish:
         """This finish with another strategy, to be walked on its own."""

@@ -37,6 +37,7 @@ MOST_LINES = 513
 CENTRES = 513  # of the ball along a pass
 ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
 FULL, AIM, TRIALS = 0.97, 0.985, 8
+STEEP = 0.5  # of a normal lies level: what leans more is not cut by a flank
 
 
 def side_step(curvature: F64, radius: float, scallop: float) -> F64:
@@ -129,10 +130,22 @@ class _Table:
         return out[..., :3], out[..., 3:] / np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
 
 
-def lay_out(iso: IsoSurface, radius: float, scallop: float) -> F64:
+@dataclass(frozen=True)
+class Flank:
+    """The side of an upright tool above its corner, which cuts what leans little.
+
+    radius : mm, of the tool; height : mm, how far above the corner's centre it may cut
+    """
+
+    radius: float
+    height: float
+
+
+def lay_out(iso: IsoSurface, radius: float, scallop: float, flank: Flank | None = None) -> F64:
     """The passes, (k,) float64, eta from 0 to 1: both borders, and as few between them as the scallop allows.
 
     radius, scallop : mm
+    flank           : of an upright tool whose corner ``radius`` is; None where only the ball counts
 
     Raises
     ------
@@ -141,7 +154,7 @@ def lay_out(iso: IsoSurface, radius: float, scallop: float) -> F64:
     """
     out, step = [0.0], None
     table = _Table(iso, scallop)
-    before = _Pass(table, 0.0, radius)
+    before = _Pass(table, 0.0, radius, flank)
     while out[-1] < 1.0:
         guess = _first_guess(iso, out[-1], radius, scallop) if step is None else step
         eta, before = _next(table, before, out[-1], guess, radius, scallop)
@@ -160,18 +173,47 @@ def _first_guess(iso: IsoSurface, eta: float, radius: float, scallop: float) -> 
 class _Pass:
     """A pass as centres of the ball, close together, to ask what is left beside it."""
 
-    def __init__(self, table: _Table, eta: float, radius: float) -> None:
+    def __init__(self, table: _Table, eta: float, radius: float, flank: Flank | None) -> None:
         point, normal = table(np.linspace(0.0, 1.0, CENTRES), np.array([eta]))
-        self.centres, self.radius = point[0] + radius * normal[0], radius
+        self.centres, self.radius, self.flank = point[0] + radius * normal[0], radius, flank
         self.tree = cKDTree(self.centres)
+        if flank is not None:
+            level = normal[0, :, :2]
+            level = level / np.maximum(np.linalg.norm(level, axis=1), 1e-12)[:, None]
+            self.axes = self.centres[:, :2] + (flank.radius - radius) * level
+            self.axis_tree = cKDTree(self.axes)
 
     def left(self, points: F64, normals: F64) -> F64:
-        """How far along the normals (n, 3) of places (n, 3), mm, the ball begins; a little over r where it is not."""
+        """How far along the normals (n, 3) of places (n, 3), mm, the tool begins; a little over r where it is not."""
         _, near = self.tree.query(points + self.radius * normals)
         best = np.full(len(points), 1.01 * self.radius)
         for k in (-1, 0):
             a = np.clip(near + k, 0, len(self.centres) - 2)
             best = np.minimum(best, self._on(points, normals, self.centres[a], self.centres[a + 1]))
+        return best if self.flank is None else np.minimum(best, self._beside(points, normals, self.flank))
+
+    def _beside(self, points: F64, normals: F64, flank: Flank) -> F64:
+        """The same of the flank: where rays meet the upright band as wide as the tool over the way of its corner."""
+        best = np.full(len(points), 1.01 * self.radius)
+        size = np.linalg.norm(normals[:, :2], axis=1)
+        rows = np.flatnonzero(size > STEEP)
+        p, n = points[rows], normals[rows]
+        _, near = self.axis_tree.query(p[:, :2] + flank.radius / size[rows, None] * n[:, :2])
+        for k in (-1, 0):
+            a = np.clip(near + k, 0, len(self.axes) - 2)
+            start, d = self.axes[a], self.axes[a + 1] - self.axes[a]
+            length2 = np.maximum((d * d).sum(axis=1), 1e-300)
+            t = np.zeros(len(p))
+            for _ in range(4):  # the axis nearest to where the ray meets the band, taken anew
+                s = np.clip(((p[:, :2] + t[:, None] * n[:, :2] - start) * d).sum(axis=1) / length2, 0.0, 1.0)
+                w = start + s[:, None] * d - p[:, :2]
+                along, out = (w * n[:, :2]).sum(axis=1), size[rows] ** 2
+                deep = along * along - out * ((w * w).sum(axis=1) - flank.radius**2)
+                t = np.where(deep >= 0.0, (along - np.sqrt(np.maximum(deep, 0.0))) / out, np.inf)
+                t = np.minimum(t, 1.01 * self.radius)
+            low = self.centres[a, 2] + s * (self.centres[a + 1, 2] - self.centres[a, 2])
+            high = p[:, 2] + t * n[:, 2] - low
+            best[rows] = np.minimum(best[rows], np.where((high >= 0.0) & (high <= flank.height), t, np.inf))
         return best
 
     def _on(self, points: F64, normals: F64, a: F64, b: F64) -> F64:
@@ -209,7 +251,7 @@ def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
     low, high, step = 0.0, math.inf, min(guess, 1.0 - at)
     kept = None
     for _ in range(TRIALS):
-        trial = _Pass(table, at + step, radius)
+        trial = _Pass(table, at + step, radius, before.flank)
         left = _worst(table, before, trial, at, at + step)
         if left <= scallop:
             low, kept = step, (at + step, trial)
@@ -222,5 +264,5 @@ def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
             wanted = 0.5 * (low + high) if high < math.inf else 1.5 * step
         step = min(wanted, 1.0 - at)
     if kept is None:  # not even a narrow step keeps it: what is left there is for others
-        kept = (at + step, _Pass(table, at + step, radius))
+        kept = (at + step, _Pass(table, at + step, radius, before.flank))
     return (1.0 if kept[0] > 1.0 - 1e-9 else kept[0]), kept[1]

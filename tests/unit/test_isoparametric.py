@@ -9,11 +9,14 @@ from geometry.gridmap import GridMap
 from geometry.laplace import laplace
 from geometry.nurbs import NurbsSurface
 from geometry.quadgrid import Quad
+from tests.hand_parts import tool
 from tests.square_regions import region
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.forward import Profile, steps
-from toolpath.isoparametric import IsoSurface, lay_out, side_step
+from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
+from toolpath.locations import tips
+from verify.removal import Moves, residual_on_normals
 
 RADIUS, SCALLOP = 5.0, 0.5
 
@@ -106,3 +109,33 @@ def test_a_grid_that_folds_is_refused():
     with pytest.raises(GeometryError) as refusal:
         GridMap.of(grid)
     assert refusal.value.code == "folded"
+
+
+def wall(lean: float, bend: float) -> IsoSurface:
+    """30 mm long and 12 mm high, leaning by degrees, bent along by 1/mm; passes level, the outside at less y."""
+    x, z = np.meshgrid([-15.0, 0.0, 15.0], [0.0, 6.0, 12.0], indexing="ij")
+    y = np.tan(np.radians(lean)) * z + 0.5 * bend * np.array([225.0, -225.0, 225.0])[:, None]
+    knots = np.array([0.0, 0, 0, 1, 1, 1])
+    surface = NurbsSurface(np.stack([x, y, z], -1), knots, knots, (3, 3))
+    at = np.linspace(0.0, 1.0, 5)
+    return IsoSurface(surface, GridMap.of(np.dstack(np.meshgrid(at, at))))
+
+
+@pytest.mark.parametrize("corner", [3.0, 0.8])
+@pytest.mark.parametrize(("lean", "bend"), [(0.4, 0.0), (0.4, 0.03), (0.4, -0.03), (2.0, 0.02)])
+def test_beside_walls_the_flank_of_an_upright_tool_counts(lean, bend, corner):
+    """Fewer passes than the corner alone would need, and still no more left than the scallop, by the verifier."""
+    iso, scallop, body = wall(lean, bend), 0.01, tool(6.0, corner_radius=corner)
+    etas = lay_out(iso, corner, scallop, Flank(3.0, 2.0))
+    assert np.diff(etas).max() * 12.0 <= 2.0 + 1e-9 + np.sqrt(8.0 * corner * scallop)
+    places = np.stack(np.meshgrid(np.linspace(0.02, 0.98, 40), np.linspace(0.0, 1.0, 400)), -1).reshape(-1, 2)
+    points, normals = iso.surface.points_and_normals(places)
+    lines = [tips(*iso.contact(np.linspace(0.0, 1.0, 400), np.full(400, eta)), body) for eta in etas]
+    start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
+    moves = Moves(start, end, np.ones(len(start), bool), np.zeros(len(start), np.int32))
+    left = residual_on_normals(points, normals, np.full(len(points), 10.0), moves, [body])[0]
+    assert left.max() <= 1.02 * scallop and left.min() > -1e-3
+    alone = lay_out(iso, corner, scallop)
+    assert len(etas) <= len(alone)
+    if lean < 1.0:
+        assert len(etas) < 0.5 * len(alone) and left.max() > 0.6 * scallop

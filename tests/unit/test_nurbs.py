@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from examples.thesis import Kind, control_points, surface
 from geometry.errors import GeometryError
@@ -194,3 +195,27 @@ def test_parameters_and_steps_out_of_range_are_refused():
         with pytest.raises(GeometryError) as caught:
             call()
         assert caught.value.code == code
+
+
+@pytest.mark.parametrize("rational", [False, True])
+@pytest.mark.parametrize("orders", [(3, 5), (4, 3), (6, 4)])
+def test_values_and_derivatives_are_those_of_products_of_splines(orders, rational):
+    rng = np.random.default_rng(7 * orders[0] + rational)
+    weights = rng.uniform(0.5, 2.0, (9, 8)) if rational else np.ones((9, 8))
+    net = np.dstack([rng.uniform(-5.0, 5.0, (9, 8, 3)) * weights[..., None], weights])
+    inner = [np.sort(rng.uniform(0.1, 0.9, n - k)) for n, k in zip((9, 8), orders, strict=True)]
+    inner[0][1] = inner[0][0]  # a knot that repeats
+    knots = [np.concatenate([np.zeros(k), q, np.ones(k)]) for k, q in zip(orders, inner, strict=True)]
+    uv = np.vstack([rng.uniform(0.0, 1.0, (200, 2)), [[0, 0], [1, 1], [1, 0], [inner[0][3 % len(inner[0])], 1.0]]])
+
+    def twin(i: int, j: int) -> np.ndarray:
+        rows = BSpline(knots[1], net.swapaxes(0, 1), orders[1] - 1)(uv[:, 1], j)
+        return np.array([BSpline(knots[0], row, orders[0] - 1)(u, i) for row, u in zip(rows, uv[:, 0], strict=True)])
+
+    a, au, av = twin(0, 0), twin(1, 0), twin(0, 1)
+    point = a[:, :3] / a[:, 3:]
+    found = NurbsSurface(net[..., :3] / weights[..., None], *knots, orders, weights if rational else None
+                         ).derivatives(uv)
+    assert np.allclose(found.point, point, atol=1e-10)
+    assert np.allclose(found.u, (au[:, :3] - au[:, 3:] * point) / a[:, 3:], atol=1e-8)
+    assert np.allclose(found.v, (av[:, :3] - av[:, 3:] * point) / a[:, 3:], atol=1e-8)

@@ -22,7 +22,7 @@ from geometry.squaring import Squared, squared
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
 from toolpath.forward import Profile, steps
-from toolpath.isoparametric import IsoSurface, lay_out
+from toolpath.isoparametric import Flank, IsoSurface, lay_out
 from toolpath.levels import Line, true_runs
 from toolpath.locations import lifted
 from zones.reach import TipField
@@ -49,7 +49,7 @@ class TrimmedFace:
     surface: NurbsSurface
     loops: tuple[F64, ...]
     area: float
-    _laid: dict[tuple[float, ...], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict, repr=False)
+    _laid: dict[tuple[float, float, Flank | None], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict, repr=False)
 
     @cached_property
     def pieces(self) -> list[Squared]:
@@ -58,13 +58,17 @@ class TrimmedFace:
         scale = float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())
         return squared(self.loops, scale)
 
-    def passes(self, radius: float, scallop: float, steep: bool) -> list[tuple[IsoSurface, F64]]:
-        """Each piece with the eta of its passes; radius, scallop : mm; steep : passes go the more level way."""
-        key = radius, scallop, float(steep)
+    def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[tuple[IsoSurface, F64]]:
+        """Each piece with the eta of its passes.
+
+        radius, scallop : mm, of the tool's corner, and what may be left
+        flank           : of the upright tool, on walls: passes go the more level way; None for the longer sides
+        """
+        key = radius, scallop, flank
         if key not in self._laid:
             pieces = [IsoSurface(self.surface, p.map) for p in self.pieces]
-            pieces = [_leveller(p) for p in pieces] if steep else pieces
-            self._laid[key] = [(iso, lay_out(iso, radius, scallop)) for iso in pieces]
+            pieces = [_leveller(p) for p in pieces] if flank is not None else pieces
+            self._laid[key] = [(iso, lay_out(iso, radius, scallop, flank)) for iso in pieces]
         return self._laid[key]
 
 
@@ -96,14 +100,15 @@ class Course:
 
 
 def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallop: float, chord: float,
-           steep: bool) -> Course:
+           flank: Flank | None) -> Course:
     """The passes of faces as far as they serve what is to be cut.
 
     target  : Target; passes go where its points are
     field   : TipField of the tool
     scallop : mm, what may be left between passes, the chordal error aside
     chord   : mm, chordal tolerance of a pass
-    steep   : a wall: passes go the more level way, the stock on their right; else to and fro, along the longer sides
+    flank   : of the tool, on a wall: passes go the more level way, the stock on their right; None elsewhere: to and
+              fro, along the longer sides
     """
     radius = field.tool.corner_radius + field.allowance
     near = cKDTree(target.points)
@@ -115,12 +120,12 @@ def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallo
         if face.area < LEAST_AREA * radius**2:
             continue
         try:
-            passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), steep)
+            passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), flank)
         except GeometryError as refusal:
             refused.append(f"F{face.face}: {refusal.message}")
             continue
         for iso, etas in passes:
-            own, step, length = _served(iso, etas, near, target.spacing, radius, steep)
+            own, step, length = _served(iso, etas, near, target.spacing, radius, flank is not None)
             if own:
                 groups.append(own)
                 apart.append(step)
