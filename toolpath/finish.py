@@ -154,8 +154,8 @@ class Finish:
         return _Strategy(isoparametric.NAME, found.side_step, rounds, not steep, usual.rejected), refused
 
     def _flank(self) -> Flank:
-        tool = self.field.tool
-        return Flank(tool.radius + self.field.allowance, min(self.cut.step_down, tool.flute_length - tool.corner_radius))
+        tool, above = self.field.tool, self.field.tool.flute_length - self.field.tool.corner_radius
+        return Flank(tool.radius + self.field.allowance, min(self.cut.step_down, above))
 
     def _copied(self, strategy: _Strategy) -> Finish:
         """This finish with another strategy, to be walked on its own."""

@@ -49,7 +49,8 @@ class TrimmedFace:
     surface: NurbsSurface
     loops: tuple[F64, ...]
     area: float
-    _laid: dict[tuple[float, float, Flank | None], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict, repr=False)
+    _laid: dict[tuple[float, float, Flank | None], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict,
+                                                                                         repr=False)
 
     @cached_property
     def pieces(self) -> list[Squared]:
