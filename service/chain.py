@@ -40,7 +40,7 @@ from toolpath.motion import RAPID_MM_MIN
 from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from verify.model import Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
@@ -76,7 +76,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress)
-    trimmed: Mapping[str, Sequence[TrimmedFace]] = {}
+    trimmed: Mapping[str, Sequence[Faces]] = {}
     if setup.operations.finishing:
         try:
             trimmed = trimmed_faces(part_path, ready)
@@ -134,7 +134,7 @@ class _Share:
         self.progress(stage, self.low + self.width * share)
 
 
-def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[TrimmedFace]], steps: int,
+def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]], steps: int,
           share: _Share) -> Side:
     """Plan and write the zones of one access, from the whole blank; the proof has what the accesses before leave."""
     stock = planning_stock(ready, view)

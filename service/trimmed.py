@@ -5,19 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from geometry.facepatches import read_patches
 from geometry.mesh import F64, I32
+from geometry.part import EdgeKind
 from geometry.trim import trim_faces
 from service.prepare import Prepared, placement_of
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.isoparametric import Faces, SmoothFaces, TrimmedFace
 from zones.machinable import Form
 
 WIDE = 1e3  # mm between places a face is looked at for a change of label, of which there is none
 
 
-def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[TrimmedFace, ...]]:
+def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     """The faces, planes left out, that every steep or shallow zone is part of, by its id, in the frame of its access.
+
+    Those of a zone that join smoothly are one.
 
     path : the STEP file ``ready`` was read from
     """
@@ -29,7 +34,14 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[TrimmedFace, .
     setup = ready.setup
     exact = read_patches(path, numbers, placement=placement_of(setup), solid=setup.part.solid)
     pieces = trim_faces(ready.part, numbers, _whole, WIDE)[0]
+    uv = np.array(ready.part.uv)
+    for f, patch in exact.items():
+        rows = ready.part.mesh.face_ids == f
+        uv[rows] = patch.parameters(uv[rows].reshape(-1, 2)).reshape(-1, 3, 2)
+    smooth = [e.faces for e in ready.part.edges if e.kind is EdgeKind.SMOOTH]
     there: dict[str, dict[int, list[TrimmedFace]]] = {}
+    joined: dict[tuple[str, tuple[int, ...]], SmoothFaces] = {}
+    out: dict[str, tuple[Faces, ...]] = {}
     for access in {z.access for z in wanted}:
         turn = np.eye(4)
         turn[:3, :3] = ready.view(access).rotation
@@ -38,7 +50,28 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[TrimmedFace, .
             patch = exact[p.face]
             loops = tuple(patch.parameters(loop) for loop in p.loops)
             own.setdefault(p.face, []).append(TrimmedFace(p.face, patch.surface.moved(turn), loops, p.area))
-    return {z.id: tuple(face for f in z.faces for face in there[z.access].get(f, ())) for z in wanted}
+    for z in wanted:
+        mine: list[Faces] = []
+        for group in _together([f for f in z.faces if f in there[z.access]], smooth):
+            alone = tuple(face for f in group for face in there[z.access][f])
+            if len(group) == 1 or len(alone) > len(group):  # a face in pieces is not one sheet with others
+                mine += alone
+                continue
+            key = z.access, group
+            if key not in joined:
+                joined[key] = SmoothFaces(alone, ready.view(z.access).part.mesh, uv)
+            mine.append(joined[key])
+        out[z.id] = tuple(mine)
+    return out
+
+
+def _together(faces: list[int], smooth: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Faces in groups that smooth edges join, in order."""
+    place = {f: k for k, f in enumerate(faces)}
+    pairs = np.array([(place[a], place[b]) for a, b in smooth if a in place and b in place and a != b]).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(faces), len(faces)))
+    group = connected_components(graph, directed=False)[1].tolist()
+    return [tuple(f for f, g in zip(faces, group, strict=True) if g == k) for k in dict.fromkeys(group)]
 
 
 def _whole(points: F64, _normals: F64, _face: I32) -> np.ndarray:

@@ -28,7 +28,7 @@ from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, isoparametric, spot, zigzag, zlevel
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from zones.machinable import Form
 from zones.reach import TipField
@@ -70,7 +70,7 @@ class Finish:
     """
 
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, faces: Sequence[TrimmedFace] = ()) -> None:
+                 settings: PlanSettings, faces: Sequence[Faces] = ()) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):

@@ -26,6 +26,7 @@ from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.gridmap import GridMap
+from geometry.joined import Joined
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
 from toolpath.forward import Curve
@@ -37,6 +38,8 @@ MOST_LINES = 513
 CENTRES = 513  # of the ball along a pass
 ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
 FULL, AIM, TRIALS = 0.97, 0.985, 8
+NODES = 49  # each way, through which several faces are splined
+APART = 1e-3  # of the unit square, between places a curvature is asked with
 STEEP = 0.5  # of a normal lies level: what leans more is not cut by a flank
 
 
@@ -100,6 +103,53 @@ class IsoSurface:
         return np.clip(uv, *self.surface.domain)
 
 
+@dataclass(frozen=True, eq=False)
+class JoinedSurface:
+    """Several faces over the unit square as one; ``turned``: xi is the grid's eta.
+
+    splines : x, y and z (mm) over (eta, xi) of the grid, through places of the faces, near them in between
+    """
+
+    faces: Joined
+    splines: tuple[RectBivariateSpline, ...]
+    turned: bool = False
+
+    @classmethod
+    def of(cls, faces: Joined, grid: GridMap) -> JoinedSurface:
+        """Faces over a piece of their plane that ``grid`` lays into the unit square."""
+        at = np.linspace(0.0, 1.0, NODES)
+        xi, eta = np.meshgrid(at, at)
+        place = faces.places(grid(xi.ravel(), eta.ravel())).reshape(NODES, NODES, 3)
+        return cls(faces, tuple(RectBivariateSpline(at, at, place[:, :, c]) for c in range(3)))
+
+    def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """As for ``IsoSurface``."""
+        a, b = (xi, eta) if self.turned else (eta, xi)
+        return self.faces.feet(np.column_stack([spline.ev(a, b) for spline in self.splines]))
+
+    def curve(self, eta: float, low: float = 0.0, high: float = 1.0) -> Curve:
+        """As for ``IsoSurface``."""
+        return lambda t: self.contact(low + (high - low) * t, np.full(len(t), eta))
+
+    def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """As for ``IsoSurface``, from places a little apart: the curvature jumps where faces join."""
+        def apart(dx: float, dy: float) -> tuple[F64, F64]:
+            low = self.contact(np.clip(xi - dx, 0.0, 1.0), np.clip(eta - dy, 0.0, 1.0))
+            high = self.contact(np.clip(xi + dx, 0.0, 1.0), np.clip(eta + dy, 0.0, 1.0))
+            return high[0] - low[0], high[1] - low[1]
+
+        along, (over, turn) = apart(APART, 0.0)[0], apart(0.0, APART)
+        along = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+        span = np.minimum(eta + APART, 1.0) - np.maximum(eta - APART, 0.0)
+        square = over - (over * along).sum(axis=1)[:, None] * along
+        size = np.linalg.norm(square, axis=1)
+        return size / span, -(turn * square).sum(axis=1) / np.maximum(size * size, 1e-300)
+
+
+Laid = IsoSurface | JoinedSurface
+"""A face, or several as one, over the unit square."""
+
+
 class _Table:
     """Contacts and normals as splines over the unit square, fine enough for what a scallop is measured with.
 
@@ -107,7 +157,7 @@ class _Table:
     most half way between its places, or the lattice has 513 by 513.
     """
 
-    def __init__(self, iso: IsoSurface, scallop: float) -> None:
+    def __init__(self, iso: Laid, scallop: float) -> None:
         count, off = 33, np.inf
         while off > 1e-3 * scallop and count <= MOST_LINES:
             at = np.linspace(0.0, 1.0, count)
@@ -141,7 +191,7 @@ class Flank:
     height: float
 
 
-def lay_out(iso: IsoSurface, radius: float, scallop: float, flank: Flank | None = None) -> F64:
+def lay_out(iso: Laid, radius: float, scallop: float, flank: Flank | None = None) -> F64:
     """The passes, (k,) float64, eta from 0 to 1: both borders, and as few between them as the scallop allows.
 
     radius, scallop : mm
@@ -163,7 +213,7 @@ def lay_out(iso: IsoSurface, radius: float, scallop: float, flank: Flank | None 
     return np.array(out)
 
 
-def _first_guess(iso: IsoSurface, eta: float, radius: float, scallop: float) -> float:
+def _first_guess(iso: Laid, eta: float, radius: float, scallop: float) -> float:
     xi = np.linspace(0.0, 1.0, ALONG)
     width, curvature = iso.across(xi, np.full(ALONG, eta))
     g = side_step(np.minimum(curvature, TIGHT / radius), radius, scallop)

@@ -21,7 +21,7 @@ from toolpath.motion import Workingstep
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.isoparametric import Faces
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -44,7 +44,7 @@ class Plan:
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[TrimmedFace]] | None = None) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
     """Plan all zones.
 
     zones    : in machining order

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
-from geometry.mesh import F64
+from geometry.joined import Joined
+from geometry.mesh import F64, TriangleMesh
 from geometry.nurbs import NurbsSurface
 from geometry.squaring import Squared, squared
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
 from toolpath.forward import Profile, steps
-from toolpath.isoparametric import Flank, IsoSurface, lay_out
+from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 from toolpath.levels import Line, true_runs
 from toolpath.locations import lifted
 from zones.reach import TipField
@@ -33,6 +34,11 @@ ALONG = 129  # places along a pass at which it is asked what it serves
 LATTICE = 9  # places each way at which the rise of both families of passes is looked at
 LEVEL_GAIN = 0.5  # of the rise along the longer sides: what less there must be along the shorter to go there instead
 OVERRUN = 0.3  # radii of the corner a pass goes on past the last place it serves
+
+
+Asked = tuple[float, float, Flank | None]
+Passes = tuple[Laid, F64]
+"""A piece over the unit square and the eta of its passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +55,7 @@ class TrimmedFace:
     surface: NurbsSurface
     loops: tuple[F64, ...]
     area: float
-    _laid: dict[tuple[float, float, Flank | None], list[tuple[IsoSurface, F64]]] = fresh(default_factory=dict,
-                                                                                         repr=False)
+    _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
 
     @cached_property
     def pieces(self) -> list[Squared]:
@@ -59,7 +64,17 @@ class TrimmedFace:
         scale = float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())
         return squared(self.loops, scale)
 
-    def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[tuple[IsoSurface, F64]]:
+    @property
+    def name(self) -> str:
+        """As it is told: F12."""
+        return f"F{self.face}"
+
+    @property
+    def alone(self) -> tuple[TrimmedFace, ...]:
+        """What is to be tried instead where it cannot be laid: nothing."""
+        return ()
+
+    def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
         """Each piece with the eta of its passes.
 
         radius, scallop : mm, of the tool's corner, and what may be left
@@ -67,17 +82,57 @@ class TrimmedFace:
         """
         key = radius, scallop, flank
         if key not in self._laid:
-            pieces = [IsoSurface(self.surface, p.map) for p in self.pieces]
-            pieces = [_leveller(p) for p in pieces] if flank is not None else pieces
-            self._laid[key] = [(iso, lay_out(iso, radius, scallop, flank)) for iso in pieces]
+            self._laid[key] = _passes([IsoSurface(self.surface, p.map) for p in self.pieces], *key)
         return self._laid[key]
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothFaces:
+    """Faces that join smoothly, to be gone over as one.
+
+    alone : the faces, each as it would be gone over on its own
+    mesh  : TriangleMesh of the part, access frame; uv (m, 3, 2) float64, parameters on the surfaces of the corners of
+            the facets of these faces, whatever elsewhere
+    """
+
+    alone: tuple[TrimmedFace, ...]
+    mesh: TriangleMesh
+    uv: F64
+    _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
+
+    @property
+    def name(self) -> str:
+        """As they are told: F12 F13."""
+        return " ".join(face.name for face in self.alone)
+
+    @property
+    def area(self) -> float:
+        """mm²."""
+        return sum(face.area for face in self.alone)
+
+    @cached_property
+    def pieces(self) -> list[JoinedSurface]:
+        """The pieces of them over the unit square; a GeometryError where they are no sheet, or fold."""
+        joined = Joined.of(self.mesh, self.uv, {face.face: face.surface for face in self.alone})
+        return [JoinedSurface.of(joined, p.map) for p in squared((joined.border,), (1.0, 1.0))]
+
+    def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
+        """As for one face."""
+        key = radius, scallop, flank
+        if key not in self._laid:
+            self._laid[key] = _passes(self.pieces, *key)
+        return self._laid[key]
+
+
+Faces = TrimmedFace | SmoothFaces
+"""What passes are laid over: a face, or several as one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """A piece of a pass: eta, and from which xi to which; ``turned``: walked from the greater xi to the less."""
 
-    iso: IsoSurface
+    iso: Laid
     eta: float
     low: float
     high: float
@@ -100,7 +155,7 @@ class Course:
     refused: tuple[str, ...]
 
 
-def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallop: float, chord: float,
+def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: float, chord: float,
            flank: Flank | None) -> Course:
     """The passes of faces as far as they serve what is to be cut.
 
@@ -117,13 +172,16 @@ def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallo
     apart: list[float] = []
     refused: list[str] = []
     way = 0.0
-    for face in faces:
+    todo = list(faces)
+    while todo:
+        face = todo.pop(0)
         if face.area < LEAST_AREA * radius**2:
             continue
         try:
             passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), flank)
         except GeometryError as refusal:
-            refused.append(f"F{face.face}: {refusal.message}")
+            refused.append(f"{face.name}: {refusal.message}")
+            todo[:0] = face.alone
             continue
         for iso, etas in passes:
             own, step, length = _served(iso, etas, near, target.spacing, radius, flank is not None)
@@ -134,7 +192,7 @@ def course(faces: Sequence[TrimmedFace], target: Target, field: TipField, scallo
     return Course(tuple(groups), way, float(np.median(apart)) if apart else 0.0, tuple(refused))
 
 
-def _served(iso: IsoSurface, etas: F64, near: cKDTree, spacing: float, radius: float,
+def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
             steep: bool) -> tuple[tuple[Stretch, ...], float, float]:
     """The stretches of all passes that come near places, mm between passes, and mm the tool goes."""
     xi = np.linspace(0.0, 1.0, ALONG)
@@ -203,13 +261,18 @@ def suits(tool: ToolBody) -> bool:
     return tool.corner_radius > 0.0
 
 
-def _leveller(iso: IsoSurface) -> IsoSurface:
+def _passes(pieces: Sequence[Laid], radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
+    ways = [_leveller(p) for p in pieces] if flank is not None else pieces
+    return [(iso, lay_out(iso, radius, scallop, flank)) for iso in ways]
+
+
+def _leveller(iso: Laid) -> Laid:
     """The surface with passes along the longer sides, or along the others where they are far more level."""
     other = replace(iso, turned=True)
     return other if _rise(other) < LEVEL_GAIN * _rise(iso) else iso
 
 
-def _rise(iso: IsoSurface) -> float:
+def _rise(iso: Laid) -> float:
     """How steeply the passes go up or down: mm a mm, on average."""
     at = np.linspace(0.0, 1.0, LATTICE)
     xi, eta = np.meshgrid(at, at)
