@@ -45,7 +45,7 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None) -> 
 
 
 def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
-           off: float = 0.0) -> tuple[list[F64], bool]:
+           off: float = 0.0, most: float | None = None) -> tuple[list[F64], bool]:
     """The tips of a pass, upright, moved off the surface or raised where the part stands over them.
 
     profile   : Profile of the pass; ends (n,) float64, mm, the ways at which it is located
@@ -79,7 +79,7 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
         order = np.argsort(np.concatenate([way, between]), kind="stable")
         way, rise = np.concatenate([way, between])[order], np.concatenate([rise, up])[order]
         made = np.concatenate([made, tip])[order]
-    whole = (rise <= tool.radius) & np.isfinite(rise)
+    whole = (rise <= (tool.radius if most is None else most)) & np.isfinite(rise)
     steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
     runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, 0.5 * tolerance))
     return [thinned(made[i:j + 1], 0.5 * tolerance) for i, j in runs], True

@@ -143,13 +143,15 @@ class Stretch:
 class Course:
     """What passes over trimmed faces would be.
 
-    groups    : stretches of each piece of a face, pass after pass
+    groups    : stretches of each piece of a face, pass after pass; on a wall each pass is one, from the highest down
+    steep     : on a wall, where a pass ends at what stands in its way; elsewhere it goes over it
     way       : mm the tool goes along all of them
     side_step : mm between neighbouring passes, the usual one
     refused   : why faces have none, in words
     """
 
     groups: tuple[tuple[Stretch, ...], ...]
+    steep: bool
     way: float
     side_step: float
     refused: tuple[str, ...]
@@ -169,6 +171,7 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
     radius = field.tool.corner_radius + field.allowance
     near = cKDTree(target.points)
     groups: list[tuple[Stretch, ...]] = []
+    levels: list[tuple[float, tuple[Stretch, ...]]] = []
     apart: list[float] = []
     refused: list[str] = []
     way = 0.0
@@ -185,16 +188,22 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
             continue
         for iso, etas in passes:
             own, step, length = _served(iso, etas, near, target.spacing, radius, flank is not None)
-            if own:
-                groups.append(own)
-                apart.append(step)
-                way += length
-    return Course(tuple(groups), way, float(np.median(apart)) if apart else 0.0, tuple(refused))
+            if not own:
+                continue
+            if flank is None:
+                groups.append(tuple(s for _, mine in own for s in mine))
+            levels += own
+            apart.append(step)
+            way += length
+    if flank is not None:  # what stands above a pass would have to be taken off with it
+        groups = [mine for _, mine in sorted(levels, key=lambda level: -level[0])]
+    return Course(tuple(groups), flank is not None, way, float(np.median(apart)) if apart else 0.0, tuple(refused))
 
 
 def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
-            steep: bool) -> tuple[tuple[Stretch, ...], float, float]:
-    """The stretches of all passes that come near places, mm between passes, and mm the tool goes."""
+            steep: bool) -> tuple[list[tuple[float, tuple[Stretch, ...]]], float, float]:
+    """The stretches of all passes that come near places, with the height (mm) of each pass, mm between passes, and mm
+    the tool goes."""
     xi = np.linspace(0.0, 1.0, ALONG)
     along, across = np.meshgrid(xi, etas)
     place, normal = (v.reshape(len(etas), ALONG, 3) for v in iso.contact(along.ravel(), across.ravel()))
@@ -202,7 +211,7 @@ def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
     size = np.linalg.norm(np.diff(place, axis=1), axis=2)
     wanted = near.query(place.reshape(-1, 3))[0].reshape(len(etas), ALONG) <= np.maximum(
         step + 0.5 * spacing, np.median(size))
-    out: list[Stretch] = []
+    out: list[tuple[float, tuple[Stretch, ...]]] = []
     total = 0.0
     for k, eta in enumerate(etas.tolist()):
         at = np.concatenate([[0.0], np.cumsum(size[k])])
@@ -214,8 +223,10 @@ def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
             a, b = np.interp([low, high], at, xi).tolist()
             mine.append(Stretch(iso, eta, a, b, turned))
             total += float(np.diff(np.interp([low, high], at, gone))[0])
-        out += reversed(mine) if turned else mine
-    return tuple(out), step, total
+        if mine:
+            height = float(place[k, wanted[k], 2].mean())
+            out.append((height, tuple(reversed(mine) if turned else mine)))
+    return out, step, total
 
 
 def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[float, float]]:
@@ -238,7 +249,7 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
     """
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
-    out, refused = [], []
+    out, refused, most = [], [], 0.0 if planned.steep else None
     for group in planned.groups:
         lines: list[Line] = []
         for s in group:
@@ -249,7 +260,7 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
                 refused.append(refusal.message)
                 continue
             made = [Line(p + [0.0, 0.0, spare], False)
-                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift)[0]
+                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift, most)[0]
                     if len(p) > 1]
             lines += [line.reversed() for line in reversed(made)] if s.turned else made
         out.append(lines)
