@@ -53,11 +53,14 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
     tolerance : mm, of the raised way
     off       : mm, up to which a tip may stand off along the normal first: facets of a wall may stand over its surface,
                 and beside a wall the limit is its top
+    most      : mm, up to which a tip is raised, the radius of the tool where None; 0 on walls, where a raised tip cuts
+                nothing that the pass is there for
 
     Returns
     -------
-    Pieces (k, 3) float64, mm, and whether anything was raised: then the way follows the limit there, and what it leaves
-    at those contacts is for others. Where the limit is over a radius higher, or jumps, the pass is broken.
+    Pieces (k, 3) float64, mm, and whether the part stood in the way anywhere: then the way follows the limit there, and
+    what it leaves at those contacts is for others. Where the limit is higher than ``most``, or jumps, the pass is
+    broken.
     """
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
     way = np.unique(np.concatenate([ends, profile.ways, looks]))
@@ -103,7 +106,7 @@ def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.b
 
 def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), off the surface where that frees them, and what the part allows there (n,); mm."""
-    contact, normal = _contacts(profile, way)
+    contact, normal = contacts(profile, way)
     made = tips(contact, normal, tool)
     high = limit(np.ascontiguousarray(made[:, :2]))
     for share in OFFS if off > 0.0 else ():
@@ -117,8 +120,8 @@ def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: floa
     return made, high
 
 
-def _contacts(profile: Profile, way: F64) -> tuple[F64, F64]:
-    """Contacts and unit normals (n, 3) at ways (n,) mm."""
+def contacts(profile: Profile, way: F64) -> tuple[F64, F64]:
+    """Contacts (n, 3) mm and unit normals (n, 3) of a pass at ways (n,) mm."""
     contact = profile.centres(way, 0.0)
     normal = profile.centres(way, 1.0) - contact
     return contact, normal
