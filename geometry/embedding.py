@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay, cKDTree
 
 from geometry.bvh import TriangleTree
@@ -156,11 +156,17 @@ def _solved(place: F64, held: np.ndarray, start: np.ndarray, end: np.ndarray, we
     border = held[j]
     np.add.at(known, i[border], w[border, None] * place[j[border]])
     total = np.bincount(i, w, count)
+    total[total == 0.0] = 1.0  # a place in no triangle lies where it likes
     system = coo_matrix((np.concatenate([total, -w[~border]]),
                          (np.concatenate([np.arange(count), i[~border]]),
                           np.concatenate([np.arange(count), number[j[~border]]]))), shape=(count, count)).tocsc()
     out = place.copy()
-    out[~held] = np.asarray(spsolve(system, known)).reshape(-1, 2)
+    try:
+        out[~held] = splu(system).solve(known)
+    except RuntimeError as singular:
+        raise GeometryError("triangles of the region hang together with no border", code="flat_triangle",
+                            subjects=("region",), measured=count, limit=0,
+                            remedy="triangulate it as one piece") from singular
     return out
 
 

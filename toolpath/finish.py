@@ -217,7 +217,7 @@ class Finish:
             if key in self.walked:  # what it left, it leaves again
                 continue
             before, last = len(linker.trajectories), 0
-            for layer in zigzag.skimmed(line, self.stock, tool, skin, slope):
+            for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, self.zone.form is Form.STEEP):
                 last = len(linker.trajectories)
                 linker.add(layer, thin)
             cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]

@@ -271,6 +271,17 @@ def test_a_level_pass_and_one_in_air_are_not_skimmed():
     assert len(zigzag.skimmed(into, stock, ball(2.0), 0.1, 0.05)) > 5
 
 
+def test_beside_a_wall_only_what_is_under_the_end_of_a_pass_that_goes_down_is_skimmed():
+    mesh = box_mesh([0, 0, -2], [40, 4, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([40.0, 4, 3.0]), 0.1)
+    down = np.array([[3.0, 2, 2.8], [33, 2, 0.6]])
+    beside = down + [0.0, 3.4, 0.0]  # the ball of 4 mm goes along the block with 0.6 mm of its flank in it
+    assert len(zigzag.skimmed(Line(beside, False), stock, ball(4.0), 0.3, 0.05, True)) == 1
+    assert len(zigzag.skimmed(Line(beside, False), stock, ball(4.0), 0.3, 0.05)) > 1
+    assert len(zigzag.skimmed(Line(down, False), stock, ball(4.0), 0.3, 0.05, True)) > 5
+    assert len(zigzag.skimmed(Line(down[::-1], False), stock, ball(4.0), 0.3, 0.05, True)) == 1
+
+
 # -- level planes -------------------------------------------------------------------------------------------------
 
 

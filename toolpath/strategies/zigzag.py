@@ -150,7 +150,7 @@ def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
     return [line.reversed() for line in lines] if climb else lines
 
 
-def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float) -> list[Line]:
+def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float, wall: bool = False) -> list[Line]:
     """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
 
     A descent is worked off only by going sideways: over a piece of length s each layer after the first adds what
@@ -161,6 +161,8 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
     stock : StockMap as it stands
     skin  : mm, the most that is taken off in a descent
     slope : mm per mm, of the ramp down which the tool may go for any length
+    wall  : beside a wall, where what stands at the side of a tool is cut by its flank: only what is under its end
+            counts, and only where the pass goes down
 
     Returns
     -------
@@ -171,10 +173,10 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
     if rise < 1e-6:
         return [line]
     points = dense(line.points, 0.3 * tool.radius)
-    deep = _steep_stock(points, stock, tool)
+    deep = _steep_stock(points, stock, tool, wall)
     out: list[Line] = []
     for piece in pieces_where(Line(points, False), deep > skin, tool.radius, 4.0 * tool.radius):
-        over = float(_steep_stock(dense(piece.points, 0.3 * tool.radius), stock, tool).max())
+        over = float(_steep_stock(dense(piece.points, 0.3 * tool.radius), stock, tool, wall).max())
         run = float(np.linalg.norm(np.diff(piece.points[:, :2], axis=0), axis=1).sum())
         layers = max(math.ceil(over / skin), 1 + math.ceil(max(over - skin, 0.0) / max(slope * run, 1e-3)))
         out.extend(Line(piece.points + np.array([0.0, 0.0, k * over / layers]), False)
@@ -182,16 +184,14 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
     return [*out, line]
 
 
-def _steep_stock(points: F64, stock: StockMap, tool: ToolBody) -> F64:
-    """(n,) float64, mm: how far stock stands above the cutter where the pass goes up or down; 0 elsewhere."""
-    over = stock.overlap(points, tool, -0.3)
+def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F64:
+    """(n,) float64, mm: how far stock stands above the cutter where the pass goes up or down, on a wall how far above
+    the end of the cutter where it goes down; 0 elsewhere."""
+    move = np.diff(points, axis=0)
+    rise = -move[:, 2] if wall else np.abs(move[:, 2])
+    steep = rise > 0.05 * np.hypot(move[:, 0], move[:, 1])  # 3 degrees
+    steep = np.concatenate([steep, [False]]) | np.concatenate([[False], steep])
+    over = stock.under_end(points, tool) if wall else stock.overlap(points, tool, -0.3)
     if tool.corner_radius == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim
         over = np.maximum(over, stock.standing(points, tool))
-    return np.where(np.isfinite(over) & _descends(points), over, 0.0)
-
-
-def _descends(points: F64) -> NDArray[np.bool_]:
-    """(n,) bool: one of the moves at a point is steeper than 3 degrees, either way."""
-    move = np.diff(points, axis=0)
-    steep = np.abs(move[:, 2]) > 0.05 * np.hypot(move[:, 0], move[:, 1])
-    return np.concatenate([steep, [False]]) | np.concatenate([[False], steep])
+    return np.where(np.isfinite(over) & steep, over, 0.0)
