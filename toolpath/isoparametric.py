@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
-from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.gridmap import GridMap
@@ -30,6 +29,7 @@ from geometry.joined import Joined
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
 from toolpath.forward import Curve
+from toolpath.kernels.beside import left_beside
 
 LEVEL = 1e-9  # 1/mm: what is less curved is level
 TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
@@ -177,7 +177,8 @@ class _Table:
     def __call__(self, xi: F64, eta: F64) -> tuple[F64, F64]:
         """Contacts and unit normals, both (m, n, 3), at all of xi (n,) and eta (m,), which grow."""
         out = np.stack([spline(eta, xi) for spline in self.splines], axis=-1)
-        return out[..., :3], out[..., 3:] / np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
+        normal = out[..., 3:] / np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
+        return np.ascontiguousarray(out[..., :3]), np.ascontiguousarray(normal)
 
 
 @dataclass(frozen=True)
@@ -221,72 +222,30 @@ def _first_guess(iso: Laid, eta: float, radius: float, scallop: float) -> float:
 
 
 class _Pass:
-    """A pass as centres of the ball, close together, to ask what is left beside it."""
+    """A pass as centres of the corner, close together, to ask what is left beside it."""
 
     def __init__(self, table: _Table, eta: float, radius: float, flank: Flank | None) -> None:
         point, normal = table(np.linspace(0.0, 1.0, CENTRES), np.array([eta]))
         self.centres, self.radius, self.flank = point[0] + radius * normal[0], radius, flank
-        self.tree = cKDTree(self.centres)
+        self.axes = self.centres
         if flank is not None:
-            level = normal[0, :, :2]
-            level = level / np.maximum(np.linalg.norm(level, axis=1), 1e-12)[:, None]
-            self.axes = self.centres[:, :2] + (flank.radius - radius) * level
-            self.axis_tree = cKDTree(self.axes)
+            level = normal[0] * [1.0, 1.0, 0.0]
+            size = np.maximum(np.linalg.norm(level, axis=1), 1e-12)
+            self.axes = self.centres + (flank.radius - radius) * level / size[:, None]
 
     def left(self, points: F64, normals: F64) -> F64:
-        """How far along the normals (n, 3) of places (n, 3), mm, the tool begins; a little over r where it is not."""
-        _, near = self.tree.query(points + self.radius * normals)
-        best = np.full(len(points), 1.01 * self.radius)
-        for k in (-1, 0):
-            a = np.clip(near + k, 0, len(self.centres) - 2)
-            best = np.minimum(best, self._on(points, normals, self.centres[a], self.centres[a + 1]))
-        return best if self.flank is None else np.minimum(best, self._beside(points, normals, self.flank))
-
-    def _beside(self, points: F64, normals: F64, flank: Flank) -> F64:
-        """The same of the flank: where rays meet the upright band as wide as the tool over the way of its corner."""
-        best = np.full(len(points), 1.01 * self.radius)
-        size = np.linalg.norm(normals[:, :2], axis=1)
-        rows = np.flatnonzero(size > STEEP)
-        p, n = points[rows], normals[rows]
-        _, near = self.axis_tree.query(p[:, :2] + flank.radius / size[rows, None] * n[:, :2])
-        for k in (-1, 0):
-            a = np.clip(near + k, 0, len(self.axes) - 2)
-            start, d = self.axes[a], self.axes[a + 1] - self.axes[a]
-            length2 = np.maximum((d * d).sum(axis=1), 1e-300)
-            t = np.zeros(len(p))
-            for _ in range(4):  # the axis nearest to where the ray meets the band, taken anew
-                s = np.clip(((p[:, :2] + t[:, None] * n[:, :2] - start) * d).sum(axis=1) / length2, 0.0, 1.0)
-                w = start + s[:, None] * d - p[:, :2]
-                along, out = (w * n[:, :2]).sum(axis=1), size[rows] ** 2
-                deep = along * along - out * ((w * w).sum(axis=1) - flank.radius**2)
-                t = np.where(deep >= 0.0, (along - np.sqrt(np.maximum(deep, 0.0))) / out, np.inf)
-                t = np.minimum(t, 1.01 * self.radius)
-            low = self.centres[a, 2] + s * (self.centres[a + 1, 2] - self.centres[a, 2])
-            high = p[:, 2] + t * n[:, 2] - low
-            best[rows] = np.minimum(best[rows], np.where((high >= 0.0) & (high <= flank.height), t, np.inf))
-        return best
-
-    def _on(self, points: F64, normals: F64, a: F64, b: F64) -> F64:
-        """The same of a ball that goes straight from a to b (n, 3): where the ray meets its capsule."""
-        best = np.full(len(points), 1.01 * self.radius)
-        t = np.zeros(len(points))
-        d = b - a
-        length2 = np.maximum((d * d).sum(axis=1), 1e-300)
-        for _ in range(4):  # the centre nearest to where the ray meets it, taken anew
-            at = points + t[:, None] * normals
-            s = np.clip(((at - a) * d).sum(axis=1) / length2, 0.0, 1.0)
-            w = a + s[:, None] * d - points
-            along = (w * normals).sum(axis=1)
-            deep = self.radius**2 - (w * w).sum(axis=1) + along * along
-            t = np.where(deep >= 0.0, along - np.sqrt(np.maximum(deep, 0.0)), best)
-        return np.minimum(best, t)
+        """How far along the normals of places (m, ALONG, 3), mm, the tool begins, (m, ALONG); a little over r where it
+        is not. The second index goes along the pass."""
+        out = np.empty(points.shape[:2])
+        wide, high = (0.0, 0.0) if self.flank is None else (self.flank.radius, self.flank.height)
+        left_beside(points, normals, self.centres, self.axes, self.radius, wide, high, STEEP, out)
+        return out
 
 
 def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
     """The most that is left between two passes, mm."""
     points, normals = table(np.linspace(0.0, 1.0, ALONG), low + ROWS * (high - low))
-    shape, points, normals = points.shape[:2], points.reshape(-1, 3), normals.reshape(-1, 3)
-    one, two = a.left(points, normals).reshape(shape), b.left(points, normals).reshape(shape)
+    one, two = a.left(points, normals), b.left(points, normals)
     # what is left grows with the square of the way from a pass: between two rows both roots are straight
     p, q = np.sqrt(np.maximum(one, 0.0)), np.sqrt(np.maximum(two, 0.0))
     fall = (p[:-1] <= q[:-1]) & (p[1:] >= q[1:])

@@ -15,6 +15,7 @@ from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
+from toolpath.kernels.beside import left_beside
 from toolpath.locations import tips
 from verify.removal import Moves, residual_on_normals
 
@@ -139,3 +140,37 @@ def test_beside_walls_the_flank_of_an_upright_tool_counts(lean, bend, corner):
     assert len(etas) <= len(alone)
     if lean < 1.0:
         assert len(etas) < 0.5 * len(alone) and left.max() > 0.6 * scallop
+
+
+@pytest.mark.parametrize("corner", [3.0, 0.8])
+@pytest.mark.parametrize("lean", [1.0, 12.0, 40.0])
+def test_what_is_left_beside_a_pass_is_that_of_balls_and_cylinders_set_down_all_along_it(lean, corner):
+    iso, flank, rng = wall(lean, 0.03), Flank(3.0, 2.0), np.random.default_rng(4)
+    xi = np.linspace(0.0, 1.0, 513)
+    point, normal = iso.contact(xi, 0.4 + 0.1 * np.sin(3.0 * xi))
+    centres = point + corner * normal
+    level = normal * [1.0, 1.0, 0.0]
+    axes = centres + (3.0 - corner) * level / np.linalg.norm(level, axis=1)[:, None]
+    at = np.sort(rng.uniform(0.0, 1.0, (9, 65)), axis=1)
+    p, n = iso.contact(at.ravel(), rng.uniform(0.0, 1.0, at.size))
+    found = np.empty(at.shape)
+    left_beside(p.reshape(9, 65, 3), n.reshape(9, 65, 3), centres, axes, corner, flank.radius, flank.height, 0.5, found)
+    share = np.linspace(0.0, 1.0, 4)[:-1, None, None]
+    c, a = ((q[:-1] + share * (q[1:] - q[:-1])).reshape(-1, 3) for q in (centres, axes))
+    twin = np.full(len(p), 1.01 * corner)
+    for k in range(len(p)):
+        w = c - p[k]
+        along = w @ n[k]
+        deep = corner**2 - (w * w).sum(axis=1) + along**2
+        twin[k] = min(twin[k], (along - np.sqrt(np.maximum(deep, 0.0)))[deep >= 0.0].min(initial=np.inf))
+        w, size = (a - p[k])[:, :2], np.hypot(*n[k, :2])
+        along = w @ n[k, :2]
+        deep = along**2 - size**2 * ((w * w).sum(axis=1) - flank.radius**2)
+        t = (along - np.sqrt(np.maximum(deep, 0.0))) / size**2
+        up = p[k, 2] + t * n[k, 2] - c[:, 2]
+        good = (deep >= 0.0) & (up >= 0.0) & (up <= flank.height) & (size > 0.5)
+        twin[k] = min(twin[k], t[good].min(initial=np.inf))
+    off, near = (found.ravel() - twin), twin < 0.1
+    assert near.sum() > 20 and np.quantile(np.abs(off[near]), 0.95) < 1e-4
+    assert off[near].min() > -1e-4  # the twin's own places are 0.02 mm apart; more than is true may be told, not less
+    assert off.min() > -0.004  # grazed, far from the pass
