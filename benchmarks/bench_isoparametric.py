@@ -1,8 +1,9 @@
 """Iso-parametric passes on trimmed surfaces: analogues of a published table, chords on exact surfaces, random trims.
 
 Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]
-[--demo] [--wheel FOLDER]``; without a flag all but the last. What is left is judged by ``verify.removal``, which shares
-no code with the passes. Seconds are wall clock of one run, compiled kernels: laying into the square, passes and steps.
+[--demo] [--wheel FOLDER [--lean DEGREES]]``; without a flag all but the last. What is left is judged by
+``verify.removal``, which shares no code with the passes. Seconds are wall clock of one run, compiled kernels: laying
+into the square, passes and steps.
 """
 
 from __future__ import annotations
@@ -27,22 +28,25 @@ from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
 from geometry.facepatches import read_patches  # noqa: E402
 from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
+from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.squaring import Method, Squared, squared  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
-from service.convert import parse_setup  # noqa: E402
-from service.prepare import placement_of, prepare  # noqa: E402
+from service.convert import parse_setup, tool_bodies  # noqa: E402
+from service.prepare import clearances, placement_of, prepare  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
 from toolpath.isoparametric import Flank, IsoSurface, lay_out  # noqa: E402
 from toolpath.locations import FREE, lifted, tips  # noqa: E402
+from toolpath.posed import enters, leaned, posed  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
 from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
+from verify.toolaxes import ToolAxes  # noqa: E402
 
 RADIUS, SCALLOP = 5.0, 0.5
 SIZE = 200.0  # mm
@@ -336,6 +340,55 @@ def wheel_faces(parts: Path) -> None:
     faces(parts / "imp_kj66_compressor_wheel.step", given, 1.0, 0.05, 0.005, "compressor wheel")
 
 
+def leaning_faces(parts: Path, lean: float) -> None:
+    """The large faces of the blades by a ball of 2 mm that leans to the side they look to, free of the wheel."""
+    root = Path(__file__).resolve().parents[1]
+    setup = parse_setup((root / "examples/setups/kj66_compressor_wheel.json").read_text())
+    step, scallop, chord = parts / "imp_kj66_compressor_wheel.step", 0.05, 0.004
+    ready = prepare(step, setup, lambda _stage, _share: None)
+    part, body = ready.views[0].part, tool_bodies(setup)[3]
+    large = {f.number for f in part.faces if f.surface == "bspline" and f.area > 500.0}
+    numbers = sorted({f for w in ready.decomposition.walls for f in w.faces} & large)
+    patches = read_patches(step, numbers, placement=placement_of(setup), solid=setup.part.solid)
+    trimmed = trim_faces(part, numbers, lambda p, _n, _f: np.zeros(len(p), np.int64), 1e3)[0]
+    tree, off = TriangleTree(part.mesh), max(0.1 * scallop, 1.5 * part.chord)
+    blocked = enters(tree, body, clearances(setup))
+    print(f"\nblades of the wheel: ball of {body.radius} mm that leans, scallop {scallop}, chord {chord} mm")
+    print(f"{'face':>5} {'lean':>5} {'passes':>6} {'mm':>7} {'walked':>7} {'p99':>8} {'most':>8} {'over h':>7} "
+          f"{'gouge':>8} {'s':>6}")
+    for patch in trimmed:
+        exact = patches[patch.face]
+        face = TrimmedFace(patch.face, exact.surface, tuple(exact.parameters(q) for q in patch.loops), patch.area)
+        s = with_surface_normals(sample_surface(part.mesh, 60.0, seed=2, triangles=np.flatnonzero(
+            part.mesh.face_ids == patch.face)), part.mesh)
+        foot = foot_points(exact.surface, s.points, exact.parameters(part.uv[s.triangle].mean(axis=1)))
+        points, normals = exact.surface.points_and_normals(foot.uv)
+        for angle in (0.0, lean):
+            begin, pieces, way, out, count = time.perf_counter(), [], 0.0, 0.0, 0
+            for iso, etas in face.passes(body.radius, scallop - chord - off, None):
+                for eta in etas.tolist():
+                    profile = Profile.of(iso.curve(eta), chord)
+                    made = posed(profile, steps(profile, body.radius, chord, scallop), body, leaned(np.radians(angle)),
+                                 blocked, chord, off)
+                    pieces += made.pieces
+                    way, out, count = way + profile.length, out + sum(b - a for a, b in made.left), count + 1
+            seconds = time.perf_counter() - begin
+            if not pieces:
+                print(f"F{patch.face:<4} {angle:5.0f} {count:6d} {way:7.0f} {0.0:7.3f}")
+                continue
+            start, end, a, b = (np.vstack([piece[c][k] for piece in pieces]) for c in (0, 1)
+                                for k in (slice(None, -1), slice(1, None)))
+            moves = Moves(start, end, np.ones(len(start), np.bool_), np.zeros(len(start), np.int32),
+                          ToolAxes.between(a, b))
+            left = residual_on_normals(points, normals, np.full(len(points), 10.0), moves, [body])[0]
+            axis = leaned(np.radians(angle))(points, normals, normals)
+            free = ~blocked(tips(points + off * normals, normals, body, axis), axis)
+            print(f"F{patch.face:<4} {angle:5.0f} {count:6d} {way:7.0f} {1.0 - out / way:7.3f} "
+                  f"{np.quantile(left[free], 0.99):8.4f} {left[free].max():8.4f} "
+                  f"{(left[free] > scallop).mean():7.4f} {max(-left.min(), 0.0):8.4f} "
+                  f"{seconds:6.1f}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", action="store_true")
@@ -343,6 +396,7 @@ def main() -> None:
     parser.add_argument("--trims", type=int, default=0)
     parser.add_argument("--demo", action="store_true")
     parser.add_argument("--wheel", type=Path, help="folder of the parts by others")
+    parser.add_argument("--lean", type=float, help="degrees, with --wheel: the blades by a leaning ball instead")
     args = parser.parse_args()
     every = not (args.cases or args.chords or args.trims or args.demo or args.wheel)
     if args.cases or every:
@@ -353,7 +407,9 @@ def main() -> None:
         trims(args.trims or 50)
     if args.demo or every:
         demo_faces()
-    if args.wheel:
+    if args.wheel and args.lean:
+        leaning_faces(args.wheel, args.lean)
+    elif args.wheel:
         wheel_faces(args.wheel)
 
 

@@ -52,6 +52,10 @@ class Posed:
     pieces: tuple[tuple[F64, F64], ...]
     left: tuple[tuple[float, float], ...]
 
+    def reversed(self) -> Posed:
+        """The pass walked the other way; ``left`` stays as it is."""
+        return Posed(tuple((tip[::-1], axis[::-1]) for tip, axis in reversed(self.pieces)), self.left)
+
 
 def leaned(angle: float) -> Axes:
     """Z, leaned by an angle (rad) to the side a wall looks to; not where the surface lies level."""

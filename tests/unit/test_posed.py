@@ -9,12 +9,14 @@ from geometry.gridmap import GridMap
 from geometry.mesh import TriangleMesh
 from geometry.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
+from toolpath.family import Target
 from toolpath.forward import Profile, steps
-from toolpath.isoparametric import IsoSurface, lay_out
+from toolpath.isoparametric import Flank, IsoSurface, lay_out
 from toolpath.posed import enters, lead_and_tilt, leaned, posed
+from toolpath.strategies.isoparametric import TrimmedFace, course, laid_leaning
 from verify.removal import Moves, residual_on_normals
 from verify.toolaxes import ToolAxes
-from zones.reach import Clearances
+from zones.reach import Clearances, TipField
 
 SCALLOP, CHORD, RADIUS = 0.02, 0.004, 3.0
 KNOTS = np.array([0.0, 0, 0, 1, 1, 1])
@@ -83,6 +85,27 @@ def test_lead_and_tilt_keep_the_scallop_of_a_ball_and_of_a_bull_nose(corner):
     assert missed == 0.0
     left = left_by(pieces, body, surface)
     assert left.max() <= SCALLOP and left.min() > -1.2 * CHORD
+
+
+def test_a_course_over_a_face_is_walked_leaning_with_the_material_on_the_right():
+    """The strategy as the planner calls it, on a wall an upright tool cannot touch."""
+    surface, body = wall(-8.0, 0.02), ball(2.0 * RADIUS)
+    tree = tree_of(surface)
+    s = np.stack(np.meshgrid(np.linspace(0.02, 0.98, 60), np.linspace(0.0, 1.0, 40)), -1).reshape(-1, 2)
+    points, normals = surface.points_and_normals(s)
+    field = TipField(tree, body, Clearances(), np.array([points.min(axis=0), points.max(axis=0)]), 5.0, 0.2)
+    face = TrimmedFace(3, surface, (np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),), 360.0)
+    found = course([face], Target(points, normals, points, 0.5), field, SCALLOP, CHORD, Flank(RADIUS, 0.0))
+    groups, refused = laid_leaning(found, body, leaned(np.radians(15.0)), enters(tree, body, Clearances()), SCALLOP,
+                                   CHORD, 0.003)
+    assert not refused and not any(one.left for group in groups for one in group)
+    pieces = [piece for group in groups for one in group for piece in one.pieces]
+    left = left_by(pieces, body, surface)
+    assert left.max() <= SCALLOP and left.min() > -1.05 * CHORD
+    for tip, _ in pieces:
+        assert tip[-1, 0] < tip[0, 0]  # the wall is at greater y
+    heights = [group[0].pieces[0][0][:, 2].mean() for group in groups]
+    assert heights == sorted(heights, reverse=True)
 
 
 def test_what_the_shank_would_hit_is_left_and_told():
