@@ -99,7 +99,7 @@ def passes_of(piece: Squared, surface: NurbsSurface, radius: float, scallop: flo
     """Tips (n, 3) of each pass over a piece, mm, and their length in all; kept : mm of scallop to lay out for."""
     iso, out, way = IsoSurface(surface, piece.map), [], 0.0
     for eta in lay_out(iso, radius, kept).tolist():
-        profile = Profile.of(iso.curve(eta), chord)
+        profile = Profile.of(iso.curve(eta), chord, radius)
         out.append(profile.centres(steps(profile, radius, chord, scallop), radius) - [0.0, 0.0, radius])
         way += profile.length
     return out, way
@@ -186,7 +186,7 @@ def chords() -> None:
                 off: list[F64] = []
                 total = bends = 0
                 for eta in np.linspace(0.0, 1.0, 12).tolist():
-                    profile = Profile.of(iso.curve(eta), tolerance)
+                    profile = Profile.of(iso.curve(eta), tolerance, RADIUS)
                     ends = steps(profile, RADIUS, tolerance) if name == "ours" else arc_rule(profile, RADIUS, tolerance)
                     whole = np.diff(ends) < 39.99
                     whole[-1] = False
@@ -300,7 +300,7 @@ def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, 
             lines, way, count = [], 0.0, 0
             for iso, etas in face.passes(radius, scallop - chord - off, flank):
                 for eta in etas.tolist():
-                    profile = Profile.of(iso.curve(eta), chord)
+                    profile = Profile.of(iso.curve(eta), chord, radius)
                     line, _ = lifted(profile, steps(profile, radius, chord, scallop), tool, limit, chord, off)
                     lines += line
                     way, count = way + profile.length, count + 1
@@ -367,7 +367,7 @@ def leaning_faces(parts: Path, lean: float) -> None:
             begin, pieces, way, out, count = time.perf_counter(), [], 0.0, 0.0, 0
             for iso, etas in face.passes(body.radius, scallop - chord - off, None):
                 for eta in etas.tolist():
-                    profile = Profile.of(iso.curve(eta), chord)
+                    profile = Profile.of(iso.curve(eta), chord, body.radius)
                     made = posed(profile, steps(profile, body.radius, chord, scallop), body, leaned(np.radians(angle)),
                                  blocked, chord, off)
                     pieces += made.pieces

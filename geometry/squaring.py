@@ -16,6 +16,7 @@ from enum import StrEnum
 
 import numpy as np
 import shapely
+from scipy.spatial import QhullError
 from shapely.ops import split
 
 from geometry.corners import Corners, find_corners
@@ -215,7 +216,7 @@ def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method 
         try:
             grid = _grid(method, blend, quad, piece, sides, shape)
             mapped = GridMap.of(grid / by)
-        except GeometryError as refusal:
+        except (GeometryError, QhullError) as refusal:  # the latter where places of a sliver lie on one line
             tried.append(f"{method}{f' {blend:g}' if method is Method.BLEND else ''}: {refusal}")
             continue
         return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / by,

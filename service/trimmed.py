@@ -16,6 +16,7 @@ from service.prepare import Prepared, placement_of
 from toolpath.strategies.isoparametric import Faces, SmoothFaces, TrimmedFace
 from zones.machinable import Form
 
+TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one
 WIDE = 1e3  # mm between places a face is looked at for a change of label, of which there is none
 
 
@@ -38,7 +39,7 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     for f, patch in exact.items():
         rows = ready.part.mesh.face_ids == f
         uv[rows] = patch.parameters(uv[rows].reshape(-1, 2)).reshape(-1, 3, 2)
-    smooth = [e.faces for e in ready.part.edges if e.kind is EdgeKind.SMOOTH]
+    smooth = [e.faces for e in ready.part.edges if e.kind is EdgeKind.SMOOTH and abs(e.angle) < TURN]
     there: dict[str, dict[int, list[TrimmedFace]]] = {}
     joined: dict[tuple[str, tuple[int, ...]], SmoothFaces] = {}
     out: dict[str, tuple[Faces, ...]] = {}

@@ -91,7 +91,8 @@ class Finish:
         """The workingstep of the zone; none where no pass is walked.
 
         Where passes along the borders of its faces are not much more way than the usual ones, both are walked, each
-        until no more than the scallop is left, and the faster one stays.
+        until no more than the scallop is left. The one that leaves fewer samples above it stays, of two that leave as
+        many the faster.
         """
         every = np.ones(len(self.checks.points), np.bool_)
         other, refused = self._along_borders()
@@ -102,16 +103,17 @@ class Finish:
         made = [t._rounds(step_id, every) for t in tries]
         left = [int((t.residual.residual[:self.given] > self.settings.scallop_height).sum()) for t in tries]
         seconds = [sum(step.seconds for step in steps) for steps in made]
-        best = int(bool(made[1]) and left[1] <= left[0] and seconds[1] < seconds[0])
-        if left[1] > left[0] and not best:
-            why: dict[str, object] = {"reason": "more samples are left above the scallop", "value": left[1],
-                                      "limit": left[0]}
-        else:
-            why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[1 - best], 1),
+        best = int((not made[1], left[1], seconds[1]) < (not made[0], left[0], seconds[0]))
+        lost = 1 - best
+        why: dict[str, object] = {"reason": "no pass is walked", "value": 0, "limit": 0}
+        if made[lost] and left[lost] > left[best]:
+            why = {"reason": "more samples are left above the scallop", "value": left[lost], "limit": left[best]}
+        elif made[lost]:
+            why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[lost], 1),
                    "limit": round(seconds[best], 1)}
         stock, taken = self.stock, tries[best]
         stock.become(taken.stock)
-        rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[1 - best].strategy.name, **why})
+        rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[lost].strategy.name, **why})
         self.__dict__.update(taken.__dict__ | {"stock": stock, "strategy": replace(taken.strategy, rejected=rejected)})
         return made[best]
 

@@ -29,6 +29,7 @@ MOST_STEPS = 1_000_000
 FIRST = 256  # intervals a pass is looked at in at first
 SHARE = 2e-4  # of the tolerance: what the cubics of a profile may be off
 MOST_PLACES = 1 << 18
+FINEST = 0.002  # mm between places of a profile: what jumps in less is an edge
 
 Curve = Callable[[F64], tuple[F64, F64]]
 """Contacts (n, 3) mm and unit normals out of the material (n, 3) at parameters (n,) in 0 to 1."""
@@ -48,13 +49,16 @@ class Profile:
     normal: F64
 
     @classmethod
-    def of(cls, curve: Curve, tolerance: float) -> Profile:
-        """A pass over 0 to 1 with places so close that cubics through them are off by 2e-4 of a tolerance (mm).
+    def of(cls, curve: Curve, tolerance: float, radius: float) -> Profile:
+        """A pass over 0 to 1 with places so close that cubics through them are off by 2e-4 of a tolerance.
+
+        tolerance : mm; radius : mm, of the ball, whose centres are to be as right as the contacts
 
         Raises
         ------
         GeometryError
-            Code 'bad_pass': the pass is a point, or its normals are not known.
+            Code 'bad_pass': the pass is a point, its normals are not known, or it turns over so sharply that places
+            0.002 mm apart do not show half the tolerance how.
         """
         t = np.linspace(0.0, 1.0, FIRST + 1)
         way = _way(curve(t)[0])
@@ -66,16 +70,26 @@ class Profile:
         t = _even(way, t, ways)
         contact, normal = curve(t)
         while True:
-            between = _even(way, np.linspace(0.0, 1.0, FIRST + 1), 0.5 * (ways[1:] + ways[:-1]))
+            middle = 0.5 * (ways[1:] + ways[:-1])
+            between = _even(way, np.linspace(0.0, 1.0, FIRST + 1), middle)
             more, lean = curve(between)
             if not (np.isfinite(contact).all() and np.isfinite(normal).all() and np.isfinite(lean).all()):
                 raise GeometryError("a pass goes over a place without a normal", code="bad_pass",
                                     remedy="keep it off poles and tips")
-            off = np.abs(CubicSpline(ways, contact)(0.5 * (ways[1:] + ways[:-1])) - more).max()
-            ways, t = _merged(ways, 0.5 * (ways[1:] + ways[:-1])), _merged(t, between)
+            guess = CubicSpline(ways, np.column_stack([contact, normal]))(middle)
+            off = np.maximum(np.abs(guess[:, :3] - more), radius * np.abs(guess[:, 3:] - lean)).max(axis=1)
+            ways, t = _merged(ways, middle), _merged(t, between)
             contact, normal = _merged(contact, more), _merged(normal, lean)
-            if off <= SHARE * tolerance or len(t) > MOST_PLACES:
-                return cls(t, float(ways[-1]) / (len(ways) - 1), contact, normal)
+            width = float(ways[-1]) / (len(ways) - 1)
+            if off.max() <= SHARE * tolerance:
+                return cls(t, width, contact, normal)
+            if width < FINEST or len(t) > MOST_PLACES:
+                if off.max() <= 0.5 * tolerance:
+                    return cls(t, width, contact, normal)
+                at = ", ".join(f"{x:.3f}" for x in more[int(off.argmax())])
+                raise GeometryError(f"a pass turns over sharply at ({at})", code="bad_pass", subjects=(f"({at})",),
+                                    measured=float(off.max()), limit=0.5 * tolerance,
+                                    remedy="end it there: an edge lies across it")
 
     @property
     def length(self) -> float:
@@ -139,7 +153,7 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
     Raises
     ------
     GeometryError
-        Code 'too_many_steps': the tolerance asks for over a million.
+        Code 'too_many_steps': the tolerance asks for over a million, or for steps that are none.
     """
     pieces, aside = profile.pieces(), _aside(radius, scallop)
     room = 1024
@@ -149,6 +163,8 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
                                     ends))
         if count > 0:
             return ends[:count].copy()
+        if count < -1:
+            break
         room *= 8
     raise GeometryError(f"a pass of {profile.length:g} mm asks for over {MOST_STEPS} steps", code="too_many_steps",
                         measured=profile.length, limit=MOST_STEPS, remedy="allow a larger chord tolerance")

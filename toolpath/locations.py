@@ -9,6 +9,8 @@ Notation
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,13 +27,15 @@ ROUNDS = 6  # a move under the limit is halved so often, and then left out
 FREE = 1e-4  # mm, by which the part may stand over a tip and count as the surface itself
 
 
-def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None) -> F64:
+def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, side: F64 | None = None) -> F64:
     """Tips of a tool that touches places of a surface (3.34 of papers/000, for a ball, a bull nose and a flat).
 
     contact, normal : (n, 3) float64, mm and unit
     axis            : (n, 3) or (3,) float64, unit; +Z where None
+    side            : (n, 3) float64, unit, across the axis: from the contact to the axis of a tool that stands on a
+                      level place, which does not say where (``sides``)
 
-    Returns (n, 3) float64, mm; nan where a bull nose or a flat stands on a level place, which does not say where.
+    Returns (n, 3) float64, mm; nan where a bull nose or a flat stands on a level place and ``side`` is None.
     """
     u = np.broadcast_to(np.array([0.0, 0.0, 1.0]) if axis is None else np.asarray(axis, np.float64), contact.shape)
     r, a = min(tool.corner_radius, tool.radius), tool.radius - min(tool.corner_radius, tool.radius)
@@ -40,8 +44,70 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None) -> 
         across = normal - (normal * u).sum(axis=1)[:, None] * u
         size = np.linalg.norm(across, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            out = out + a * np.where(size > FLAT, 1.0 / size, np.nan)[:, None] * across
+            across = np.where(size > FLAT, 1.0 / size, np.nan)[:, None] * across
+        out = out + a * (across if side is None else np.where((size > FLAT)[:, None], across, side))
     return np.asarray(out)
+
+
+def sides(profile: Profile, way: F64, axis: F64 | None = None) -> F64:
+    """From the contact to the axis of a bull nose or a flat, for places (n,) mm of a pass that lie level.
+
+    There any place under the flat of its end will do. It stays on the side it has at the nearest place of the pass that
+    does not lie level; on the left of a pass that is level all along.
+
+    axis : (n, 3) float64, unit, at those places; +Z where None
+
+    Returns (n, 3) float64, unit, square to the axis.
+    """
+    u = np.broadcast_to(np.array([0.0, 0.0, 1.0]) if axis is None else axis, (len(way), 3))
+    contact, normal = contacts(profile, way)
+    across = normal - (normal * u).sum(axis=1)[:, None] * u
+    known = np.flatnonzero(np.linalg.norm(across, axis=1) > FLAT)
+    if axis is None:  # the same answer whatever places are asked for
+        known = np.flatnonzero(np.linalg.norm(profile.normal[:, :2], axis=1) > FLAT)
+        across, at = profile.normal * [1.0, 1.0, 0.0], profile.ways
+    else:
+        at = way
+    if len(known):
+        out = across[known[nearest_of(at[known], way)]]
+        out = out - (out * u).sum(axis=1)[:, None] * u
+    else:
+        step = 1e-3 * profile.width
+        ahead = contacts(profile, np.minimum(way + step, profile.length))[0]
+        out = np.cross(u, ahead - contacts(profile, np.maximum(way - step, 0.0))[0])
+    size = np.linalg.norm(out, axis=1)
+    other = np.cross(u, np.where(np.abs(u[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    other /= np.linalg.norm(other, axis=1)[:, None]
+    return np.asarray(np.where(size[:, None] > 1e-12, out / np.maximum(size, 1e-300)[:, None], other))
+
+
+def nearest_of(grown: F64, asked: F64) -> NDArray[np.int64]:
+    """(n,) which of numbers that grow (k,) is nearest to each of some (n,)."""
+    k = np.clip(np.searchsorted(grown, asked), 1, max(len(grown) - 1, 1))
+    k = np.minimum(k, len(grown) - 1)
+    low = np.maximum(k - 1, 0)
+    return np.where(asked - grown[low] <= grown[k] - asked, low, k)
+
+
+def chorded(ways: F64, at: Callable[[F64], F64], tolerance: float) -> F64:
+    """Ways with others between them, until what ``at`` says half way and at quarters is near the chords.
+
+    ways : (n,) float64, mm; at : ways -> places (n, 3) mm; tolerance : mm
+
+    A tip that keeps to chords of its own way puts the tool no farther than that from where it is to be; a ball does not
+    need it, whose steps are measured on what it sweeps. What jumps (from one side of a level crest to the other) is
+    gone over straight.
+    """
+    for _ in range(ROUNDS):
+        a, b = at(ways[:-1]), at(ways[1:])
+        over = np.zeros(len(ways) - 1, np.bool_)
+        for share in (0.25, 0.5, 0.75):
+            off = at(ways[:-1] + share * np.diff(ways)) - a - share * (b - a)
+            over |= np.linalg.norm(off, axis=1) > tolerance
+        if not over.any():
+            break
+        ways = np.sort(np.concatenate([ways, 0.5 * (ways[1:] + ways[:-1])[over]]))
+    return ways
 
 
 def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
@@ -62,6 +128,8 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
     what it leaves at those contacts is for others. Where the limit is higher than ``most``, or jumps, the pass is
     broken.
     """
+    if tool.radius > tool.corner_radius:
+        ends = chorded(ends, lambda w: _tips(profile, w, tool), 0.5 * tolerance)
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
     way = np.unique(np.concatenate([ends, profile.ways, looks]))
     made, high = _against(profile, way, tool, limit, off)
@@ -107,17 +175,23 @@ def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.b
 def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), off the surface where that frees them, and what the part allows there (n,); mm."""
     contact, normal = contacts(profile, way)
-    made = tips(contact, normal, tool)
+    side = sides(profile, way) if tool.radius > tool.corner_radius else None
+    made = tips(contact, normal, tool, None, side)
     high = limit(np.ascontiguousarray(made[:, :2]))
     for share in OFFS if off > 0.0 else ():
         k = np.flatnonzero(high > made[:, 2] + FREE)
         if not len(k):
             break
-        away = tips(contact[k] + share * off * normal[k], normal[k], tool)
+        away = tips(contact[k] + share * off * normal[k], normal[k], tool, None, None if side is None else side[k])
         there = limit(np.ascontiguousarray(away[:, :2]))
         free = there <= away[:, 2] + FREE
         made[k[free]], high[k[free]] = away[free], there[free]
     return made, high
+
+
+def _tips(profile: Profile, way: F64, tool: ToolBody) -> F64:
+    """Tips (n, 3) mm of an upright tool at ways (n,) mm."""
+    return tips(*contacts(profile, way), tool, None, sides(profile, way))
 
 
 def contacts(profile: Profile, way: F64) -> tuple[F64, F64]:

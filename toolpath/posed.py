@@ -7,7 +7,7 @@ Notation
 Between two locations the control takes the tip straight and turns the axis on the great circle, by theta. The centre of
 a ball r then leaves the straight way between its ends by r (1 - cos(theta / 2)) at most, for the tip lags by r times
 what the arc of axes is off its chord. Locations are put in until that is a tenth of the chordal tolerance, so a pass
-keeps what ``toolpath.forward`` gave it.
+keeps what ``toolpath.forward`` gave it. Where a field jumps, no number of locations is enough: there the pass ends.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from geometry.tilted import axis_frames, blocked_along
 from geometry.toolbody import ToolBody
 from toolpath.forward import Profile
 from toolpath.levels import true_runs
-from toolpath.locations import LOOK, OFFS, contacts, tips
+from toolpath.locations import LOOK, OFFS, chorded, contacts, sides, tips
 from zones.approach import assembly
 from zones.reach import LEVEL_TOLERANCE, Clearances
 
 SWING_SHARE = 0.1  # of the chordal tolerance: what turning between two locations may add
-ROUNDS = 10
+ROUNDS = 16  # of halving ways between which the axis turns too much
 MOST_PARTS = 1000  # a step is divided into at most so many
-UPRIGHT = 1e-9  # of a normal across Z: what is less does not say to which side to lean
+FADES = 0.2  # of a normal across Z: where it is less a leaning tool leans less
 
 Axes = Callable[[F64, F64, F64], F64]
 """Tool axes (k, 3), unit, at contacts (k, 3) mm with normals and ways along the pass (k, 3), both unit."""
@@ -46,7 +46,7 @@ class Posed:
     """A pass as the tool can walk it.
 
     pieces : tips (k, 3) float64 mm and axes (k, 3) float64, unit, of each piece that is free
-    left   : from where to where along the pass (mm) the tool cannot go
+    left   : from where to where along the pass (mm) the tool cannot go, or the field of axes jumps
     """
 
     pieces: tuple[tuple[F64, F64], ...]
@@ -58,11 +58,12 @@ class Posed:
 
 
 def leaned(angle: float) -> Axes:
-    """Z, leaned by an angle (rad) to the side a wall looks to; not where the surface lies level."""
+    """Z, leaned by an angle (rad) to the side a wall looks to; less where the surface is within 11.5 degrees of level,
+    and not at all where it is level, so that the field does not jump over a crest."""
     def axes(_contact: F64, normal: F64, _way: F64) -> F64:
         size = np.linalg.norm(normal[:, :2], axis=1)
-        side = normal[:, :2] / np.maximum(size, UPRIGHT)[:, None]
-        lean = np.where(size > UPRIGHT, angle, 0.0)
+        side = normal[:, :2] / np.maximum(size, 1e-12)[:, None]
+        lean = angle * np.minimum(size / FADES, 1.0)
         return np.column_stack([np.sin(lean)[:, None] * side, np.cos(lean)])
 
     return axes
@@ -97,7 +98,8 @@ def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Bloc
     profile   : Profile of the pass; ends (n,) float64, mm, the ways at which it is located
     tool      : ToolBody, a ball or a bull nose
     axes      : the field of tool axes
-    blocked   : whether the tool enters something; asked every quarter of a radius, 0.25 mm at most
+    blocked   : whether the tool enters something; asked so often that tip and far end of the tool go a quarter of a
+                radius on in between, 0.25 mm at most
     tolerance : mm, chordal, of the pass
     off       : mm, up to which a tip may stand off along the normal where that frees it (facets of the part)
 
@@ -106,28 +108,43 @@ def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Bloc
     GeometryError
         Code 'bad_axis': the field gives none somewhere.
     """
+    room = 2.0 * float(np.arccos(max(1.0 - SWING_SHARE * tolerance / tool.radius, -1.0)))
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
-    ways = _swung(profile, ends, looks, tool, axes, SWING_SHARE * tolerance)
-    way = np.unique(np.concatenate([ways, looks]))
-    contact, normal, axis = _axes(profile, way, axes)
-    tip = tips(contact, normal, tool, axis)
+    ends = _turned_through(profile, np.unique(np.concatenate([ends, looks])), axes, room, ends)
+    if tool.radius > tool.corner_radius:
+        ends = chorded(ends, lambda w: _located(profile, w, tool, axes)[2], 0.5 * tolerance)
+    high = tool.stickout + sum(h.length for h in tool.holder)
+    asked = min(room, min(LOOK, 0.25 * tool.radius) / high)  # what the far end of the tool may swing between questions
+    way = _turned_through(profile, np.unique(np.concatenate([ends, looks])), axes, asked)
+    normal, axis, tip = _located(profile, way, tool, axes)
     met = blocked(tip, axis)
     for share in OFFS if off > 0.0 else ():
         k = np.flatnonzero(met)
         if not len(k):
             break
-        away = tips(contact[k] + share * off * normal[k], normal[k], tool, axis[k])
+        away = tip[k] + share * off * normal[k]
         free = ~blocked(away, axis[k])
         tip[k[free]], met[k[free]] = away[free], False
-    pieces = []
-    kept = np.isin(way, ways)
-    for i, j in true_runs(~met):
-        rows = np.arange(i, j)
-        rows = rows[kept[rows] | (rows == i) | (rows == j - 1)]
-        if len(rows) > 1:
-            pieces.append((tip[rows], axis[rows]))
-    return Posed(tuple(pieces), tuple((float(way[max(i - 1, 0)]), float(way[min(j, len(way) - 1)]))
-                                      for i, j in true_runs(met)))
+    jumps = _angles(axis) > asked
+    pieces, left = [], []
+    kept = np.isin(way, ends)
+    stop = [k + 1 for k in np.flatnonzero(jumps).tolist()]
+    for a, b in zip([0, *stop], [*stop, len(way)], strict=True):
+        for i, j in true_runs(~met[a:b]):
+            rows = np.arange(a + i, a + j)
+            rows = rows[kept[rows] | (rows == a + i) | (rows == a + j - 1)]
+            if len(rows) > 1:
+                pieces.append((tip[rows], axis[rows]))
+    for i, j in true_runs(met[1:] | met[:-1] | jumps):
+        left.append((float(way[i]), float(way[j])))
+    return Posed(tuple(pieces), tuple(left))
+
+
+def _located(profile: Profile, way: F64, tool: ToolBody, axes: Axes) -> tuple[F64, F64, F64]:
+    """Normals, tool axes and tips (k, 3) at ways (k,) mm."""
+    contact, normal, axis = _axes(profile, way, axes)
+    side = sides(profile, way, axis) if tool.radius > tool.corner_radius else None
+    return normal, axis, tips(contact, normal, tool, axis, side)
 
 
 def _axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
@@ -147,25 +164,30 @@ def _axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
     return contact, normal, axis
 
 
-def _swung(profile: Profile, ends: F64, looks: F64, tool: ToolBody, axes: Axes, most: float) -> F64:
-    """Ways with others between them wherever turning from one to the next moves the centre by over ``most`` mm.
+def _angles(axis: F64) -> F64:
+    """(k - 1,) rad between neighbouring axes (k, 3)."""
+    cross = np.linalg.norm(np.cross(axis[1:], axis[:-1]), axis=1)
+    return np.asarray(np.arctan2(cross, (axis[1:] * axis[:-1]).sum(axis=1)))
 
-    looks : (n,) mm, ways close together, at which the axis is asked: over a long step it may turn to and fro
+
+def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first: F64 | None = None) -> F64:
+    """Ways with others between them until the axis turns by no more than ``room`` (rad) from one to the next, but where
+    it jumps.
+
+    looks : (n,) mm, ways close together: over a long step the axis may turn to and fro
+    first : (k,) mm, the ways to begin with; the looks where None
     """
-    way = np.unique(np.concatenate([ends, looks]))
-    axis = _axes(profile, way, axes)[2]
-    turn = np.arccos(np.clip((axis[1:] * axis[:-1]).sum(axis=1), -1.0, 1.0))
-    turned = np.concatenate([[0.0], np.cumsum(turn)])
-    room = 2.0 * np.arccos(max(1.0 - most / tool.radius, -1.0))
-    at = np.interp(ends, way, turned)
-    parts = np.clip(np.ceil(np.diff(at) / room), 1, MOST_PARTS).astype(np.int64)
-    climb = turned + 1e-12 * way  # so that it can be turned round where the axis stands
-    low, high = (np.interp(e, way, climb) for e in (ends[:-1], ends[1:]))
-    inner = [np.interp(a + (b - a) * np.arange(n) / n, climb, way) for a, b, n in zip(low, high, parts, strict=True)]
-    out = np.unique(np.concatenate([ends, *inner]))
+    out = looks
+    if first is not None:
+        turned = np.concatenate([[0.0], np.cumsum(_angles(_axes(profile, looks, axes)[2]))])
+        parts = np.clip(np.ceil(np.diff(np.interp(first, looks, turned)) / room), 1, MOST_PARTS).astype(np.int64)
+        climb = turned + 1e-12 * looks  # so that it can be turned round where the axis stands
+        low, high = (np.interp(e, looks, climb) for e in (first[:-1], first[1:]))
+        inner = [np.interp(a + (b - a) * np.arange(n) / n, climb, looks)
+                 for a, b, n in zip(low, high, parts, strict=True)]
+        out = np.unique(np.concatenate([first, *inner]))
     for _ in range(ROUNDS):  # between looks it may turn more than they say
-        axis = _axes(profile, out, axes)[2]
-        over = np.arccos(np.clip((axis[1:] * axis[:-1]).sum(axis=1), -1.0, 1.0)) > room
+        over = _angles(_axes(profile, out, axes)[2]) > room
         if not over.any():
             break
         out = np.unique(np.concatenate([out, 0.5 * (out[1:] + out[:-1])[over]]))

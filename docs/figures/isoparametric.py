@@ -74,7 +74,7 @@ def chord(path: Path) -> None:
     iso = IsoSurface(trim.surface, piece.map)
     eta = float(lay_out(iso, RADIUS, SCALLOP)[3])
     wide, tall, tolerance = 900.0, 260.0, 0.005
-    profile = Profile.of(iso.curve(eta), tolerance)
+    profile = Profile.of(iso.curve(eta), tolerance, RADIUS)
     rows = {}
     for words, ends in (("circular arc at the start of the step", arc_rule(profile, RADIUS, tolerance)),
                         ("true profile", steps(profile, RADIUS, tolerance))):

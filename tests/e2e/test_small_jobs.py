@@ -143,3 +143,16 @@ def test_warm_fails_where_the_small_part_is_not_proved(monkeypatch):
     assert got.exit_code == 1
     problem = json.loads(got.stdout)
     assert problem["code"] == "not_as_installed" and problem["subjects"] == ["T1 cuts into the part"]
+
+
+def test_a_bull_nose_finishes_rounds_that_go_over_into_a_level_plane(tmp_path):
+    """Its tip is not given by a contact on the level edge; both strategies are tried there and one is proved."""
+    shape = cq.Workplane().box(10, 8, 4, centered=False).edges("|Y and >Z").fillet(2)
+    bull = {**FLAT, "kind": "bull", "corner_radius_mm": 0.5, "flute_length_mm": 12}
+    setup = {**SETUP, "tools": [bull], "quality": {"scallop_height_mm": 0.02}}
+    out = tmp_path / "out"
+    got = run("plan", write_step(shape, tmp_path / "round.step"), tmp_path, setup, "--out", str(out))
+    report = json.loads((out / "report.json").read_text())
+    assert got.exit_code == 0 and report["state"] == "proved" and report["coverage"] == 1.0
+    tried = [r for z in report["zones"] for r in z["rejected"] if r.get("strategy") == "isoparametric"]
+    assert any("longer" in r["reason"] for r in tried) or any(z["strategy"] == "isoparametric" for z in report["zones"])

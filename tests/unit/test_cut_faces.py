@@ -44,7 +44,7 @@ def test_passes_over_a_piece_between_cutting_planes(cut, piece):
     for one in pieces[piece]:
         for iso, etas in one.passes(1.0, SCALLOP - CHORD, None):
             for eta in etas.tolist():
-                profile = Profile.of(iso.curve(eta), CHORD)
+                profile = Profile.of(iso.curve(eta), CHORD, 1.0)
                 lines += lifted(profile, steps(profile, 1.0, CHORD, SCALLOP), body,
                                 lambda xy: np.full(len(xy), -np.inf), CHORD)[0]
                 borders.append(profile.contact)

@@ -16,7 +16,7 @@ from toolpath.envelope import Envelope
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
 from toolpath.kernels.beside import left_beside
-from toolpath.locations import tips
+from toolpath.locations import lifted, tips
 from verify.removal import Moves, residual_on_normals
 
 RADIUS, SCALLOP = 5.0, 0.5
@@ -89,7 +89,7 @@ def left_standing(iso: IsoSurface, chord: float) -> np.ndarray:
     """What is left at a fine lattice of places away from the borders, under polylines of tips, mm."""
     paths = []
     for eta in lay_out(iso, RADIUS, SCALLOP).tolist():
-        profile = Profile.of(iso.curve(eta), chord)
+        profile = Profile.of(iso.curve(eta), chord, RADIUS)
         paths.append(profile.centres(steps(profile, RADIUS, chord, SCALLOP), RADIUS) - [0.0, 0.0, RADIUS])
     xi, eta = np.meshgrid(np.linspace(0.02, 0.98, 120), np.linspace(0.005, 0.995, 301))
     return Envelope(paths, Cutter.ball(diameter=2 * RADIUS, length=20.0)).along(*iso.contact(xi.ravel(), eta.ravel()))
@@ -174,3 +174,34 @@ def test_what_is_left_beside_a_pass_is_that_of_balls_and_cylinders_set_down_all_
     assert near.sum() > 20 and np.quantile(np.abs(off[near]), 0.95) < 1e-4
     assert off[near].min() > -1e-4  # the twin's own places are 0.02 mm apart; more than is true may be told, not less
     assert off.min() > -0.004  # grazed, far from the pass
+
+
+def post(radius: float) -> IsoSurface:
+    """A quarter of an upright post, 10 mm high; passes level."""
+    c = np.sqrt(0.5)
+    net = np.array([[[radius * x, radius * y, z] for z in (0.0, 10.0)] for x, y in ((1, 0), (1, 1), (0, 1))])
+    knots, line = np.array([0.0, 0, 0, 1, 1, 1]), np.array([0.0, 0, 1, 1])
+    weights = np.repeat(np.array([[1.0], [c], [1.0]]), 2, axis=1)
+    surface = NurbsSurface(net, knots, line, (3, 2), weights)
+    out = surface.points_and_normals(np.array([[0.5, 0.5]]))
+    surface = surface if out[0][0, :2] @ out[1][0, :2] > 0.0 else NurbsSurface(net, knots, line, (3, 2), weights, -1)
+    at = np.linspace(0.0, 1.0, 5)
+    return IsoSurface(surface, GridMap.of(np.dstack(np.meshgrid(at, at))))
+
+
+@pytest.mark.parametrize(("radius", "diameter", "corner", "chord"), [
+    (2.0, 10.0, 0.5, 0.02), (1.0, 20.0, 0.5, 0.005), (2.0, 10.0, 0.5, 0.005), (5.0, 20.0, 1.0, 0.005)])
+def test_a_bull_nose_round_a_post_keeps_the_chordal_tolerance(radius, diameter, corner, chord):
+    """Its flank goes on a way of greater radius than the corner's ball, whose steps would be too long for it."""
+    iso, body = post(radius), tool(diameter, corner_radius=corner)
+    lines = []
+    for eta in lay_out(iso, corner, 0.02, Flank(0.5 * diameter, 3.0)).tolist():
+        profile = Profile.of(iso.curve(eta), chord, corner)
+        lines += lifted(profile, steps(profile, corner, chord, 0.02), body, lambda xy: np.full(len(xy), -np.inf),
+                        chord)[0]
+    start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
+    u, v = np.meshgrid(np.linspace(0.02, 0.98, 1400), np.linspace(0.05, 0.95, 30))
+    points, normals = iso.surface.points_and_normals(np.column_stack([u.ravel(), v.ravel()]))
+    left = residual_on_normals(points, normals, np.full(len(points), 10.0), Moves(
+        start, end, np.ones(len(start), bool), np.zeros(len(start), np.int32)), [body])[0]
+    assert left.min() > -chord and left.max() <= 0.02 + chord

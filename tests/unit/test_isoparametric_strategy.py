@@ -1,5 +1,7 @@
 """Passes along the borders of faces in a plan: what they leave, where they go, and when they are taken."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from geometry.nurbs import NurbsSurface
 from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, plan_part, slope_field, tool
 from toolpath.family import Target
+from toolpath.finish import Finish, _Strategy
 from toolpath.isoparametric import Flank
 from toolpath.levels import Line
 from toolpath.strategies import isoparametric
@@ -135,3 +138,33 @@ def test_a_sharp_end_gets_none():
     mesh, face = bowl(0.05, -0.03)
     case = plan_part(mesh, [tool(3.0, 0.0)], scallop=0.1, chord=CHORD, faces={2}, trimmed=(face,))
     assert isoparametric.NAME not in {z.strategy for z in case.plan.zones}
+
+
+@pytest.mark.parametrize(("left", "seconds", "kept", "reason"), [
+    ((3, 0), (10.0, 10.4), "isoparametric", "more samples are left above the scallop"),
+    ((0, 3), (10.4, 10.0), "zlevel", "more samples are left above the scallop"),
+    ((2, 2), (10.4, 10.0), "isoparametric", "takes longer at equal scallop, s"),
+    ((0, 0), (10.0, 10.4), "zlevel", "takes longer at equal scallop, s"),
+    ((4, 4), (None, 10.4), "isoparametric", "no pass is walked")])
+def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_faster(left, seconds, kept, reason):
+    class Stub(Finish):
+        def __init__(self):
+            self.checks, self.given = SimpleNamespace(points=np.zeros((4, 3))), 4
+            self.settings, self.stock = SimpleNamespace(scallop_height=0.02), SimpleNamespace(become=lambda _: None)
+            self.strategy = _Strategy("zlevel", 1.0, None, False)
+
+        def _along_borders(self):
+            return _Strategy("isoparametric", 1.0, None, False), ()
+
+        def _copied(self, strategy):
+            k = int(strategy.name == "isoparametric")
+            rest = np.where(np.arange(4) < left[k], 0.03, 0.01)
+            steps = [] if seconds[k] is None else [SimpleNamespace(seconds=seconds[k])]
+            return SimpleNamespace(strategy=strategy, stock=None, residual=SimpleNamespace(residual=rest),
+                                   _rounds=lambda _id, _wanted: steps)
+
+    finish = Stub()
+    finish.walk("S01")
+    assert finish.strategy.name == kept
+    assert finish.strategy.rejected[-1]["reason"] == reason
+    assert finish.strategy.rejected[-1]["strategy"] != kept

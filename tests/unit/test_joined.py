@@ -93,7 +93,7 @@ def test_passes_over_faces_as_one_leave_the_scallop(turned):
     iso = JoinedSurface(iso.faces, iso.splines, turned)
     lines, body = [], ball(2.0 * radius)
     for eta in lay_out(iso, radius, scallop - chord).tolist():
-        profile = Profile.of(iso.curve(eta), chord)
+        profile = Profile.of(iso.curve(eta), chord, radius)
         lines += lifted(profile, steps(profile, radius, chord, scallop), body, nothing, chord)[0]
     start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
     moves = Moves(start, end, np.ones(len(start), bool), np.zeros(len(start), np.int32))

@@ -49,9 +49,32 @@ def test_a_flat_on_a_level_place_is_not_guessed():
     assert tips(np.zeros((1, 3)), up, TOOLS["ball"]) == pytest.approx(np.zeros((1, 3)))
 
 
+@pytest.mark.parametrize("name", ["bull", "flat"])
+def test_on_level_places_of_a_pass_the_end_stands_on_the_side_it_has_beside_them(name):
+    """A round of 4 mm that goes over into a plane, crossed, and the edge between both, followed."""
+    body = TOOLS[name]
+
+    def across(t):
+        turn = np.radians(90.0) * np.clip(2.0 * t - 1.0, 0.0, 1.0)
+        x = 4.0 * np.sin(turn) + 6.0 * np.minimum(2.0 * t, 1.0)
+        return (np.column_stack([x, 0 * t, 4.0 * np.cos(turn)]),
+                np.column_stack([np.sin(turn), 0 * t, np.cos(turn)]))
+
+    def along(t):
+        return np.column_stack([0 * t, 9.0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))
+
+    for curve, side in ((across, [1.0, 0, 0]), (along, [-1.0, 0, 0])):
+        profile = Profile.of(curve, 0.01, 1.0)
+        ends = np.linspace(0.0, profile.length, 30)
+        (made,), raised = lifted(profile, ends, body, lambda xy: np.full(len(xy), -np.inf), 0.01)
+        assert np.isfinite(made).all() and not raised
+        apart = made[0, :2] - curve(np.zeros(1))[0][0, :2]
+        assert apart == pytest.approx((body.radius - body.corner_radius) * np.array(side[:2]), abs=1e-9)
+
+
 def level_pass(length=30.0):
     return Profile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))),
-                      0.001)
+                      0.001, 3.0)
 
 
 def test_a_pass_is_raised_over_a_block_on_its_way_and_nowhere_else():

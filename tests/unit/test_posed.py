@@ -49,7 +49,7 @@ def walked(surface, body, field, tree, scallop=SCALLOP):
     blocked = enters(tree, body, Clearances())
     pieces, left, way = [], 0.0, 0.0
     for eta in lay_out(iso, body.corner_radius, scallop - CHORD).tolist():
-        profile = Profile.of(iso.curve(eta), CHORD)
+        profile = Profile.of(iso.curve(eta), CHORD, body.corner_radius)
         made = posed(profile, steps(profile, body.corner_radius, CHORD, scallop), body, field, blocked, CHORD, 0.003)
         pieces += made.pieces
         left, way = left + sum(b - a for a, b in made.left), way + profile.length
@@ -137,6 +137,52 @@ def test_the_centre_keeps_its_way_where_the_axis_turns_fast():
         assert np.linalg.norm(off, axis=1).max() <= 0.1 * CHORD + 1e-9
     left = left_by(pieces, body, surface)
     assert left.max() <= SCALLOP and left.min() > -1.2 * CHORD
+
+
+def dome():
+    """The top of a ball of 20 mm, 30 degrees to each side of its crest, crossed by a pass."""
+    turn = np.radians(30.0)
+    x, z, w = 20.0 * np.sin(turn), 20.0 * np.cos(turn), np.cos(turn)
+    profile = np.array([[-x, z], [0.0, 20.0 / w], [x, z]])
+    net = np.stack([np.insert(profile, 1, y, axis=1) for y in (-5.0, 5.0)], axis=1)
+    weights = np.repeat(np.array([1.0, w, 1.0])[:, None], 2, axis=1)
+    surface = NurbsSurface(net, KNOTS, np.array([0.0, 0, 1, 1]), (3, 2), weights)
+    middle = surface.points_and_normals(np.array([[0.5, 0.5]]))[1][0, 2]
+    return surface if middle > 0.0 else NurbsSurface(net, KNOTS, np.array([0.0, 0, 1, 1]), (3, 2), weights, side=-1)
+
+
+def over_the_crest(surface, field, blocked):
+    def curve(t):
+        return surface.points_and_normals(np.column_stack([t, 0.5 + 0 * t]))
+
+    profile = Profile.of(curve, CHORD, RADIUS)
+    return posed(profile, steps(profile, RADIUS, CHORD), ball(2.0 * RADIUS), field, blocked, CHORD)
+
+
+def jumping(contact, normal, way):
+    """30 degrees to the left before the crest, to the right behind it."""
+    angle = np.where(contact[:, 0] > 0.0, 0.5, -0.5)
+    return np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
+
+
+def test_where_the_field_of_axes_jumps_the_pass_ends_and_is_told():
+    made = over_the_crest(dome(), jumping, lambda tip, axis: np.zeros(len(tip), bool))
+    assert len(made.pieces) == 2 and len(made.left) == 1
+    assert made.left[0][0] == pytest.approx(20.0 * np.radians(30.0), abs=0.01) and np.ptp(made.left[0]) < 0.001
+    for _, axis in made.pieces:
+        assert np.degrees(np.arccos(np.clip((axis[1:] * axis[:-1]).sum(axis=1), -1, 1))).max() < 0.1
+
+
+def test_leaning_fades_over_a_crest_and_what_stands_in_the_way_of_the_swing_is_seen():
+    free = over_the_crest(dome(), leaned(0.5), lambda tip, axis: np.zeros(len(tip), bool))
+    assert len(free.pieces) == 1 and not free.left
+
+    def between(tip, axis):  # something that only tools leaning by 8 to 9 degrees to the right meet
+        lean = np.degrees(np.arctan2(axis[:, 0], axis[:, 2]))
+        return (lean > 8.0) & (lean < 9.0)
+
+    met = over_the_crest(dome(), leaned(0.5), between)
+    assert len(met.pieces) == 2 and len(met.left) == 1
 
 
 def test_a_field_without_an_axis_is_refused_with_the_place():

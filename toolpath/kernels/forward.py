@@ -22,6 +22,7 @@ CLOSE = 0.97  # of the greatest seen: others that may be greater between places
 GROWTH = 1.3
 ENOUGH = 0.9985  # of the tolerance: a step that uses so much is long enough
 TRIALS = 60
+LEAST = 1e-3  # of a piece of the profile
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -115,8 +116,8 @@ def _end_of_step(pieces, width, total, s, guess, radius, aside, tolerance, longe
 
 @njit(**KERNEL)
 def forward(pieces, width, total, radius, aside, tolerance, longest, ends):
-    """Ways at which the steps of a pass end, into ``ends``, the beginning first; returns how many, or -1 where
-    there are more than it holds.
+    """Ways at which the steps of a pass end, into ``ends``, the beginning first; returns how many, -1 where there are
+    more than it holds, -2 where one is no step: shorter than LEAST of a piece.
 
     pieces : (k, 6, 4) float64; width : mm, of each; total : mm, of the pass; longest : mm;
     aside : what a way aside of 1 mm counts
@@ -128,6 +129,8 @@ def forward(pieces, width, total, radius, aside, tolerance, longest, ends):
         if count == len(ends):
             return -1
         end = _end_of_step(pieces, width, total, s, guess, radius, aside, tolerance, longest, seen, out)
+        if end - s < LEAST * width and end < total:
+            return -2
         guess = max(end - s, 1e-9 * total)
         s = end
         ends[count] = s

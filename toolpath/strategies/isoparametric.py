@@ -255,7 +255,7 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
         lines: list[Line] = []
         for s in group:
             try:
-                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord)
+                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord, grown.corner_radius)
                 ends = steps(profile, grown.corner_radius, chord, scallop)
             except GeometryError as refusal:  # passes in between will have to do there
                 refused.append(refusal.message)
@@ -279,7 +279,7 @@ def laid_leaning(planned: Course, tool: ToolBody, axes: Axes, blocked: Blocked, 
         made: list[Posed] = []
         for s in group:
             try:
-                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord)
+                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord, tool.corner_radius)
                 ends = steps(profile, tool.corner_radius, chord, scallop)
                 one = posed(profile, ends, tool, axes, blocked, chord, lift)
             except GeometryError as refusal:
