@@ -181,6 +181,8 @@ def main() -> None:
               f"{'failed':>6} {'p99':>8} {'most':>8} {'gouge':>8} {'took s':>6}")
         begin = time.perf_counter()
         report = chain.plan(step, parse_setup(json.dumps(given)), Path(folder) / "out", lambda _stage, _share: None)
+        for found in report.get("findings", []):
+            print(found["kind"], found.get("line"), found.get("zone"), found.get("depth"), found.get("message"))
         print(f"{report['state']} in {time.perf_counter() - begin:.0f} s, with all trials; "
               f"findings {len(report.get('findings', []))}")
         for zone in report["zones"]:
