@@ -29,7 +29,7 @@ MOST_STEPS = 1_000_000
 FIRST = 256  # intervals a pass is looked at in at first
 SHARE = 2e-4  # of the tolerance: what the cubics of a profile may be off
 MOST_PLACES = 1 << 18
-FINEST = 0.002  # mm between places of a profile: what jumps in less is an edge
+FINEST = 0.02  # mm between places of a profile: what still jumps is an edge
 
 Curve = Callable[[F64], tuple[F64, F64]]
 """Contacts (n, 3) mm and unit normals out of the material (n, 3) at parameters (n,) in 0 to 1."""
@@ -57,8 +57,12 @@ class Profile:
         Raises
         ------
         GeometryError
-            Code 'bad_pass': the pass is a point, its normals are not known, or it turns over so sharply that places
-            0.002 mm apart do not show half the tolerance how.
+            Code 'bad_pass': the pass is a point, its normals are not known, or an edge lies across it.
+
+        Notes
+        -----
+        Where faces join with normals an angle d apart, no places are close enough: the centre jumps, along the surface.
+        Off it the ball is by r d² / 2 only; with places 0.02 mm apart that may be half the tolerance.
         """
         t = np.linspace(0.0, 1.0, FIRST + 1)
         way = _way(curve(t)[0])
@@ -77,13 +81,14 @@ class Profile:
                 raise GeometryError("a pass goes over a place without a normal", code="bad_pass",
                                     remedy="keep it off poles and tips")
             guess = CubicSpline(ways, np.column_stack([contact, normal]))(middle)
-            off = np.maximum(np.abs(guess[:, :3] - more), radius * np.abs(guess[:, 3:] - lean)).max(axis=1)
+            off, turn = (np.linalg.norm(guess[:, k:k + 3] - true, axis=1) for k, true in ((0, more), (3, lean)))
             ways, t = _merged(ways, middle), _merged(t, between)
             contact, normal = _merged(contact, more), _merged(normal, lean)
             width = float(ways[-1]) / (len(ways) - 1)
-            if off.max() <= SHARE * tolerance:
+            if np.maximum(off, radius * turn).max() <= SHARE * tolerance:
                 return cls(t, width, contact, normal)
             if width < FINEST or len(t) > MOST_PLACES:
+                off = np.maximum(off, 0.5 * radius * turn * turn)
                 if off.max() <= 0.5 * tolerance:
                     return cls(t, width, contact, normal)
                 at = ", ".join(f"{x:.3f}" for x in more[int(off.argmax())])
