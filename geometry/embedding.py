@@ -120,15 +120,27 @@ def grid_of(vertices: F64, faces: np.ndarray, laid: F64, n: int, m: int) -> F64:
     vertices : (k, d) float64, mm; laid : (k, 2) as ``embedded`` returns it
     """
     x, y = np.meshgrid(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m))
-    asked = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * m)])
+    row, share = located(laid, faces, np.column_stack([x.ravel(), y.ravel()]))
+    return np.einsum("ij,ijk->ik", share, vertices[faces[row]]).reshape(m, n, -1)
+
+
+def located(laid: F64, faces: np.ndarray, asked: F64) -> tuple[np.ndarray, F64]:
+    """Where places lie among triangles of a plane.
+
+    laid  : (k, 2) float64, mm or unitless, corners
+    faces : (t, 3) int, counterclockwise
+    asked : (n, 2) float64, mm or unitless, places
+
+    Returns
+    -------
+    (n,) int64, the triangle each place lies in, or the nearest one, and (n, 3) float64, its shares of the corners
+    """
     flat = TriangleMesh(np.column_stack([laid, np.zeros(len(laid))]), faces.astype(np.int32),
                         np.zeros(len(faces), np.int32))
-    _, row, _ = nearest(TriangleTree(flat), asked)
+    _, row, _ = nearest(TriangleTree(flat), np.column_stack([asked, np.zeros(len(asked))]))
     a, b, c = (laid[faces[row, k]] for k in range(3))
-    q = asked[:, :2]
-    whole = _cross(b - a, c - a)
-    share = np.column_stack([_cross(b - q, c - q), _cross(c - q, a - q), _cross(a - q, b - q)]) / whole[:, None]
-    return np.einsum("ij,ijk->ik", share, vertices[faces[row]]).reshape(m, n, -1)
+    share = np.column_stack([_cross(b - asked, c - asked), _cross(c - asked, a - asked), _cross(a - asked, b - asked)])
+    return row, share / _cross(b - a, c - a)[:, None]
 
 
 def _mean_values(vertices: F64, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, F64]:

@@ -26,6 +26,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from geometry.bvh import TriangleTree
+from geometry.embedding import located
 from geometry.errors import GeometryError
 from geometry.footpoints import foot_points
 from geometry.mesh import F64, TriangleMesh
@@ -78,10 +79,7 @@ class Joined:
 
     def places(self, at: F64) -> F64:
         """The places (n, 3) mm of the exact faces that lie at places (n, 2) mm of the plane."""
-        flat = TriangleMesh(np.column_stack([self.plane, np.zeros(len(self.plane))]), self.mesh.faces)
-        _, row, _ = nearest(TriangleTree(flat), np.column_stack([at, np.zeros(len(at))]))
-        a, b, c = (self.plane[self.mesh.faces[row, k]] for k in range(3))
-        share = _shares(a, b, c, at)
+        row, share = located(self.plane, self.mesh.faces, at)
         return self._feet(np.einsum("nk,nkc->nc", share, self.mesh.vertices[self.mesh.faces[row]]), row,
                           np.einsum("nk,nkc->nc", share, self.uv[row]))[0]
 
@@ -162,13 +160,3 @@ def _laid_flat(vertices: F64, faces: NDArray[np.int32], loop: NDArray[np.int64],
         raise GeometryError(f"{' '.join(names)} overlap themselves when laid into a plane", code="not_flat",
                             subjects=names, measured=1, limit=0, remedy="take them one by one")
     return plane
-
-
-def _shares(a: F64, b: F64, c: F64, at: F64) -> F64:
-    """(n, 3) of the corners (n, 2) of triangles at places (n, 2) of the plane."""
-    def over(u: F64, v: F64) -> F64:
-        return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-
-    whole = over(b - a, c - a)
-    share = np.column_stack([over(b - at, c - at), over(c - at, a - at), over(a - at, b - at)])
-    return np.asarray(share / whole[:, None])

@@ -140,6 +140,14 @@ class Stretch:
     high: float
     turned: bool
 
+    def stepped(self, radius: float, scallop: float, chord: float) -> tuple[Profile, F64]:
+        """Its profile and the ways (n,) mm at which a ball is to be located; radius, scallop, chord : mm.
+
+        Raises GeometryError as ``Profile.of`` and ``steps`` do.
+        """
+        profile = Profile.of(self.iso.curve(self.eta, self.low, self.high), chord, radius)
+        return profile, steps(profile, radius, chord, scallop)
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -263,8 +271,7 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
         lines: list[Line] = []
         for s in group:
             try:
-                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord, grown.corner_radius)
-                ends = steps(profile, grown.corner_radius, chord, scallop)
+                profile, ends = s.stepped(grown.corner_radius, scallop, chord)
             except GeometryError as refusal:  # passes in between will have to do there
                 refused.append(refusal.message)
                 continue
@@ -287,8 +294,7 @@ def laid_leaning(planned: Course, tool: ToolBody, axes: Axes, blocked: Blocked, 
         made: list[Posed] = []
         for s in group:
             try:
-                profile = Profile.of(s.iso.curve(s.eta, s.low, s.high), chord, tool.corner_radius)
-                ends = steps(profile, tool.corner_radius, chord, scallop)
+                profile, ends = s.stepped(tool.corner_radius, scallop, chord)
                 one = posed(profile, ends, tool, axes, blocked, chord, lift)
             except GeometryError as refusal:
                 refused.append(refusal.message)
