@@ -17,11 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import Line, serving
+from toolpath.levels import Line, pieces_where, serving
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
@@ -39,6 +40,7 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+OVERLAP = 4  # moves of a line walked once more where only what goes on from there is new
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
 WORTH_A_TRY = 1.15  # of the way of the usual passes: iso-parametric ones that are more are not walked
 
@@ -206,8 +208,8 @@ class Finish:
 
     def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
         """Walk lines of round k and measure them."""
-        tool, settings, name = self.field.tool, self.settings, self.strategy.name
-        thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if name == "floor" else None
+        tool, settings = self.field.tool, self.settings
+        thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if self.strategy.name == "floor" else None
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:
@@ -215,19 +217,42 @@ class Finish:
         for line in lines:
             if not self.strategy.ordered:
                 line = turned(line, settings)
-            key = (np.round(line.points, 5) + 0.0).tobytes()
-            if key in self.walked:  # what it left, it leaves again
-                continue
-            before, last = len(linker.trajectories), 0
-            for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, self.zone.form is Form.STEEP):
-                last = len(linker.trajectories)
-                linker.add(layer, thin)
-            cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
-            for points in cuts:
-                self.residual.cut(points, tool)
-            whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
-            if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
-                self.walked.add(key)
+            for piece in self._unwalked(line):
+                self._add_one(linker, piece, skin, slope, thin)
+
+    def _add_one(self, linker: Linker, line: Line, skin: float, slope: float, thin: float | None) -> None:
+        """Walk a line with the layers above it and measure them."""
+        tool, steep = self.field.tool, self.zone.form is Form.STEEP
+        before, last = len(linker.trajectories), 0
+        for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, steep):
+            last = len(linker.trajectories)
+            if not linker.add(layer, thin):  # what it would have taken is too much for the layer below
+                break
+        for points in (t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT):
+            self.residual.cut(points, tool)
+        whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
+        if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
+            self.walked.update(_places(line.points))
+
+    def _unwalked(self, line: Line) -> list[Line]:
+        """What of a line was not walked whole in a round before: what that left, it would leave again.
+
+        Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one.
+        """
+        new = np.array([place not in self.walked for place in _places(line.points)])
+        new[0], new[-1] = new[0] and new[1], new[-1] and new[-2]  # ends may lie between the points of the first time
+        if new.all():
+            return [line]
+        grown = new.copy()
+        for k in range(1, OVERLAP + 1):
+            grown[k:] |= new[:-k]
+            grown[:-k] |= new[k:]
+        return pieces_where(line, grown, 0.0, 0.0)
+
+
+def _places(points: F64) -> list[bytes]:
+    """Points (n, 3) as keys, equal for those that are the same to 0.01 um."""
+    return [row.tobytes() for row in np.round(points, 5) + 0.0]
 
 
 def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:

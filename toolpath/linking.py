@@ -14,6 +14,7 @@ because no rapid keeps its clearance beside a wall.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as fresh
 
@@ -34,6 +35,7 @@ FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
+SAME_PLACE = 1e-6  # mm
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
@@ -61,6 +63,7 @@ class Linker:
     stock   : StockMap, lowered as passes are added
     motions : Motions
     skipped : lines that found no safe way in
+    _lowest : mm, Z of the lowest cut by place of a tip
     """
 
     field: TipField
@@ -70,6 +73,7 @@ class Linker:
     at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
+    _lowest: dict[tuple[int, int], float] = fresh(default_factory=dict, repr=False)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
@@ -202,7 +206,7 @@ class Linker:
         seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
         highest = max(float(self.stock.overlap(points[:1], tool, SURE_RIM)[0]),
                       float(self.stock.under_end(points[:1], tool)[0]))
-        for over in (max(seen, self.motions.step_down) + 0.1, highest + 0.1):
+        for over in (seen + 0.1, max(seen, self.motions.step_down) + 0.1, highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
             entry = self._beside(ramp[0]) if ramp is not None else None
             if ramp is not None and entry is not None:
@@ -210,9 +214,12 @@ class Linker:
         return None
 
     def _beside(self, top: F64) -> F64 | None:
-        """Where to come down to the top of a ramp: there, or off the wall where no rim left there can be met."""
+        """Where to come down to the top of a ramp: there, or off the wall where no rim left there can be met.
+
+        Where this tool has cut as deep nothing can be left, however close the stock stands all round.
+        """
         tool = self.field.tool
-        if bool(self.stock.in_air(top[None, :], tool)[0]):
+        if self._lowest.get(_place(top.tolist()), math.inf) <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
             return top[None, :]
         for far in (0.06, 0.12, 0.25, 0.5, 1.0):
             ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
@@ -280,6 +287,10 @@ class Linker:
         self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
+        if motion is Motion.CUT:
+            for p in points.tolist():
+                place = _place(p)
+                self._lowest[place] = min(p[2], self._lowest.get(place, math.inf))
 
     def _rapid(self, points: F64) -> None:
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
@@ -313,6 +324,10 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
+
+
+def _place(tip: Sequence[float]) -> tuple[int, int]:
+    return round(tip[0] / SAME_PLACE), round(tip[1] / SAME_PLACE)
 
 
 def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:

@@ -68,6 +68,21 @@ def test_from_outside_the_stock_it_comes_in_level():
     assert (first.points[:, 0] < -2.0).all()  # beside the block
 
 
+def test_rings_of_layer_after_layer_are_gone_down_to_where_the_tool_has_been():
+    """The hole is as wide as the tool, so nothing in it counts as air; but the tool stood there a layer before."""
+    link = linker()
+    tops, moves = [], []
+    for z in (2.4, 1.6, 0.8):
+        for hole in ((8.0, 8.0), (22.0, 22.0)):
+            assert link.add(loop(0.5, z, hole))
+            cut = link.trajectories[-1].points
+            tops.append(cut[0, 2])
+            moves.extend(np.round(np.hstack([cut[:-1], cut[1:]]), 6).tolist())
+    assert min(tops[:2]) >= TOP
+    assert np.allclose(tops[2:], [2.5, 2.5, 1.7, 1.7], atol=0.01)  # every ramp begins a tenth above what it comes to
+    assert len({tuple(m) for m in moves}) == len(moves)  # no way is run twice
+
+
 @pytest.mark.parametrize("length", [3.0, 12.0, 24.0])
 def test_an_open_line_in_stock_is_ramped_to_and_fro(length):
     link = linker(step_down=0.5)
@@ -124,7 +139,7 @@ def test_a_point_is_no_pass():
 
 
 def test_the_next_pass_beside_is_reached_without_a_lift():
-    link = linker(step_down=1.5)
+    link = linker()
     link.add(straight(-1, 25, 10, 3.0))
     link.add(Line(straight(-1, 25, 12, 3.0).points[::-1], False))
     assert motions(link)[-2:] == [Motion.CONNECT, Motion.CUT]

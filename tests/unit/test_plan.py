@@ -12,6 +12,8 @@ from scipy.spatial import cKDTree
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.family import Target
+from toolpath.finish import OVERLAP, Finish
+from toolpath.levels import Line
 from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.settings import CutData, PlanSettings
@@ -54,6 +56,34 @@ def replanned(c: Case, stock: StockMap | None = None, checks=None, cut=None, pro
 
 def bytes_of(c: Case) -> list[bytes]:
     return [p.tobytes() for _, p in c.moves(*Motion)]
+
+
+def test_a_later_round_walks_only_what_no_earlier_one_has():
+    """Rounds ask for the first six tenths of a line, for its first four, and for all of it."""
+    c = case("walls")
+    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    cut = CutData(10_000, 800, 200, 3000, 0.75)
+    stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
+    finish = Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings)
+    line = max((q for lines in finish.strategy.rounds(0, np.arange(len(zone.tips))) for q in lines),
+               key=lambda q: len(q.points))
+    points = line.points[:-1] if line.closed else line.points
+    cuts = [int(share * len(points)) for share in (0.6, 0.4, 1.0)]
+
+    def rounds(k, _failing):
+        return [[Line(points[:cuts[k]], False)]] if k < 3 else []
+
+    finish.strategy = replace(finish.strategy, rounds=rounds)
+    (step,) = finish.walk("S01")
+    level = [t.points[np.abs(t.points[:, 2] - points[0, 2]) < 1e-9] for t in step.trajectories
+             if t.motion is Motion.CUT]
+    level = [p for p in level if len(p) > 1]
+    assert len(level) == 2  # nothing at all in the second round
+    second = level[1]
+    begin = int(np.linalg.norm(points - second[0], axis=1).argmin())
+    assert cuts[0] - OVERLAP - 2 <= begin <= cuts[0]  # the third goes on from where the first ended
+    assert np.linalg.norm(second[-1] - points[-1]) < 1e-6
 
 
 # -- steps --------------------------------------------------------------------------------------------------------

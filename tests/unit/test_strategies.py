@@ -226,7 +226,7 @@ def test_no_steep_part_of_a_skimmed_pass_takes_more_than_the_skin(body):
     line = Line(np.column_stack([x, np.full(41, 2.0), 0.9 + 0.7 * np.cos(1.3 * x)]), False)
     skin, top = 0.25, 1.9
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([10.0, 4, top]), 0.1)
-    got = zigzag.skimmed(line, stock, body, skin, 0.05)
+    got = zigzag.skimmed(line, stock, body, skin, 0.2)
     assert got[-1] is line and len(got) > 3
     # without them the pass itself would take much more
     (plain,) = steepest_bites([line], Discs([0, 0], [10, 4], top), body)
@@ -241,23 +241,34 @@ def test_no_steep_part_of_a_skimmed_pass_takes_more_than_the_skin(body):
     assert np.ptp(steps) < 0.02 and 0.8 * skin < steps.max() <= skin
 
 
-def test_what_a_short_descent_takes_is_worked_off_going_sideways():
-    """On a short slope each layer may only add what the way back has earned; on a long one a skin each."""
-    mesh = box_mesh([0, 0, -2], [40, 4, 0])
-    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([40.0, 4, 3.0]), 0.1)
+def open_depth(lines, x, top, slope):
+    """The most that is open at x while lines along X are walked: what descents took less what other way worked off."""
+    worst = debt = 0.0
+    for line in lines:
+        p = dense(line.points, 0.01)
+        move = np.diff(p, axis=0)
+        down = -move[:, 2] > slope * np.abs(move[:, 0])
+        k = int(np.abs(0.5 * (p[1:, 0] + p[:-1, 0]) - x).argmin())
+        height = float(p[k, 2])
+        if down[k] and height < top:
+            debt += top - height
+        worst, top = max(worst, debt), min(top, height)
+        debt = max(debt - slope * float(np.abs(move[~down, 0]).sum()), 0.0)
+    return worst
+
+
+@pytest.mark.parametrize(("run", "up"), [(2.0, 2.0), (30.0, 30.0), (20.0, 1.0), (20.0, 0.0), (3.0, 0.0)])
+def test_what_descents_take_is_worked_off_by_way_that_does_not_go_down(run, up):
+    """Valleys: down over ``run`` mm, up over ``up`` mm; the way down works nothing off, however long it is."""
+    mesh = box_mesh([0, 0, -2], [70, 4, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([70.0, 4, 4.0]), 0.1)
     body, skin, slope = tool(2.0, 0.4), 0.4, 0.05
-    counts = []
-    for run, low in ((2.0, 1.4), (30.0, 0.6)):
-        line = Line(np.array([[3.0, 2, 2.6], [3.0 + run, 2, low]]), False)
-        got = zigzag.skimmed(line, stock, body, skin, slope)
-        heights = [float(np.interp(3.0 + 0.5 * run, q.points[:, 0], q.points[:, 2])) for q in got]
-        steps = -np.diff([3.0, *heights])  # from the top of the block down
-        debt = 0.0
-        for step in steps:
-            debt = max(debt - slope * run, 0.0) + step
-            assert debt <= skin + 0.05
-        counts.append(len(got))
-    assert counts[0] > 2 * counts[1]
+    valley = [[3.0, 2, 3.6], [3.0 + run, 2, 1.4], *([[3.0 + run + up, 2, 3.6]] if up else [])]
+    got = zigzag.skimmed(Line(np.array(valley), False), stock, body, skin, slope)
+    assert got[-1].points.tolist() == valley
+    assert max(open_depth(got, x, 4.0, slope) for x in (3.0 + 0.5 * run, 3.0 + 0.9 * run)) <= skin + 0.05
+    # a skin each is enough on a long way, and for layers walked uphill
+    assert len(got) > 8 if run == up == 2.0 else len(got) <= 2.6 / skin + 1
 
 
 def test_a_level_pass_and_one_in_air_are_not_skimmed():

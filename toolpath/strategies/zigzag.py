@@ -153,9 +153,10 @@ def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
 def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float, wall: bool = False) -> list[Line]:
     """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
 
-    A descent is worked off only by going sideways: over a piece of length s each layer after the first adds what
-    ``slope`` times s allows. So a place where stock stands h above the pass is taken in n equal layers, n the least
-    with h / n <= skin and h - (n - 1) slope s <= skin; short pieces get many thin ones.
+    A descent is worked off only by going sideways, level or up: over a piece with a length s of such way each layer
+    after the first adds what ``slope`` times s allows. So a place where stock stands h above the pass is taken in n
+    equal layers, n the least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes
+    downhill for most of its way is walked uphill but for the pass itself where that needs fewer.
 
     line  : Line; level ones are returned alone
     stock : StockMap as it stands
@@ -176,12 +177,25 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
     deep = _steep_stock(points, stock, tool, wall)
     out: list[Line] = []
     for piece in pieces_where(Line(points, False), deep > skin, tool.radius, 4.0 * tool.radius):
-        over = float(_steep_stock(dense(piece.points, 0.3 * tool.radius), stock, tool, wall).max())
-        run = float(np.linalg.norm(np.diff(piece.points[:, :2], axis=0), axis=1).sum())
-        layers = max(math.ceil(over / skin), 1 + math.ceil(max(over - skin, 0.0) / max(slope * run, 1e-3)))
-        out.extend(Line(piece.points + np.array([0.0, 0.0, k * over / layers]), False)
+        way = dense(piece.points, 0.3 * tool.radius)
+        over = _steep_stock(way, stock, tool, wall)
+        back = np.maximum(over[::-1], _steep_stock(way[::-1], stock, tool, wall))
+        layers, uphill = _layers(way, over, skin, slope), _layers(way[::-1], back, skin, slope)
+        if uphill < layers:
+            piece, over, layers = piece.reversed(), back, uphill
+        out.extend(Line(piece.points + np.array([0.0, 0.0, k * float(over.max()) / layers]), False)
                    for k in range(layers - 1, 0, -1))
     return [*out, line]
+
+
+def _layers(way: F64, over: F64, skin: float, slope: float) -> int:
+    """In how many layers a way (n, 3) is gone down to, ``over`` (n,) mm of stock on it."""
+    move = np.diff(way, axis=0)
+    aside = np.hypot(move[:, 0], move[:, 1])
+    down = -move[:, 2] > slope * aside
+    dug = float(np.maximum(over[:-1], over[1:])[down].max(initial=0.0))
+    earned = slope * float(aside[~down].sum())
+    return max(math.ceil(float(over.max()) / skin), 1 + math.ceil(max(dug - skin, 0.0) / max(earned, 1e-3)))
 
 
 def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F64:
