@@ -17,12 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import Line, pieces_where, serving
+from toolpath.levels import Line, pieces_where, place_keys, serving
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
@@ -232,14 +231,14 @@ class Finish:
             self.residual.cut(points, tool)
         whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
         if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
-            self.walked.update(_places(line.points))
+            self.walked.update(place_keys(line.points))
 
     def _unwalked(self, line: Line) -> list[Line]:
         """What of a line was not walked whole in a round before: what that left, it would leave again.
 
         Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one.
         """
-        new = np.array([place not in self.walked for place in _places(line.points)])
+        new = np.array([place not in self.walked for place in place_keys(line.points)])
         new[0], new[-1] = new[0] and new[1], new[-1] and new[-2]  # ends may lie between the points of the first time
         if new.all():
             return [line]
@@ -248,11 +247,6 @@ class Finish:
             grown[k:] |= new[:-k]
             grown[:-k] |= new[k:]
         return pieces_where(line, grown, 0.0, 0.0)
-
-
-def _places(points: F64) -> list[bytes]:
-    """Points (n, 3) as keys, equal for those that are the same to 0.01 um."""
-    return [row.tobytes() for row in np.round(points, 5) + 0.0]
 
 
 def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:

@@ -29,6 +29,8 @@ from toolpath.kernels.contour import (
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 BISECTIONS = 9  # a crossing is placed to step / 2**9
+SAME_PLACE = 1e-6  # mm
+BESIDE = 0.1234  # of that
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,14 @@ def thinned(points: F64, tolerance: float) -> F64:
     keep = np.zeros(len(points), np.bool_)
     thin(points, tolerance, keep)
     return np.ascontiguousarray(points[keep])
+
+
+def place_keys(points: F64) -> list[bytes]:
+    """A key for each of points (n, k), mm, that is the same for places rounded differently.
+
+    Lines cut from a lattice lie on its nice fractions: the borders of what is one place are put beside them.
+    """
+    return [row.tobytes() for row in np.floor(points / SAME_PLACE + BESIDE).astype(np.int64)]
 
 
 def dense(points: F64, spacing: float) -> F64:

@@ -14,7 +14,6 @@ because no rapid keeps its clearance beside a wall.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as fresh
 
@@ -22,7 +21,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from toolpath.kernels.ramp import ease
-from toolpath.levels import Line, dense, pieces_where, thinned
+from toolpath.levels import Line, dense, pieces_where, place_keys, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import LEVEL_TOLERANCE, TipField
@@ -35,7 +34,6 @@ FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
-SAME_PLACE = 1e-6  # mm
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
@@ -73,7 +71,7 @@ class Linker:
     at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
-    _lowest: dict[tuple[int, int], float] = fresh(default_factory=dict, repr=False)
+    _lowest: dict[bytes, float] = fresh(default_factory=dict, repr=False)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
@@ -219,7 +217,8 @@ class Linker:
         Where this tool has cut as deep nothing can be left, however close the stock stands all round.
         """
         tool = self.field.tool
-        if self._lowest.get(_place(top.tolist()), math.inf) <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
+        lowest = self._lowest.get(place_keys(top[None, :2])[0], math.inf)
+        if lowest <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
             return top[None, :]
         for far in (0.06, 0.12, 0.25, 0.5, 1.0):
             ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
@@ -288,9 +287,8 @@ class Linker:
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
         if motion is Motion.CUT:
-            for p in points.tolist():
-                place = _place(p)
-                self._lowest[place] = min(p[2], self._lowest.get(place, math.inf))
+            for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
+                self._lowest[place] = min(z, self._lowest.get(place, math.inf))
 
     def _rapid(self, points: F64) -> None:
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
@@ -324,10 +322,6 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
-
-
-def _place(tip: Sequence[float]) -> tuple[int, int]:
-    return round(tip[0] / SAME_PLACE), round(tip[1] / SAME_PLACE)
 
 
 def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:

@@ -14,6 +14,7 @@ from toolpath.levels import (
     free_pieces,
     moves_free,
     pieces_where,
+    place_keys,
     rings,
     thinned,
     true_runs,
@@ -155,3 +156,11 @@ def test_moves_through_a_wall_are_seen_and_cut_out():
     assert len(whole) == 1 and len(whole[0].points) == 2
     # standing inside the wall is no better than moving through it
     assert free_pieces(field, along([[6, 7, 4], [6.1, 7, 4]]), False) == []
+
+
+def test_a_place_has_one_key_however_it_was_rounded():
+    """Nice fractions of a mm, as a lattice has them, and the same a few digits of rounding off; neighbours differ."""
+    p = np.array([[-28.979375, 0.0703125, 9.40651], [0.15, -0.0375, 0.0]])
+    for off in (1e-14, -1e-14, 1e-10, -1e-10):
+        assert place_keys(p + off) == place_keys(p)
+    assert not set(place_keys(p + 2e-6)) & set(place_keys(p))
