@@ -34,7 +34,6 @@ LEAST_AREA = 1.0  # of r²: a face smaller than that is left to passes in betwee
 ALONG = 129  # places along a pass at which it is asked what it serves
 LATTICE = 9  # places each way at which the rise of both families of passes is looked at
 LEVEL_GAIN = 0.5  # of the rise along the longer sides: what less there must be along the shorter to go there instead
-RAMP = 0.05  # mm a mm: what goes down more steeply cuts with its end
 OVERRUN = 0.3  # radii of the corner a pass goes on past the last place it serves
 
 
@@ -197,10 +196,7 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
             todo[:0] = face.alone
             continue
         for iso, etas in passes:
-            own, step, length, short = _served(iso, etas, near, target.spacing, radius, flank)
-            if short:
-                refused.append(f"{face.name}: {short} passes go up or down and are shorter than the tool is wide: it "
-                               "would come down on its end")
+            own, step, length = _served(iso, etas, near, target.spacing, radius, flank is not None)
             if not own:
                 continue
             if flank is None:
@@ -214,9 +210,9 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
 
 
 def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
-            flank: Flank | None) -> tuple[list[tuple[float, tuple[Stretch, ...]]], float, float, int]:
-    """The stretches of all passes that come near places, with the height (mm) of each pass, mm between passes, mm the
-    tool goes, and how many stretches on a wall are left out, too short to go down along."""
+            steep: bool) -> tuple[list[tuple[float, tuple[Stretch, ...]]], float, float]:
+    """The stretches of all passes that come near places, with the height (mm) of each pass, mm between passes, and mm
+    the tool goes."""
     xi = np.linspace(0.0, 1.0, ALONG)
     along, across = np.meshgrid(xi, etas)
     place, normal = (v.reshape(len(etas), ALONG, 3) for v in iso.contact(along.ravel(), across.ravel()))
@@ -225,7 +221,7 @@ def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
     wanted = near.query(place.reshape(-1, 3))[0].reshape(len(etas), ALONG) <= np.maximum(
         step + 0.5 * spacing, np.median(size))
     out: list[tuple[float, tuple[Stretch, ...]]] = []
-    total, short, steep = 0.0, 0, flank is not None
+    total = 0.0
     for k, eta in enumerate(etas.tolist()):
         at = np.concatenate([[0.0], np.cumsum(size[k])])
         turned = _against(place[k], normal[k]) if steep else bool(k % 2)
@@ -234,16 +230,12 @@ def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
         gone = np.concatenate([[0.0], np.cumsum(moved)])
         for low, high in _spans(at, wanted[k], OVERRUN * radius):
             a, b = np.interp([low, high], at, xi).tolist()
-            rise = float(np.ptp(np.interp([low, high], at, place[k, :, 2])))
-            if flank is not None and high - low < 2.0 * flank.radius and rise > RAMP * (high - low):
-                short += 1
-                continue
             mine.append(Stretch(iso, eta, a, b, turned))
             total += float(np.diff(np.interp([low, high], at, gone))[0])
         if mine:
             height = float(place[k, wanted[k], 2].mean())
             out.append((height, tuple(reversed(mine) if turned else mine)))
-    return out, step, total, short
+    return out, step, total
 
 
 def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[float, float]]:
