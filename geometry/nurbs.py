@@ -16,10 +16,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
 
 from geometry.arrays import finite_points
 from geometry.errors import GeometryError
-from geometry.kernels.nurbs import surface_values
+from geometry.kernels.nurbs import heights_along, surface_values
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Parameters may lie outside of the knots by this share of their range: they have been through someone's rounding.
@@ -162,6 +163,24 @@ class NurbsSurface:
         normal = self._normal(d)
         return _dots((d.u, d.u), (d.u, d.v), (d.v, d.v)), _dots((d.uu, normal), (d.uv, normal), (d.vv, normal))
 
+    def heights_along(self, points: F64, start: F64, beyond: float = 0.1) -> tuple[F64, F64]:
+        """How high chains of points stand over the surface, each foot searched from the one before it in its chain.
+
+        points : (m, t, 3) float64, mm, neighbours close together
+        start  : (m, 2), parameters near the foot of the first point of each chain
+        beyond : share of the domain by which feet may lie outside of it, where the surface goes on smoothly
+
+        Returns (m, t) float64, mm along the normal of the foot, negative inside the material, and (m, t, 2)
+        parameters of the feet. Both are right where the points are nearer than the least radius of curvature.
+        """
+        low, high = self.domain
+        room = beyond * (high - low)
+        uv, height = np.empty((*points.shape[:2], 2)), np.empty(points.shape[:2])
+        heights_along(tuple(self._nets[way][0] for way in _WAYS[:3]), self.knots_u, self.knots_v, *self.orders,
+                      self.side, low - room, high + room, np.ascontiguousarray(points, np.float64),
+                      np.ascontiguousarray(start, np.float64), uv, height)
+        return height, uv
+
     def curvature(self, uv: ArrayLike) -> F64:
         """Principal curvatures; parameters and errors are those of ``points``.
 
@@ -195,6 +214,29 @@ class NurbsSurface:
             raise GeometryError(f"the matrix scales, shears or mirrors (off by {off:.3g})", code="not_rigid",
                                 subjects=("matrix",), measured=off, limit=1e-9, remedy="use a rotation and a shift")
         return replace(self, control=self.control @ turn.T + m[:3, 3])
+
+    def extended(self, share: float) -> NurbsSurface:
+        """The surface carried on beyond its four borders by a share of its domain, as the polynomial it is there.
+
+        Returns NurbsSurface with the same parameters where it was and others around.
+        Raises GeometryError (``bad_surface``): a weight does not stay positive that far out.
+        """
+        net = self._nets[0, 0][0]
+        knots = []
+        for axis, (t, order) in enumerate(zip((self.knots_u, self.knots_v), self.orders, strict=True)):
+            room = share * (self.domain[1, axis] - self.domain[0, axis])
+            wide = np.array(t, np.float64)
+            wide[:order], wide[-order:] = t[order - 1] - room, t[-order] + room
+            at = np.array([wide[i + 1:i + order].mean() for i in range(net.shape[axis])])  # one in reach of each point
+            at = np.clip(at, wide[order - 1], wide[-order])
+            values = BSpline(t, np.moveaxis(net, axis, 0), order - 1)(at)
+            basis = BSpline.design_matrix(at, wide, order - 1).toarray()
+            net = np.moveaxis(np.linalg.solve(basis, values.reshape(len(at), -1)).reshape(values.shape), 0, axis)
+            knots.append(wide)
+        if self.weights is None:
+            return replace(self, control=net, knots_u=knots[0], knots_v=knots[1])
+        return replace(self, control=net[..., :3] / net[..., 3:], weights=net[..., 3], knots_u=knots[0],
+                       knots_v=knots[1])
 
     def discretised(self, du: float, dv: float) -> TriangleMesh:
         """Two facets to every cell of an even grid over the parameters, from border to border.

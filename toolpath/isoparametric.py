@@ -35,6 +35,7 @@ LEVEL = 1e-9  # 1/mm: what is less curved is level
 TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
 ALONG = 65  # places along a pass at which its distance to the next is looked at
 MOST_LINES = 513
+FEET = 8  # steps of Newton from a place of the square to parameters near it
 CENTRES = 513  # of the ball along a pass
 ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
 FULL, AIM, TRIALS = 0.97, 0.985, 8
@@ -87,7 +88,7 @@ class IsoSurface:
         The way square to the direction (u', v') is (-(F u' + G v'), E u' + F v').
         """
         uv = self._inside(self._uv(xi, eta))
-        along, over = self.grid.tangents(eta, xi)[::-1] if self.turned else self.grid.tangents(xi, eta)
+        along, over = self.tangents(xi, eta)
         first, second = self.surface.forms(uv)
         e, f, g = first.T
         u, v = -(f * along[:, 0] + g * along[:, 1]), e * along[:, 0] + f * along[:, 1]
@@ -96,8 +97,30 @@ class IsoSurface:
         inner = e * u * over[:, 0] + f * (u * over[:, 1] + v * over[:, 0]) + g * v * over[:, 1]
         return np.abs(inner) / np.sqrt(size), curvature
 
+    def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Derivatives of (u, v) along xi and along eta at xi and eta, both (p,): (p, 2) each."""
+        return self.grid.tangents(eta, xi)[::-1] if self.turned else self.grid.tangents(xi, eta)
+
+    def parameters(self, xi: F64, eta: F64) -> F64:
+        """Parameters (p, 2) of the surface at xi and eta, both (p,); beyond its border the square goes on straight."""
+        return self._inside(self._uv(xi, eta))
+
+    def square(self, uv: F64, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Where over the unit square, or beyond it, parameters (p, 2) lie, searched from xi and eta, both (p,)."""
+        for _ in range(FEET):
+            off = uv - self._uv(xi, eta)
+            (a, b), (c, d) = (way.T for way in self.tangents(np.clip(xi, 0.0, 1.0), np.clip(eta, 0.0, 1.0)))
+            area = a * d - b * c
+            xi, eta = xi + (d * off[:, 0] - c * off[:, 1]) / area, eta + (a * off[:, 1] - b * off[:, 0]) / area
+        return xi, eta
+
     def _uv(self, xi: F64, eta: F64) -> F64:
-        return self.grid(eta, xi) if self.turned else self.grid(xi, eta)
+        a, b = np.clip(xi, 0.0, 1.0), np.clip(eta, 0.0, 1.0)
+        uv = self.grid(b, a) if self.turned else self.grid(a, b)
+        if not ((a != xi) | (b != eta)).any():
+            return uv
+        along, across = self.tangents(a, b)
+        return uv + (xi - a)[:, None] * along + (eta - b)[:, None] * across
 
     def _inside(self, uv: F64) -> F64:
         return np.clip(uv, *self.surface.domain)

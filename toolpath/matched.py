@@ -1,0 +1,247 @@
+"""Passes of a flat or bull-nose end, tilted until its nose matches the surface (papers/001, section 4, mended).
+
+Each pass is a line of one eta; its tool leans forward, by the least tilt with which no place of the nose enters the
+true surface (``toolpath.nose``), turned aside where that cuts a wider strip. Where the nose begins to stand higher than
+the scallop lie the edges of its strip. Strips are not as wide to the left as to the right, and the next pass is not
+known before its own strip is: passes are put as far apart as lets the edge of the next reach the edge of the last all
+along, solved for both together. A pass runs on over its ends, on the surface as it would go on, by as much as the
+edges of its strip lag behind the contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.isoparametric import IsoSurface
+from toolpath.locations import tips
+from toolpath.nose import Contacts, Nose, strip_edges
+
+STATIONS = 33  # along a pass, at which tilts are looked for
+FIRST_STEP, LEAST_STEP = 0.05, 1e-4  # of the unit square, between passes
+SOLVED = 5e-3  # of the step between passes: as near the edges of neighbours are brought
+TRIALS = 14
+TURNS = np.radians(np.arange(-20.0, 21.0, 5.0))
+TURN_COST = 0.5  # of the radius, in width of the strip, by rad of turning from one station to the next
+EVEN = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0  # by which turns of neighbours are meant
+EXTENDED = 0.25  # of its domain: so far the surface is carried on round its border
+FINEST = 12  # halvings of the way between two stations
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of passes, mm and rad.
+
+    scallop    : may stay standing between passes
+    depth      : the nose may be in the surface
+    least_tilt : with which the end cuts
+    chord      : may be added by straight moves between the locations
+    """
+
+    scallop: float
+    depth: float
+    least_tilt: float
+    chord: float
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A pass and what it cuts.
+
+    eta        : where it lies;  xi (m,) its stations, the first and last of them beyond the border
+    tilt, turn : (m,) rad
+    low, high  : (m,) eta at the edges of the strip, at the stations
+    """
+
+    eta: float
+    xi: F64
+    tilt: F64
+    turn: F64
+    low: F64
+    high: F64
+
+    def leans(self, xi: F64) -> tuple[F64, F64]:
+        """Tilts and turns, both (k,) rad, between the stations."""
+        return PchipInterpolator(self.xi, self.tilt)(xi), PchipInterpolator(self.xi, self.turn)(xi)
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Passes of an end over a surface.
+
+    iso     : the surface over the unit square, passes along xi
+    tool    : ToolBody, a flat or a bull nose
+    run_out : of the unit square, by which a pass goes on over its ends
+    """
+
+    iso: IsoSurface
+    tool: ToolBody
+    wanted: Wanted
+    run_out: float
+
+    @classmethod
+    def over(cls, iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Matched:
+        """Passes over a surface, which is carried on beyond its border for them."""
+        wide = replace(iso, surface=iso.surface.extended(EXTENDED))
+        xi = np.linspace(0.0, 1.0, STATIONS)
+        length = min(float(np.linalg.norm(np.diff(iso.contact(xi, np.full(STATIONS, eta))[0], axis=0), axis=1).sum())
+                     for eta in (0.0, 0.5, 1.0))
+        # edges of a strip as wide as the radius lie so far behind the contact, turned as far as may be: 30 degrees on
+        # the nose, which there is 1 - cos(30) of the radius behind, and half the radius aside
+        lag = tool.radius * (1.0 - np.sqrt(0.75) + 0.5 * float(np.sin(TURNS[-1])))
+        return cls(wide, tool, wanted, min(lag / length, 0.5 * EXTENDED))
+
+    @property
+    def nose(self) -> Nose:
+        """The nose of the tool over the surface, as far as passes go over it."""
+        low, high = self.iso.surface.domain
+        room = (EXTENDED - self.run_out) / (1.0 + 2.0 * EXTENDED) * (high - low)
+        return Nose(self.iso.surface, self.tool, np.stack([low + room, high - room]))
+
+    @property
+    def stations(self) -> F64:
+        """xi (m,) at which tilts are looked for."""
+        return np.linspace(-self.run_out, 1.0 + self.run_out, STATIONS)
+
+    def contacts(self, xi: F64, eta: float) -> Contacts:
+        """Contacts of the pass at eta."""
+        level = np.full(len(xi), eta)
+        along = self.iso.tangents(np.clip(xi, 0.0, 1.0), np.clip(level, 0.0, 1.0))[0]
+        return Contacts.on(self.iso.surface, self.iso.parameters(xi, level), along)
+
+    def strip(self, eta: float, turn: F64) -> Strip:
+        """The pass at eta; turn : (m,) rad, of the tilt at the stations, out of the feed to its left.
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_pass': at some station no tilt keeps the nose out of the surface.
+        """
+        xi, wanted = self.stations, self.wanted
+        at = self.contacts(xi, eta)
+        tilt = self.nose.least_tilt(at, turn, wanted.depth, wanted.least_tilt)
+        bad = np.flatnonzero(np.isnan(tilt))
+        if len(bad):
+            where = ", ".join(f"{v:.3f}" for v in at.point[bad[0]])
+            raise GeometryError(f"{self.tool.id}: no tilt keeps its end out of the surface at ({where})",
+                                code="bad_pass", subjects=(self.tool.id, f"({where})"),
+                                remedy="take a smaller tool or a ball")
+        tilt = _evened(tilt)
+        sides = []
+        for half in strip_edges(*self.nose.heights(at, tilt, turn), wanted.scallop):
+            x, e = self.iso.square(half, xi, np.full(STATIONS, eta))
+            order = np.argsort(x, kind="stable")
+            sides.append(np.interp(xi, x[order], e[order]))
+        sides = sides if sides[0].sum() > sides[1].sum() else sides[::-1]
+        return Strip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta))
+
+    def lay_out(self) -> list[Strip]:
+        """Passes from one border to the other, as few as the scallop allows.
+
+        Raises
+        ------
+        GeometryError
+            As ``strip``.
+        """
+        out: list[Strip] = []
+        edge, step = np.zeros(STATIONS), FIRST_STEP
+        while edge.min() < 1.0 and (not out or out[-1].eta < 1.0):
+            begin = out[-1].eta if out else 0.0
+            out.append(self._next(edge, begin, step))
+            edge, step = out[-1].high, max(out[-1].eta - begin, LEAST_STEP)
+        return out
+
+    def widest_turns(self, eta: float) -> F64:
+        """How the tilt of a pass is turned at its stations, (m,) rad, so that the narrower side of its strip is widest.
+
+        The nose may match the surface best with its tangent off the way across the feed: where the principal
+        directions lie aside, or where the curvature grows to one side. Of a few turns at each station the way through
+        all of them is taken that is widest less what it turns from one to the next.
+        """
+        at = self.contacts(self.stations, eta)
+        widths = np.empty((len(TURNS), STATIONS))
+        for k, angle in enumerate(TURNS):
+            turn = np.full(STATIONS, angle)
+            tilt = self.nose.least_tilt(at, turn, self.wanted.depth, self.wanted.least_tilt)
+            edges = strip_edges(*self.nose.heights(at, np.nan_to_num(tilt), turn), self.wanted.scallop)
+            left, right = (((self.iso.surface.points(np.clip(e, *self.iso.surface.domain)) - at.point) * at.left).sum(1)
+                           for e in edges)
+            widths[k] = np.where(np.isnan(tilt), 0.0, 2.0 * np.minimum(left, -right))
+        cost = TURN_COST * self.tool.radius * np.abs(TURNS[:, None] - TURNS)
+        best, back = widths[:, 0], np.zeros((STATIONS, len(TURNS)), np.int64)
+        for m in range(1, STATIONS):
+            through = best[None, :] - cost
+            back[m] = through.argmax(axis=1)
+            best = widths[:, m] + through.max(axis=1)
+        out = [int(best.argmax())]
+        for m in range(STATIONS - 1, 0, -1):
+            out.append(int(back[m, out[-1]]))
+        return np.convolve(np.pad(TURNS[out[::-1]], len(EVEN) // 2, mode="edge"), EVEN, "valid")
+
+    def _next(self, edge: F64, begin: float, step: float) -> Strip:
+        """The farthest pass beyond ``begin`` whose strip still reaches ``edge`` all along, to SOLVED of the step."""
+        def miss(s: Strip) -> float:
+            return float(np.where(edge < 1.0, s.low - edge, -np.inf).max())
+
+        turn = self.widest_turns(min(begin + step, 1.0))
+        kept = self.strip(min(begin + LEAST_STEP, 1.0), turn)
+        under, over = miss(kept), None
+        if under > 0.0:  # a strip narrower than the least step: what is left beside it is for others
+            return kept
+        upper = trial = min(begin + step, 1.0)
+        for _ in range(TRIALS):
+            tried = self.strip(trial, turn)
+            off = miss(tried)
+            if off <= 0.0:
+                kept, under = tried, off
+                if trial >= 1.0 or off > -SOLVED * step:
+                    break
+            else:
+                upper, over = trial, off
+            if over is None:
+                trial = min(trial + max(-0.5 * off, 0.1 * step), 1.0)
+            else:
+                trial = kept.eta + (upper - kept.eta) * float(np.clip(under / (under - over), 0.05, 0.95))
+        return kept
+
+    def located(self, s: Strip) -> tuple[F64, F64]:
+        """Tips (k, 3) mm and axes (k, 3) of a pass, so close that moves between them add no more than the chord.
+
+        A move takes the tip straight and turns the axis on the great circle. Half way, what that moves the contact
+        along the normal is held against the chord: what the tip is off, and the axis times the radius.
+        """
+        nose = self.nose
+
+        def poses(xi: F64) -> tuple[F64, F64, F64]:
+            at = self.contacts(xi, s.eta)
+            axis = nose.axes(at, *s.leans(xi))
+            return tips(at.point, at.normal, self.tool, axis), axis, at.normal
+
+        xi = s.xi
+        for _ in range(FINEST):
+            tip, axis, _ = poses(xi)
+            middle = 0.5 * (xi[1:] + xi[:-1])
+            half = axis[1:] + axis[:-1]
+            half /= np.linalg.norm(half, axis=1)[:, None]
+            true_tip, true_axis, normal = poses(middle)
+            off = 0.5 * (tip[1:] + tip[:-1]) - true_tip
+            moved = np.abs((off * normal).sum(axis=1)) + self.tool.radius * np.linalg.norm(half - true_axis, axis=1)
+            far = moved > self.wanted.chord
+            if not far.any():
+                break
+            xi = np.sort(np.concatenate([xi, middle[far]]))
+        return poses(xi)[:2]
+
+
+def _evened(tilt: F64) -> F64:
+    """Tilts that change evenly, none less than it was."""
+    out = tilt
+    for _ in range(2):
+        mean = np.convolve(np.concatenate([out[:1], out, out[-1:]]), [0.25, 0.5, 0.25], "valid")
+        out = np.maximum(mean, tilt)
+    return out

@@ -1,0 +1,120 @@
+"""A flat or bull-nose end on a surface: how far its nose stands over it, how far it must tilt, how wide it cuts.
+
+Notation (with that of ``toolpath.matching``)
+    t, s     : way of the feed and the way to its left, n x t, both on the surface
+    l        : tangent of the nose circle, cos(turn) s + sin(turn) t;  f = sin(turn) s - cos(turn) t
+    axis     : cos(eta) n - sin(eta) f: leaned forward by eta, and aside where ``turn`` is not 0
+    t, angle : place on the nose circle, 0 at the contact, half a turn at the heel
+
+Every place of the nose draws a trace of its own, and what a sharp end sweeps is the set of these, so how high the
+nose stands over the surface at one instant says what stays beside the pass. Of a bull nose the circle of corner centres
+is looked at, over the surface offset by r. Nothing here is second order: heights are those over the true surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
+from geometry.toolbody import ToolBody
+from toolpath.matching import clear_tilt, nose_radii
+
+ANGLES = 65  # places on each half of the nose
+BISECTIONS = 12  # of a tilt: to a 4000th of what it may be
+TOUCH = 1e-7  # mm: rounding of a place that touches
+ROOM = np.radians(3.0)  # a tilt is looked for up to so much beyond what is clear on a quadric
+MOST_ROOM = np.radians(40.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts of a pass.
+
+    uv     : (m, 2) parameters on the surface
+    point, normal, way, left : (m, 3) float64, mm and unit: contact, n, t and s
+    """
+
+    uv: F64
+    point: F64
+    normal: F64
+    way: F64
+    left: F64
+
+    @classmethod
+    def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> Contacts:
+        """Contacts at parameters (m, 2), fed along (m, 2), parameters by anything."""
+        d, normal = surface.derivatives(uv), surface.normals(uv)
+        way = d.u * along[:, :1] + d.v * along[:, 1:]
+        way = way / np.linalg.norm(way, axis=1)[:, None]
+        return cls(uv, d.point, normal, way, np.cross(normal, way))
+
+
+@dataclass(frozen=True, eq=False)
+class Nose:
+    """The nose of a tool over a surface.
+
+    tool   : ToolBody, a flat or a bull nose
+    domain : (2, 2) least and greatest parameters; what stands under the nose beyond is for others to say
+    """
+
+    surface: NurbsSurface
+    tool: ToolBody
+    domain: F64
+
+    def axes(self, at: Contacts, tilt: F64, turn: F64) -> F64:
+        """Tool axes (m, 3), unit, for tilts and turns (m,) rad."""
+        behind = np.sin(turn)[:, None] * at.left - np.cos(turn)[:, None] * at.way
+        return np.asarray(np.cos(tilt)[:, None] * at.normal - np.sin(tilt)[:, None] * behind)
+
+    def heights(self, at: Contacts, tilt: F64, turn: F64, angles: int = ANGLES) -> tuple[F64, F64]:
+        """How high the nose stands, (2, m, angles) mm, on the left half and on the right one from the contact to the
+        heel, and the parameters of the feet, (2, m, angles, 2)."""
+        big, r = nose_radii(self.tool)
+        side, ahead = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        tangent, behind = side * at.left + ahead * at.way, ahead * at.left - side * at.way
+        inward = np.cos(tilt)[:, None] * behind + np.sin(tilt)[:, None] * at.normal
+        a = np.linspace(0.0, np.pi, angles)[None, :, None]
+        centre = (at.point + r * at.normal + big * inward)[:, None]
+        near = centre - big * np.cos(a) * inward[:, None]
+        off = big * np.sin(a) * tangent[:, None]
+        high, feet = self.surface.heights_along(np.concatenate([near + off, near - off]), np.tile(at.uv, (2, 1)))
+        shape = (2, len(at.uv), angles)
+        return high.reshape(shape) - r, feet.reshape(*shape, 2)
+
+    def least_tilt(self, at: Contacts, turn: F64, depth: float, least: float) -> F64:
+        """The least tilts (m,), rad, from ``least`` on, with no place of the nose deeper than ``depth`` mm in the
+        surface within the domain; nan where none is small enough."""
+        k_1 = np.maximum(-self.surface.curvature(np.clip(at.uv, *self.surface.domain))[:, 0], 0.0)
+        low = np.full(len(at.uv), least)
+        high = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MOST_ROOM), least) + ROOM
+        for room in (0.0, MOST_ROOM - ROOM):
+            high = high + room * self._enters(at, high, turn, depth)
+        bad = self._enters(at, high, turn, depth)
+        high = np.where(self._enters(at, low, turn, depth), high, low)
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            enters = self._enters(at, middle, turn, depth)
+            low, high = np.where(enters, middle, low), np.where(enters, high, middle)
+        return np.where(bad, np.nan, high)
+
+    def _enters(self, at: Contacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
+        high, feet = self.heights(at, tilt, turn)
+        known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3)
+        return np.asarray((known & (high < -depth - TOUCH)).any(axis=(0, 2)))
+
+
+def strip_edges(high: F64, feet: F64, height: float) -> F64:
+    """Where the nose begins to stand higher than ``height`` mm, going from the contact: feet (2, m, 2) of both halves.
+
+    high, feet : as ``Nose.heights`` gives them
+    """
+    over = high > height
+    k = np.where(over.any(axis=2), over.argmax(axis=2), high.shape[2] - 1).clip(1)
+    i, j = np.indices(k.shape)
+    a, b = high[i, j, k - 1], high[i, j, k]
+    share = np.clip((height - a) / np.where(b > a, b - a, 1.0), 0.0, 1.0)[..., None]
+    return np.asarray(feet[i, j, k - 1] + share * (feet[i, j, k] - feet[i, j, k - 1]))
