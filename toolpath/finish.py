@@ -41,7 +41,7 @@ PASS_SHARE = 0.85  # a sample is done when the measured residual is within this 
 REFINEMENTS = 4
 OVERLAP = 4  # moves of a line walked once more where only what goes on from there is new
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
-WORTH_A_TRY = 1.15  # of the way of the usual passes: iso-parametric ones that are more are not walked
+WORTH_A_TRY = 1.5  # of the way of the usual passes: iso-parametric ones that are more are not walked
 
 
 @dataclass(frozen=True, eq=False)
