@@ -21,7 +21,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import Line, pieces_where, place_keys, serving
+from toolpath.levels import Line, pieces_where, place_keys, serving, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
@@ -68,10 +68,11 @@ class Finish:
     """The finish of one zone: walked once, and again where stock was in the way that is gone since.
 
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them; faces : of the zone, exact and trimmed
+    walked : places of lines that this tool has walked whole, by ``place_keys``; filled here, shared by its zones
     """
 
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, faces: Sequence[Faces] = ()) -> None:
+                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: set[bytes] | None = None) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
@@ -86,7 +87,7 @@ class Finish:
         self.step: str | None = None
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
-        self.walked: set[bytes] = set()
+        self.walked: set[bytes] = set() if walked is None else walked
 
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingstep of the zone; none where no pass is walked.
@@ -112,10 +113,12 @@ class Finish:
         elif made[lost]:
             why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[lost], 1),
                    "limit": round(seconds[best], 1)}
-        stock, taken = self.stock, tries[best]
+        stock, walked, taken = self.stock, self.walked, tries[best]
         stock.become(taken.stock)
+        walked |= taken.walked
         rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[lost].strategy.name, **why})
-        self.__dict__.update(taken.__dict__ | {"stock": stock, "strategy": replace(taken.strategy, rejected=rejected)})
+        self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked,
+                                               "strategy": replace(taken.strategy, rejected=rejected)})
         return made[best]
 
     def _along_borders(self) -> tuple[_Strategy | None, tuple[dict[str, object], ...]]:
@@ -234,14 +237,18 @@ class Finish:
             self.walked.update(place_keys(line.points))
 
     def _unwalked(self, line: Line) -> list[Line]:
-        """What of a line was not walked whole in a round before: what that left, it would leave again.
+        """What of a line was not walked whole before by this tool; the rest is only measured, it would leave the same.
 
-        Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one.
+        Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one,
+        and those of zones side by side part of each other.
         """
         new = np.array([place not in self.walked for place in place_keys(line.points)])
         new[0], new[-1] = new[0] and new[1], new[-1] and new[-2]  # ends may lie between the points of the first time
         if new.all():
             return [line]
+        for a, b in true_runs(~new):
+            if b - a > 1:
+                self.residual.cut(line.points[a:b], self.field.tool)
         grown = new.copy()
         for k in range(1, OVERLAP + 1):
             grown[k:] |= new[:-k]

@@ -76,10 +76,11 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
             step = _layers(mine, field, cut, stock, settings, following())
             steps.extend([] if step is None else [step])
         own: list[Finish] = []
+        walked: set[bytes] = set()
         for zone in mine:
             if settings.finishing:
                 faces = (trimmed or {}).get(zone.id, ())
-                own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces))
+                own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces, walked))
                 steps.extend(own[-1].walk(following()))
             done += 1
             if progress is not None:

@@ -86,6 +86,30 @@ def test_a_later_round_walks_only_what_no_earlier_one_has():
     assert np.linalg.norm(second[-1] - points[-1]) < 1e-6
 
 
+def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
+    """The second of two zones asks for the line of the first and for one more; both count for it as walked."""
+    c = case("walls")
+    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    cut = CutData(10_000, 800, 200, 3000, 0.75)
+    stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
+    walked: set[bytes] = set()
+    made, left = [], []
+    for count in (1, 2):
+        finish = Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings, (), walked)
+        lines = [q for group in finish.strategy.rounds(0, np.arange(len(zone.tips))) for q in group][:count]
+
+        def rounds(k, _failing, lines=lines):
+            return [lines] if k == 0 else []
+
+        finish.strategy = replace(finish.strategy, rounds=rounds)
+        made.append([t.points for s in finish.walk("S01") for t in s.trajectories if t.motion is Motion.CUT])
+        left.append(finish.residual.residual.copy())
+    ends = [{p.round(6).tobytes() for t in cuts for p in t} for cuts in made]
+    assert made[0] and made[1] and len(ends[0] & ends[1]) <= OVERLAP + 1
+    assert (left[1] <= left[0] + 0.005).all() and (left[1] < left[0] - 0.005).any()
+
+
 # -- steps --------------------------------------------------------------------------------------------------------
 
 
