@@ -21,7 +21,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import Line, pieces_where, place_keys, serving, true_runs
+from toolpath.levels import Line, pieces_where, serving, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
@@ -30,6 +30,7 @@ from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, isoparametric, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
+from toolpath.walked import Walked
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -68,11 +69,11 @@ class Finish:
     """The finish of one zone: walked once, and again where stock was in the way that is gone since.
 
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them; faces : of the zone, exact and trimmed
-    walked : places of lines that this tool has walked whole, by ``place_keys``; filled here, shared by its zones
+    walked : what its tool has walked whole, shared by its zones
     """
 
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: set[bytes] | None = None) -> None:
+                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
@@ -87,7 +88,7 @@ class Finish:
         self.step: str | None = None
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
-        self.walked: set[bytes] = set() if walked is None else walked
+        self.walked = Walked() if walked is None else walked
 
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingstep of the zone; none where no pass is walked.
@@ -115,7 +116,7 @@ class Finish:
                    "limit": round(seconds[best], 1)}
         stock, walked, taken = self.stock, self.walked, tries[best]
         stock.become(taken.stock)
-        walked |= taken.walked
+        walked.become(taken.walked)
         rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[lost].strategy.name, **why})
         self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked,
                                                "strategy": replace(taken.strategy, rejected=rejected)})
@@ -167,7 +168,7 @@ class Finish:
         """This finish with another strategy, to be walked on its own."""
         out = copy.copy(self)
         out.residual, out.stock = self.residual.copied(), self.stock.copied()
-        out.met, out.walked, out.strategy = self.met.copy(), set(self.walked), strategy
+        out.met, out.walked, out.strategy = self.met.copy(), self.walked.copied(), strategy
         return out
 
     def walk_again(self, step_id: str, least: float) -> list[Workingstep]:
@@ -225,16 +226,15 @@ class Finish:
     def _add_one(self, linker: Linker, line: Line, skin: float, slope: float, thin: float | None) -> None:
         """Walk a line with the layers above it and measure them."""
         tool, steep = self.field.tool, self.zone.form is Form.STEEP
-        before, last = len(linker.trajectories), 0
+        before, refused, whole = len(linker.trajectories), linker.refused, False
         for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, steep):
-            last = len(linker.trajectories)
-            if not linker.add(layer, thin):  # what it would have taken is too much for the layer below
+            whole = linker.add(layer, thin)
+            if linker.refused > refused:  # what it would have taken is too much for the layer below
                 break
         for points in (t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT):
             self.residual.cut(points, tool)
-        whole = [t.points for t in linker.trajectories[last:] if t.motion is Motion.CUT]
-        if sum(Line(p, False).length for p in whole) > line.length - 1e-3:
-            self.walked.update(place_keys(line.points))
+        if whole:
+            self.walked.add(line)
 
     def _unwalked(self, line: Line) -> list[Line]:
         """What of a line was not walked whole before by this tool; the rest is only measured, it would leave the same.
@@ -242,17 +242,16 @@ class Finish:
         Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one,
         and those of zones side by side part of each other.
         """
-        new = np.array([place not in self.walked for place in place_keys(line.points)])
-        new[0], new[-1] = new[0] and new[1], new[-1] and new[-2]  # ends may lie between the points of the first time
-        if new.all():
+        fresh = self.walked.fresh(line)
+        if fresh.all():
             return [line]
-        for a, b in true_runs(~new):
-            if b - a > 1:
-                self.residual.cut(line.points[a:b], self.field.tool)
-        grown = new.copy()
+        for a, b in true_runs(~fresh):
+            self.residual.cut(line.points[a:b + 1], self.field.tool)
+        wanted = np.concatenate([fresh, [False]]) | np.concatenate([[False], fresh])
+        grown = wanted.copy()
         for k in range(1, OVERLAP + 1):
-            grown[k:] |= new[:-k]
-            grown[:-k] |= new[k:]
+            grown[k:] |= wanted[:-k]
+            grown[:-k] |= wanted[k:]
         return pieces_where(line, grown, 0.0, 0.0)
 
 

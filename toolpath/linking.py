@@ -60,7 +60,8 @@ class Linker:
     field   : TipField of the tool
     stock   : StockMap, lowered as passes are added
     motions : Motions
-    skipped : lines that found no safe way in
+    skipped : lines left out: no safe way in, or stock in the way of shank or holder
+    refused : how many of them found no safe way in
     _lowest : mm, Z of the lowest cut by place of a tip
     """
 
@@ -71,6 +72,7 @@ class Linker:
     at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
+    refused: int = 0
     _lowest: dict[bytes, float] = fresh(default_factory=dict, repr=False)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
@@ -86,6 +88,7 @@ class Linker:
         for piece in self._clear_of_bodies(Line(points, line.closed)):
             if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
                 self.skipped.append(piece)
+                self.refused += 1
         return len(self.skipped) == before
 
     def _clear_of_bodies(self, line: Line) -> list[Line]:

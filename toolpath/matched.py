@@ -29,7 +29,8 @@ TRIALS = 14
 TURNS = np.radians(np.arange(-20.0, 21.0, 5.0))
 TURN_COST = 0.5  # of the radius, in width of the strip, by rad of turning from one station to the next
 EVEN = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0  # by which turns of neighbours are meant
-EXTENDED = 0.25  # of its domain: so far the surface is carried on round its border
+MOST_RUN_OUT = 0.1  # of the unit square
+MARGIN = 0.02  # of the domain: so much farther than passes run out the surface is carried on
 FINEST = 12  # halvings of the way between two stations
 
 
@@ -86,21 +87,27 @@ class Matched:
 
     @classmethod
     def over(cls, iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Matched:
-        """Passes over a surface, which is carried on beyond its border for them."""
-        wide = replace(iso, surface=iso.surface.extended(EXTENDED))
+        """Passes over a surface, which is carried on beyond its border for them.
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_surface': it cannot be carried on so far (``NurbsSurface.extended``).
+        """
         xi = np.linspace(0.0, 1.0, STATIONS)
         length = min(float(np.linalg.norm(np.diff(iso.contact(xi, np.full(STATIONS, eta))[0], axis=0), axis=1).sum())
                      for eta in (0.0, 0.5, 1.0))
         # edges of a strip as wide as the radius lie so far behind the contact, turned as far as may be: 30 degrees on
         # the nose, which there is 1 - cos(30) of the radius behind, and half the radius aside
         lag = tool.radius * (1.0 - np.sqrt(0.75) + 0.5 * float(np.sin(TURNS[-1])))
-        return cls(wide, tool, wanted, min(lag / length, 0.5 * EXTENDED))
+        run_out = min(lag / length, MOST_RUN_OUT)
+        return cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
 
     @property
     def nose(self) -> Nose:
         """The nose of the tool over the surface, as far as passes go over it."""
         low, high = self.iso.surface.domain
-        room = (EXTENDED - self.run_out) / (1.0 + 2.0 * EXTENDED) * (high - low)
+        room = MARGIN / (1.0 + 2.0 * (self.run_out + MARGIN)) * (high - low)
         return Nose(self.iso.surface, self.tool, np.stack([low + room, high - room]))
 
     @property
@@ -214,6 +221,11 @@ class Matched:
 
         A move takes the tip straight and turns the axis on the great circle. Half way, what that moves the contact
         along the normal is held against the chord: what the tip is off, and the axis times the radius.
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_pass': not even steps of a 4096th of a station's keep to the chord.
         """
         nose = self.nose
 
@@ -233,9 +245,11 @@ class Matched:
             moved = np.abs((off * normal).sum(axis=1)) + self.tool.radius * np.linalg.norm(half - true_axis, axis=1)
             far = moved > self.wanted.chord
             if not far.any():
-                break
+                return tip, axis
             xi = np.sort(np.concatenate([xi, middle[far]]))
-        return poses(xi)[:2]
+        raise GeometryError(f"{self.tool.id}: the pass at {s.eta:.4f} turns too fast for a chord of "
+                            f"{self.wanted.chord:g} mm", code="bad_pass", subjects=(self.tool.id,),
+                            measured=float(moved.max()), limit=self.wanted.chord, remedy="allow a longer chord")
 
 
 def _evened(tilt: F64) -> F64:

@@ -103,15 +103,18 @@ class Nose:
 
     def _enters(self, at: Contacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
         high, feet = self.heights(at, tilt, turn)
-        known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3)
-        return np.asarray((known & (high < -depth - TOUCH)).any(axis=(0, 2)))
+        known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3) | ~np.isfinite(high)
+        return np.asarray((known & ~(high >= -depth - TOUCH)).any(axis=(0, 2)))
 
 
 def strip_edges(high: F64, feet: F64, height: float) -> F64:
     """Where the nose begins to stand higher than ``height`` mm, going from the contact: feet (2, m, 2) of both halves.
 
+    Where it does not on its front half: where it is widest.
+
     high, feet : as ``Nose.heights`` gives them
     """
+    high, feet = high[:, :, :high.shape[2] // 2 + 1], feet[:, :, :high.shape[2] // 2 + 1]  # widest a quarter round
     over = high > height
     k = np.where(over.any(axis=2), over.argmax(axis=2), high.shape[2] - 1).clip(1)
     i, j = np.indices(k.shape)

@@ -22,6 +22,7 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.strategies.isoparametric import Faces
+from toolpath.walked import Walked
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -76,7 +77,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
             step = _layers(mine, field, cut, stock, settings, following())
             steps.extend([] if step is None else [step])
         own: list[Finish] = []
-        walked: set[bytes] = set()
+        walked = Walked()
         for zone in mine:
             if settings.finishing:
                 faces = (trimmed or {}).get(zone.id, ())

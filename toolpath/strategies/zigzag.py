@@ -156,7 +156,8 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
     A descent is worked off only by going sideways, level or up: over a piece with a length s of such way each layer
     after the first adds what ``slope`` times s allows. So a place where stock stands h above the pass is taken in n
     equal layers, n the least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes
-    downhill for most of its way is walked uphill but for the pass itself where that needs fewer.
+    downhill for most of its way is walked uphill but for the pass itself where that needs fewer, on whichever side the
+    stock then is.
 
     line  : Line; level ones are returned alone
     stock : StockMap as it stands

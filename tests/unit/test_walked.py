@@ -1,0 +1,81 @@
+"""What counts as walked: moves of level lines, whole lines of others, and nothing that was not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
+from toolpath.levels import Line
+from toolpath.motion import Motion
+from toolpath.residual import ResidualMap
+from toolpath.walked import Walked
+
+
+def line(*x, z=1.0, closed=False):
+    return Line(np.array([[float(v), 0.1 * float(v) ** 2, z] for v in x]), closed)
+
+
+def walked(*lines):
+    out = Walked()
+    for q in lines:
+        out.add(q)
+    return out
+
+
+def test_parts_of_a_level_line_are_known_either_way_and_from_between_its_points():
+    w = walked(line(0, 1, 2, 3, 4, 5))
+    assert not w.fresh(line(1, 2, 3)).any()
+    assert not w.fresh(line(3, 2, 1)).any()
+    between = Line(np.array([[1.5, 0.25, 1.0], [2, 0.4, 1.0], [3, 0.9, 1.0], [3.5, 1.25, 1.0]]), False)
+    assert not w.fresh(between).any()  # its ends lie on moves of the first
+    assert w.fresh(line(4, 5, 6)).tolist() == [False, True]
+    assert w.fresh(line(1, 2, 3, z=1.001)).all()
+
+
+def test_places_from_different_lines_are_no_move():
+    """Both ends known and nobody walked the way between; an end far beyond; a line that crosses at one place."""
+    w = walked(line(0, 1), line(5, 6))
+    assert w.fresh(line(0, 1, 5, 6)).tolist() == [False, True, False]
+    assert w.fresh(line(1, 9)).tolist() == [True]
+    cross = Line(np.array([[1.0, -5.0, 1.0], [1.0, 0.1, 1.0], [1.0, 5.0, 1.0]]), False)
+    assert w.fresh(cross).all()
+
+
+def test_of_lines_that_go_up_and_down_only_the_whole_is_known():
+    up = Line(np.array([[0.0, 0, 0], [1, 0, 0.5], [2, 0, 0.7]]), False)
+    w = walked(up)
+    assert not w.fresh(up).any()
+    assert w.fresh(Line(up.points[:2], False)).all()
+
+
+def test_a_copy_is_added_to_on_its_own_until_it_is_taken_over():
+    w = walked(line(0, 1))
+    other = w.copied()
+    other.add(line(1, 2))
+    assert w.fresh(line(1, 2)).all() and not other.fresh(line(1, 2)).any()
+    w.become(other)
+    assert not w.fresh(line(0, 1, 2)).any()
+
+
+def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkeypatch):
+    """Short tools in tall blocks, whose lines are cut and topped: what the plan measured, from its own cuts again."""
+    import toolpath.plan as planner
+
+    finishes = []
+
+    class Kept(planner.Finish):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            finishes.append(self)
+
+    monkeypatch.setattr(planner, "Finish", Kept)
+    for seed, kind in ((1, "flat"), (7, "flat"), (5, "ball")):
+        finishes.clear()
+        c = plan_part(blocks(seed), [SHORT_TOOLS[kind]], near_net=False)
+        cuts = [(s.tool, t.points) for s in c.plan.steps for t in s.trajectories if t.motion is Motion.CUT]
+        for f in finishes:
+            true = ResidualMap(f.residual.points, f.checks.normals, margin=f.residual.margin)
+            for body, points in cuts:
+                true.cut(points, body)
+            done = f.residual.residual <= c.settings.scallop_height
+            assert (true.residual[done] <= c.settings.scallop_height + c.settings.chordal_tolerance).all(), (seed, kind)
