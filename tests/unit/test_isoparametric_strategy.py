@@ -15,6 +15,7 @@ from toolpath.levels import Line
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import TrimmedFace, course, laid
 from toolpath.strategies.zigzag import Pattern
+from toolpath.walked import Walked
 from verify.removal import Moves, residual_on_normals
 
 SCALLOP, CHORD = 0.02, 0.004
@@ -147,9 +148,11 @@ def test_a_sharp_end_gets_none():
     ((0, 0), (10.0, 10.4), "zlevel", "takes longer at equal scallop, s"),
     ((4, 4), (None, 10.4), "isoparametric", "no pass is walked")])
 def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_faster(left, seconds, kept, reason):
+    ways = [Line(np.array([[0.0, y, 1.0], [5.0, y, 1.0]]), False) for y in (1.0, 2.0)]
+
     class Stub(Finish):
         def __init__(self):
-            self.checks, self.given = SimpleNamespace(points=np.zeros((4, 3))), 4
+            self.checks, self.given, self.walked = SimpleNamespace(points=np.zeros((4, 3))), 4, Walked()
             self.settings, self.stock = SimpleNamespace(scallop_height=0.02), SimpleNamespace(become=lambda _: None)
             self.strategy = _Strategy("zlevel", 1.0, None, False)
 
@@ -160,11 +163,16 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             k = int(strategy.name == "isoparametric")
             rest = np.where(np.arange(4) < left[k], 0.03, 0.01)
             steps = [] if seconds[k] is None else [SimpleNamespace(seconds=seconds[k])]
+            walked = self.walked.copied()
+            walked.add(ways[k])
             return SimpleNamespace(strategy=strategy, stock=None, residual=SimpleNamespace(residual=rest),
-                                   _rounds=lambda _id, _wanted: steps)
+                                   walked=walked, _rounds=lambda _id, _wanted: steps)
 
     finish = Stub()
+    remembered = finish.walked
     finish.walk("S01")
+    assert finish.walked is remembered  # the zones of a tool share it
+    assert [not remembered.fresh(way).any() for way in ways] == [kept == "zlevel", kept == "isoparametric"]
     assert finish.strategy.name == kept
     assert finish.strategy.rejected[-1]["reason"] == reason
     assert finish.strategy.rejected[-1]["strategy"] != kept
