@@ -1,0 +1,349 @@
+"""Inverse kinematics of five-axis machines: how the rotary axes stand for a tool axis, and where the joints are then.
+
+The frames are those of the setup: it is fixed to the part, and the machine falls on it while both rotary axes stand at
+zero, where the linear joints are the tip with the length offset on. With T the tilt (about X for A, about Y for B) and
+S the turn about Z (C), all right-handed,
+
+    table-table   place = q1 + T (q2 + S (p - q2) - q1), tool along Z        axis on the part = S' T' e_z
+    head-table    place = q2 + S (p - q2), tool along T e_z                  axis on the part = S' T e_z
+    head-head     place = p, tool along S T e_z                              axis on the part = S T e_z
+
+so the tilt of an axis is the angle to Z, in either sense, and its azimuth is the angle C but for sign and a quarter or
+half turn: ``_AZIMUTH``. Where the axis stands along Z, C is free: it is put between the angles before and after.
+
+A head of length L from swivel to tip has its joints at place - L (e_z - h), h the tool in the machine.
+
+Two places of the rotary axes do for every axis, and each again after whole turns. Along a path those are taken that
+turn least in all, without ever jumping from one to the other: a jump in the middle of a pass would sweep the tool
+round while its tip stands in the material.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import OutputError
+from geometry.mesh import F64
+
+POLE = 1e-9  # rad, an axis nearer to Z than this has no azimuth
+ROUND = 2.0 * math.pi
+MOST_ROUNDS = 24  # halvings of a block
+LEAST_AXIS = 1e-7  # rad, an axis that swings less in a block is not cut again
+SHARES = (0.25, 0.5, 0.75)  # of a block, where it is held against the straight way
+_LETTER = {"A": 0, "B": 1}
+_AZIMUTH = {  # azimuth of the axis, rad, where the tilt is positive: first + second * C
+    "table-table-AC": (0.5 * math.pi, -1.0),
+    "table-table-BC": (math.pi, -1.0),
+    "head-table-BC": (0.0, -1.0),
+    "head-head-BC": (0.0, 1.0),
+    "head-head-AC": (-0.5 * math.pi, 1.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RotaryMachine:
+    """A machine with a tilting axis and C.
+
+    kind   : 'table-table-AC', 'table-table-BC', 'head-table-BC', 'head-head-BC' or 'head-head-AC'
+    pivots : mm, setup frame at zero, or None: table-table a point on the tilting and one on the turning axis,
+             head-table (0, 0, spindle face up to the swivel) and a point on the turning axis, head-head the first alone
+    limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, or None
+    tcp    : the control keeps the tip; else programs are of joints, and pivots are needed
+
+    Raises
+    ------
+    OutputError
+        Code bad_kinematics: an unknown kind; no_pivots: none are given although the control does not keep the tip.
+    """
+
+    kind: str
+    pivots: tuple[tuple[float, float, float], ...] | None = None
+    limits: F64 | None = None
+    tcp: bool = True
+
+    def __post_init__(self) -> None:
+        if self.kind not in _AZIMUTH:
+            raise OutputError(f"unknown kinematics {self.kind!r}", code="bad_kinematics", measured=self.kind,
+                              limit=sorted(_AZIMUTH), remedy="machine.kinematics is one of " + ", ".join(_AZIMUTH))
+        if self.pivots is None and not self.tcp:
+            raise OutputError("a program of joints needs to know where the rotary axes lie", code="no_pivots",
+                              subjects=("machine.pivots_mm",),
+                              remedy="give machine.pivots_mm, or say machine.tcp true where the control keeps the tip")
+
+    @property
+    def letters(self) -> str:
+        """The two rotary words, the tilting axis first."""
+        return self.kind[-2:]
+
+    @property
+    def tilts_head(self) -> bool:
+        """Whether the tilting axis carries the tool."""
+        return self.kind.startswith("head")
+
+    @property
+    def turns_head(self) -> bool:
+        """Whether C carries the tool."""
+        return self.kind.startswith("head-head")
+
+    def axes(self, turns: F64) -> F64:
+        """Tool axes on the part, (n, 3) unit, where the rotary axes stand at ``turns`` (n, 2) rad."""
+        first, sense = _AZIMUTH[self.kind]
+        tilt, azimuth = turns[:, 0], first + sense * turns[:, 1]
+        flat = np.sin(tilt)
+        return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(tilt)], axis=1)
+
+    def turns(self, axes: F64) -> F64:
+        """Both places of the rotary axes for tool axes.
+
+        axes : (n, 3) float64, unit, tip to spindle, setup frame
+
+        Returns
+        -------
+        (n, 2, 2) float64
+            Rad; [:, 0] tilts to the positive side and [:, 1] to the negative one, C in (-pi, pi], 0 at the pole.
+        """
+        first, sense = _AZIMUTH[self.kind]
+        flat = np.hypot(axes[:, 0], axes[:, 1])
+        tilt = np.arctan2(flat, axes[:, 2])
+        azimuth = np.where(flat > POLE, np.arctan2(axes[:, 1], axes[:, 0]), first)
+        one = sense * (azimuth - first)
+        out = np.stack([np.stack([tilt, one], axis=1), np.stack([-tilt, one + math.pi], axis=1)], axis=1)
+        out[:, 1, 1] = np.where(flat > POLE, out[:, 1, 1], 0.0)
+        out[..., 1] -= ROUND * np.ceil((out[..., 1] - math.pi) / ROUND)
+        return out
+
+    def joints(self, tips: F64, turns: F64, gauge: float) -> F64:
+        """Linear joints, (n, 3) mm, for tips (n, 3) mm at ``turns`` (n, 2) rad.
+
+        gauge : mm, spindle face to tip; counts where the head tilts. Raises OutputError (no_pivots) without pivots.
+        """
+        return self._places(tips, turns) - self._swing(turns, gauge)
+
+    def tips(self, joints: F64, turns: F64, gauge: float) -> F64:
+        """Tips, (n, 3) mm, for linear joints (n, 3) mm; the inverse of ``joints``."""
+        place = joints + self._swing(turns, gauge)
+        if self.turns_head:
+            return place
+        pivots = self._points()
+        if not self.tilts_head:
+            place = pivots[0] + _applied(self._tilt(turns).transpose(0, 2, 1), place - pivots[0])
+        return np.asarray(pivots[1] + _applied(_turn_matrix(2, -turns[:, 1]), place - pivots[1]))
+
+    def follow(self, axes: F64, start: F64 | None = None) -> F64:
+        """Rotary axes along a path, turning least in all.
+
+        axes  : (n, 3) float64, unit, along the path; neighbours less than half a turn apart
+        start : (2,) rad, where they stand before the path; None: anywhere, the least angles first
+
+        Returns
+        -------
+        (n, 2) float64
+            Rad, within the limits, no step of C longer than half a turn.
+
+        Raises
+        ------
+        OutputError
+            Code rotary_limit: the axes do not get along the path inside their limits; the message names the place in
+            the path, the axis and the angle.
+        """
+        out = np.zeros((len(axes), 2))
+        free = np.hypot(axes[:, 0], axes[:, 1]) <= POLE
+        known = np.flatnonzero(~free)
+        out[:, 0] = np.where(axes[:, 2] < 0.0, math.pi, 0.0)
+        if len(known):
+            out[known] = self._least_turning(self.turns(axes[known]), start)
+            out[:, 1] = np.interp(np.arange(len(axes)), known, out[known, 1])
+        else:
+            out[:, 1] = 0.0 if start is None else start[1]
+        self._check(out)
+        return out
+
+    def course(self, tips: F64, axes: F64, tolerance: float, swing: float, gauge: float,
+               start: F64 | None = None) -> tuple[F64, F64]:
+        """A path with as many points more as the rotary axes need to follow it.
+
+        tips, axes : (n, 3) float64, mm and unit: straight between tips, along great circles between axes
+        tolerance  : mm, what the tip may leave its way by where the program is one of joints
+        swing      : rad, what the axis may leave its great circle by
+        gauge      : mm, spindle face to tip
+        start      : as of ``follow``
+
+        Returns
+        -------
+        tips, turns : (m, 3) float64, mm, and (m, 2) float64, rad, m >= n, the given points among them
+
+        Raises
+        ------
+        OutputError
+            As ``follow``; pole_crossing: the axis passes so near Z that no step is short enough.
+        """
+        turns = self.follow(axes, start)
+        for _ in range(MOST_ROUNDS):
+            off = np.flatnonzero(self._off(tips, axes, turns, tolerance, swing, gauge))
+            if not len(off):
+                return tips, turns
+            middle = axes[off] + axes[off + 1]
+            middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+            near = 0.5 * (turns[off] + turns[off + 1])
+            tips = np.insert(tips, off + 1, 0.5 * (tips[off] + tips[off + 1]), axis=0)
+            axes = np.insert(axes, off + 1, middle, axis=0)
+            turns = np.insert(turns, off + 1, self._nearest(middle, near), axis=0)
+        where = tips[off[0]]
+        raise OutputError(f"the tool axis passes so near Z at ({', '.join(f'{v:.3f}' for v in where)}) that the rotary "
+                          "axes cannot follow it", code="pole_crossing", subjects=(_place(where),),
+                          measured=float(np.degrees(np.hypot(*axes[off[0], :2]))), limit=float(np.degrees(swing)),
+                          remedy="lean the tool to one side of Z all along the pass")
+
+    def _nearest(self, axes: F64, near: F64) -> F64:
+        """(n, 2) rad, the place of the rotary axes for each axis that is nearest to ``near`` (n, 2)."""
+        both = self.turns(axes)
+        free = np.hypot(axes[:, 0], axes[:, 1]) <= POLE
+        both[free, :, 1] = near[free, None, 1]
+        both[..., 1] += ROUND * np.rint((near[:, None, 1] - both[..., 1]) / ROUND)
+        far = np.abs(both - near[:, None]).max(axis=2)
+        return np.asarray(both[np.arange(len(axes)), np.argmin(far, axis=1)])
+
+    def _off(self, tips: F64, axes: F64, turns: F64, tolerance: float, swing: float,
+             gauge: float) -> NDArray[np.bool_]:
+        """(n - 1,) bool: blocks on which axis or tip leave their way by more than is allowed."""
+        out = np.zeros(len(tips) - 1, np.bool_)
+        swung = np.linalg.norm(np.diff(axes, axis=0), axis=1)
+        joints = None if self.tcp else self.joints(tips, turns, gauge)
+        for share in SHARES:
+            there = (1.0 - share) * turns[:-1] + share * turns[1:]
+            got, wanted = self.axes(there), _great(axes[:-1], axes[1:], share)
+            out |= (np.linalg.norm(got - wanted, axis=1) > swing) & (swung > LEAST_AXIS)
+            if joints is not None:
+                at = self.tips((1.0 - share) * joints[:-1] + share * joints[1:], there, gauge)
+                out |= np.linalg.norm(at - (1.0 - share) * tips[:-1] - share * tips[1:], axis=1) > tolerance
+        return out
+
+    def _least_turning(self, both: F64, start: F64 | None) -> F64:
+        """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all."""
+        rows = self._choices(both)
+        least = np.full(rows.shape[:2], math.inf)
+        came = np.zeros(rows.shape[:2], np.int64)
+        least[0] = np.abs(rows[0] - (np.zeros(2) if start is None else start)).max(axis=1)
+        least[0, np.isnan(least[0])] = math.inf
+        if not np.isfinite(least[0]).any():
+            self._refuse(both[0], 0)
+        wraps = self.limits is None
+        for k in range(1, len(rows)):
+            there = np.broadcast_to(rows[k][None], (rows.shape[1], rows.shape[1], 2)).copy()  # from, to
+            if wraps:  # as many whole turns as bring it near
+                there[..., 1] += ROUND * np.rint((rows[k - 1][:, None, 1] - there[..., 1]) / ROUND)
+            step = np.abs(there - rows[k - 1][:, None])
+            cost = np.where(step[..., 1] <= math.pi + POLE, step.max(axis=2), math.inf) + least[k - 1][:, None]
+            cost[np.isnan(cost)] = math.inf
+            came[k], least[k] = np.argmin(cost, axis=0), cost.min(axis=0)
+            if wraps:
+                rows[k] = there[came[k], np.arange(rows.shape[1])]
+            if not np.isfinite(least[k]).any():
+                self._refuse(both[k], k)
+        at = int(np.argmin(least[-1]))
+        out = np.empty((len(rows), 2))
+        for k in range(len(rows) - 1, -1, -1):
+            out[k] = rows[k, at]
+            at = int(came[k, at])
+        return out
+
+    def _choices(self, both: F64) -> F64:
+        """(n, m, 2) rad: the places to choose from, nan outside the limits; without limits the two alone."""
+        if self.limits is None:
+            return both.copy()
+        low, high = self.limits[1]
+        turns = np.arange(math.floor((low - math.pi) / ROUND), math.ceil((high + math.pi) / ROUND) + 1)
+        rows = np.repeat(both, len(turns), axis=1)
+        rows[..., 1] += np.tile(ROUND * turns, 2)
+        slack = 1e-9
+        beyond = ((rows < self.limits[:, 0] - slack) | (rows > self.limits[:, 1] + slack)).any(axis=2)
+        rows[beyond] = np.nan
+        rows[:, :, 1] = np.clip(rows[:, :, 1], low, high)
+        rows[:, :, 0] = np.clip(rows[:, :, 0], *self.limits[0])
+        return rows
+
+    def _check(self, turns: F64) -> None:
+        """Refuse places outside the limits."""
+        if self.limits is None:
+            return
+        out = (turns < self.limits[:, 0] - 1e-9) | (turns > self.limits[:, 1] + 1e-9)
+        if out.any():
+            k = int(np.flatnonzero(out.any(axis=1))[0])
+            self._refuse(np.array([turns[k], turns[k]]), k)
+
+    def _refuse(self, both: F64, place: int) -> None:
+        limits = [[-math.inf, math.inf]] * 2 if self.limits is None else self.limits
+        asked = " or ".join(" ".join(f"{letter}{math.degrees(v):.3f}" for letter, v in zip(self.letters, row.tolist(),
+                                                                                           strict=True))
+                            for row in both)
+        allowed = ", ".join(f"{letter} {math.degrees(lo):g} to {math.degrees(hi):g}"
+                            for letter, (lo, hi) in zip(self.letters, limits, strict=True))
+        raise OutputError(f"the rotary axes do not get along the path: at its point {place + 1} they would stand at "
+                          f"{asked} deg, allowed is {allowed}", code="rotary_limit", subjects=("machine.rotary_deg",),
+                          measured=np.degrees(both).tolist(), limit=np.degrees(limits).tolist(),
+                          remedy="end the pass before, or give it another tool axis")
+
+    def _points(self) -> F64:
+        if self.pivots is None:
+            raise OutputError(f"the pivots of {self.kind} are not known", code="no_pivots",
+                              subjects=("machine.pivots_mm",), remedy="give machine.pivots_mm")
+        return np.array(self.pivots)
+
+    def _tilt(self, turns: F64) -> F64:
+        return _turn_matrix(_LETTER[self.letters[0]], turns[:, 0])
+
+    def _swing(self, turns: F64, gauge: float) -> F64:
+        """(n, 3) mm: how far the head holds the tip off the joints."""
+        out = np.zeros((len(turns), 3))
+        if not self.tilts_head:
+            return out
+        tool = self._tilt(turns)[:, :, 2]
+        if self.turns_head:
+            tool = _applied(_turn_matrix(2, turns[:, 1]), tool)
+        out[:, 2] = 1.0
+        return np.asarray((self._points()[0, 2] + gauge) * (out - tool))
+
+    def _places(self, tips: F64, turns: F64) -> F64:
+        """(n, 3) mm: where in the machine the table holds places of the part."""
+        if self.turns_head:
+            return tips
+        pivots = self._points()
+        out = pivots[1] + _applied(_turn_matrix(2, turns[:, 1]), tips - pivots[1])
+        return out if self.tilts_head else pivots[0] + _applied(self._tilt(turns), out - pivots[0])
+
+
+def _turn_matrix(axis: int, angle: F64) -> F64:
+    """(n, 3, 3): right-handed turns about X, Y or Z (0, 1, 2) by (n,) rad."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.zeros((len(angle), 3, 3))
+    out[:, axis, axis] = 1.0
+    out[:, i, i] = out[:, j, j] = np.cos(angle)
+    out[:, j, i] = np.sin(angle)
+    out[:, i, j] = -out[:, j, i]
+    return out
+
+
+def _applied(matrices: F64, vectors: F64) -> F64:
+    return np.asarray(np.einsum("nij,nj->ni", matrices, vectors))
+
+
+def _great(a: F64, b: F64, share: float) -> F64:
+    """(n, 3) unit: a share of the way along great circles."""
+    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ni,ni->n", a, b))
+    small = angle < 1e-6
+    size = np.where(small, 1.0, np.sin(np.where(small, 1.0, angle)))
+    p = np.where(small, 1.0 - share, np.sin((1.0 - share) * angle) / size)
+    q = np.where(small, share, np.sin(share * angle) / size)
+    out = p[:, None] * a + q[:, None] * b
+    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+
+
+def _place(point: F64) -> str:
+    return "(" + ", ".join(f"{v:.3f}" for v in point) + ")"
+
+
+__all__ = ["RotaryMachine"]
