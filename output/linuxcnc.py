@@ -1,4 +1,4 @@
-"""LinuxCNC programs: three axes, millimetres, the tool tip in the work offset.
+"""LinuxCNC programs: three axes or five, millimetres, the tool tip in the work offset.
 
 The shape of a program: header comments for the machinist, one safe block, then
 per tool the change and per workingstep a comment and its moves. Nothing is
@@ -10,6 +10,13 @@ Path mode: G64 P, not G61. G61 brakes at every corner of a polyline with
 thousands of short segments and leaves dwell marks; G64 without P would round
 corners as far as the acceleration needs. ``P`` is the largest distance from
 the programmed path, and is kept at or below half the chordal tolerance.
+
+Rotary axes. A job of one clamping is one program: XYZ stay the tip in the setup
+frame, the control keeps it there (M428) from before the way down to the part
+until the tool is back above it, and rotary words stand in the rapids that turn.
+A control that cannot do that gets the linear joints instead, with the pivots
+they were computed from in the header; what turns in the cut is then timed
+block by block (G93). Tools are changed with both rotary axes at zero.
 """
 
 from __future__ import annotations
@@ -20,9 +27,11 @@ import textwrap
 import numpy as np
 
 from geometry.errors import OutputError
+from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from output.clamping import Leg, Section, home_of, sections
 from output.grid import GRID, I64, PER_MM, check_plan, grid_path, link, to_grid
-from output.model import Workplan
+from output.model import Clamping, Workplan
 from output.text import ascii_text, decimal, face_words, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
@@ -36,26 +45,35 @@ _ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;
 
 
 def write_linuxcnc(plan: Workplan) -> str:
-    """The program of one access direction for LinuxCNC.
+    """The program of one access direction, or of one clamping, for LinuxCNC.
 
-    plan : lengths in mm, setup frame; rapids move Z alone or XY alone
+    plan : lengths in mm, setup frame or those of its clamping; rapids move Z alone or XY alone there
     Returns the text, ASCII, lines of at most 100 characters, newline at the end; every point reads back
     within 0.00005 mm of the plan on each axis.
     Raises OutputError for an empty plan, an unknown work offset, a rapid that moves XY and Z together,
-    a path with a gap, a coordinate, feed or speed that is none.
+    a path with a gap, a coordinate, feed or speed that is none, rotary axes that cannot stand as a step wants.
     """
     check_plan(plan)
     if plan.work_offset not in _OFFSETS:
         raise OutputError(f"LinuxCNC has no work offset '{plan.work_offset}'", code="bad_work_offset",
                           subjects=(plan.work_offset,), remedy="use one of " + ", ".join(_OFFSETS))
     tolerance = path_tolerance(plan)
+    if plan.clamping is not None:
+        turning, walked = _Turning(plan, plan.clamping), sections(plan)
+        turning.lines += ["%", *_header(plan, tolerance)]
+        turning.run(walked, tolerance)
+        return "\n".join(turning.lines) + "\n"
     program = _Program(plan)
     program.lines += ["%", *_header(plan, tolerance)]
-    program.lines += [f"G21 G17 G90 G94 G40 G49 G80 G64 P{decimal(tolerance)}", plan.work_offset]
+    program.lines += [_safe_block(tolerance), plan.work_offset]
     for step in plan.steps:
         program.add_step(step)
     program.end()
     return "\n".join(program.lines) + "\n"
+
+
+def _safe_block(tolerance: float) -> str:
+    return f"G21 G17 G90 G94 G40 G49 G80 G64 P{decimal(tolerance)}"
 
 
 def path_tolerance(plan: Workplan) -> float:
@@ -66,6 +84,8 @@ def path_tolerance(plan: Workplan) -> float:
 
 class _Program:
     """Lines so far and the modal state they leave the control in."""
+
+    letters = "XYZ"
 
     def __init__(self, plan: Workplan) -> None:
         self.lines: list[str] = []
@@ -97,7 +117,9 @@ class _Program:
         if self.tool is not None:
             self._retract()
             self.lines += ["M5", "M9"]
-        tool = step.tool
+        self._put_in(step.tool)
+
+    def _put_in(self, tool: ToolBody) -> None:
         self.lines += _comment(tool_name(tool))
         self.lines += [f"T{tool.number} M6", f"G43 H{tool.number}"]
         self.tool, self.position, self.motion, self.feed, self.speed = tool, None, "", "", ""
@@ -123,12 +145,12 @@ class _Program:
             self.position = np.array([*start[:2], level])
         points = link(self.position, start, self.clearance)
         if len(points) > 1:
-            rows = _rows(points)
+            rows = _rows(points, self.letters)
             self.lines += [" ".join([*self._mode("G0"), rows[0]]), *rows[1:]]
         self.position = start
 
     def _rapid(self, target: list[int | None]) -> None:
-        words = [a + _number(v) for a, v in zip("XYZ", target, strict=True) if v is not None]
+        words = [a + _number(v) for a, v in zip(self.letters, target, strict=True) if v is not None]
         self.lines.append(" ".join([*self._mode("G0"), *words]))
 
     def _mode(self, word: str) -> list[str]:
@@ -141,22 +163,98 @@ class _Program:
         """One line a point, with the words that change; the first point is where the tool stands."""
         if len(points) < 2:
             return
-        rows = _rows(points)
+        rows = _rows(points, self.letters)
         if trajectory.motion is Motion.RAPID:
             rows[0] = " ".join([*self._mode("G0"), rows[0]])
         else:
-            feed = f"F{decimal(trajectory.feed, 1 if trajectory.feed >= 1.0 else 4)}"
-            tail = [] if feed == self.feed else [feed]
-            rows[0] = " ".join([*self._mode("G1"), rows[0], *tail])
-            self.feed = feed
+            rows[0] = " ".join([*self._mode("G1"), rows[0], *self._feed(trajectory.feed)])
+        self.lines += rows
+
+    def _feed(self, feed: float) -> list[str]:
+        word = f"F{decimal(feed, 1 if feed >= 1.0 else 4)}"
+        tail = [] if word == self.feed else [word]
+        self.feed = word
+        return tail
+
+
+class _Turning(_Program):
+    """A program whose columns are X, Y, Z and the two rotary axes, grid units, 0.0001 mm and 0.0001 deg."""
+
+    def __init__(self, plan: Workplan, clamping: Clamping) -> None:
+        super().__init__(plan)
+        self.plan, self.clamping, self.machine = plan, clamping, clamping.machine
+        self.letters = "XYZ" + self.machine.letters
+        self.home = home_of(clamping)
+
+    def run(self, walked: list[Section], tolerance: float) -> None:
+        """All lines after the header."""
+        tcp = ["M429"] if self.machine.tcp else []
+        zero = "G0 " + " ".join(f"{letter}0." for letter in self.machine.letters)
+        self.lines += [*_comment("The spindle goes up to machine zero before the rotary axes turn to 0"),
+                       _safe_block(tolerance), *tcp, self.plan.work_offset, "G53 G0 Z0.", zero]
+        for section in walked:
+            self._add(section)
+        self.lines += ["M5", "M9", "M30", "%"]
+
+    def _add(self, section: Section) -> None:
+        step = section.step
+        self.lines.append("")
+        if section.fresh:
+            if self.tool is not None:
+                self.lines += ["M5", "M9"]
+            self._put_in(step.tool)
+        self.lines += _comment(_step_words(step))
+        self._set_speed(step)
+        if section.fresh:
+            self._arrive()
+        for leg in (*section.before, *section.legs, *section.after):
+            self._walk(leg)
+        if section.after and self.machine.tcp:
+            self.lines.append("M429")
+            self.motion = ""
+
+    def _arrive(self) -> None:
+        """From wherever the control left the tool to above the part, both rotary axes at zero."""
+        at = to_grid(self.home)
+        self._rapid([None, None, int(at[2]), None, None])
+        self._rapid([int(at[0]), int(at[1]), None, None, None])
+        if self.machine.tcp:
+            self.lines.append("M428")
+            self.motion = ""
+        self.position = np.array([*at, 0, 0], dtype=np.int64)
+
+    def _walk(self, leg: Leg) -> None:
+        """The blocks of a leg; it begins where the tool stands."""
+        turns = to_grid(np.degrees(leg.turns))
+        gauge = self.clamping.gauges.get(self.tool.number, 0.0) if self.tool else 0.0
+        linear = leg.tips if self.machine.tcp else self.machine.joints(leg.tips, np.radians(turns * GRID), gauge)
+        points = np.column_stack([to_grid(linear), turns])
+        if self.position is not None:
+            points[0] = self.position
+        in_time = not self.machine.tcp and leg.motion is not Motion.RAPID and leg.is_turning
+        self.position = points[-1]
+        moved = (points[1:] != points[:-1]).any(axis=1)
+        rows = [row for row in _rows(points, self.letters) if row]
+        if not rows:
+            return
+        if in_time:
+            length = np.maximum(np.linalg.norm(np.diff(leg.tips, axis=0), axis=1)[moved], GRID)
+            per_minute = (leg.feed / length).tolist()
+            timed = [f"G1 {row} F{decimal(f, 4)}" for row, f in zip(rows, per_minute, strict=True)]
+            self.lines += ["G93", *timed, "G94"]
+            self.motion, self.feed = "", ""
+            return
+        rapid = leg.motion is Motion.RAPID
+        tail = [] if rapid else self._feed(leg.feed)
+        rows[0] = " ".join([*self._mode("G0" if rapid else "G1"), rows[0], *tail])
         self.lines += rows
 
 
-def _rows(points: I64) -> list[str]:
+def _rows(points: I64, letters: str) -> list[str]:
     """Coordinate words of points[1:], only those that differ from the point before."""
     moved = np.diff(points, axis=0) != 0
     columns = []
-    for axis, letter in enumerate("XYZ"):
+    for axis, letter in enumerate(letters):
         words = [""] * len(moved)
         where = np.flatnonzero(moved[:, axis])
         for i, value in zip(where.tolist(), points[1:, axis][where].tolist(), strict=True):
@@ -184,15 +282,14 @@ def _header(plan: Workplan, tolerance: float) -> list[str]:
     low, high = plan.stock.lower, plan.stock.upper
     box = ", ".join(f"{a} {decimal(low[i], 3)} to {decimal(high[i], 3)}" for i, a in enumerate("XYZ"))
     texts = [
-        f"Program {plan.name}, zonemill {plan.version}, LinuxCNC, 3 axes",
+        f"Program {plan.name}, zonemill {plan.version}, LinuxCNC, {_axes_words(plan)}",
         f"Part sha256 {plan.part_sha256[:16]}, setup sha256 {plan.setup_sha256[:16]}",
         *(f"Label {key}: {value}" for key, value in sorted(plan.labels.items())),
         f"Material {plan.material}",
         f"Units mm and mm/min. Work offset {plan.work_offset}. Program zero is the origin of the setup frame",
-        "XYZ is the tool tip: set every tool length in the tool table, G43 H is the tool number",
+        f"XYZ is the tool tip{_only_at_zero(plan)}: set every tool length in the tool table, G43 H is the tool number",
         f"Stock box {box}",
-        f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free",
-        _lowest(plan),
+        *_heights(plan),
         f"Path mode G64 P{decimal(tolerance)}: the control may leave the written path by that much, in mm",
         "Tools, all lengths in mm from the tip:",
         *(tool_name(t) for t in _tools_in_use(plan)),
@@ -201,12 +298,47 @@ def _header(plan: Workplan, tolerance: float) -> list[str]:
     return [line for text in texts for line in _comment(text)]
 
 
+def _axes_words(plan: Workplan) -> str:
+    return "3 axes" if plan.clamping is None else f"5 axes {plan.clamping.machine.kind}"
+
+
+def _only_at_zero(plan: Workplan) -> str:
+    return "" if plan.clamping is None or plan.clamping.machine.tcp else " at zero of the rotary axes only"
+
+
+def _heights(plan: Workplan) -> list[str]:
+    """Where rapids are free, how deep the tip goes, and what a machine with rotary axes has to know."""
+    c = plan.clamping
+    if c is None:
+        return [f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free", _lowest(plan)]
+    x, y, z = c.centre.tolist()
+    ball = f"({decimal(x, 3)}, {decimal(y, 3)}, {decimal(z, 3)}), radius {decimal(c.radius, 3)}"
+    out = [f"Part, stock and fixtures lie in the ball round {ball}: the tool turns outside it", _lowest(plan),
+           *(f"Access {name}, tool axis " + " ".join(decimal(v, 6) for v in f.rotation[2].tolist()) + ": "
+             + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
+                        zip(c.machine.letters, c.machine.follow(f.rotation[2:], np.zeros(2))[0], strict=True))
+             + " or whole turns of C from there" for name, f in c.frames.items())]
+    if c.machine.tcp:
+        return [*out, "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"]
+    pivots = "; ".join(" ".join(decimal(v, 4) for v in p) for p in c.machine.pivots or ())
+    long = ", ".join(f"T{n} {decimal(g, 4)}" for n, g in sorted(c.gauges.items()))
+    head = f" and gauge lengths {long}" if c.machine.tilts_head else ""
+    return [*out, "XYZ are linear joints where rotary axes stand off 0",
+            f"Made only for pivots {pivots} mm{head}"]
+
+
 def _lowest(plan: Workplan) -> str:
     """How deep the tip goes, for whoever sets the part on a table."""
-    lowest = min(float(t.points[:, 2].min()) for s in plan.steps for t in s.trajectories)
+    lowest = min(float((t.points @ _into_setup(plan, s.access))[:, 2].min()) for s in plan.steps
+                 for t in s.trajectories)
     below = float(plan.stock.lower[2]) - lowest
     more = f", {decimal(below, 3)} below the stock box: nothing may stand there" if below > LEAST_BELOW else ""
     return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
+
+
+def _into_setup(plan: Workplan, access: str) -> F64:
+    """(3, 3): points (n, 3) of the frame of an access, times this, are in the setup frame."""
+    return np.eye(3) if plan.clamping is None else plan.clamping.frames[access].rotation
 
 
 def _tools_in_use(plan: Workplan) -> list[ToolBody]:

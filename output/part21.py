@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 from geometry.errors import OutputError
+from geometry.mesh import F64
 from output.grid import I64, PER_MM
 
 _REFS_A_LINE = 12
@@ -50,6 +51,17 @@ class Part21:
         ]
         self._count += len(rows)
         return first
+
+    def vectors(self, vectors: F64) -> list[int]:
+        """Numbers of CARTESIAN_POINTs that hold unit vectors (n, 3); what repeats the one before is written once."""
+        out: list[int] = []
+        before = ""
+        for row in (vectors + 0.0).tolist():
+            words = reals(row, 9)
+            if words != before:
+                number, before = self.add(f"CARTESIAN_POINT('',{words})"), words
+            out.append(number)
+        return out
 
     def text(self, *, description: Sequence[str], name: str, schema: Sequence[str], system: str) -> str:
         """The whole exchange file, ASCII, newline at the end."""

@@ -13,11 +13,12 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.errors import OutputError
+from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from output.grid import I64, check_plan, grid_path, link, to_grid
+from output.grid import check_plan
 from output.model import Workplan
 from output.part21 import Part21, quoted, real, reals, refs
-from output.stepnc_words import header_words, operation_words, region_name, setup_words, stock_box
+from output.stepnc_words import Curve, header_words, operation_words, region_name, setup_words, stock_box, ways
 from output.text import decimal, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
@@ -49,7 +50,6 @@ class _Aim:
         self.symbols: dict[str, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
         self.tools: dict[int, tuple[int, ToolBody, list[int]]] = {}
-        self.clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
 
     def text(self) -> str:
         plan = self.plan
@@ -160,18 +160,11 @@ class _Aim:
         self.rapid = self.file.add(f"MACHINING_TOOLPATH_SPEED_PROFILE_REPRESENTATION('',(#{item}),#{self.plain})")
 
     def _steps(self) -> None:
-        here, tool = None, None
-        for place, step in enumerate(self.plan.steps, start=1):
-            path = grid_path(step)
-            start = path[0][1][0]
-            if here is not None and tool == step.tool and (here != start).any():
-                rapid = Trajectory(Motion.RAPID, step.trajectories[0].points, 0.0)
-                path.insert(0, (rapid, link(here, start, self.clearance)))
-            executable = self._workingstep(step, path)
+        for place, way in enumerate(ways(self.plan), start=1):
+            executable = self._workingstep(way.step, [*way.before, *way.path, *way.after])
             self.file.add(f"MACHINING_PROCESS_SEQUENCE_RELATIONSHIP('','',#{self.workplan},#{executable},{place}.)")
-            here, tool = path[-1][1][-1], step.tool
 
-    def _workingstep(self, step: Workingstep, path: list[tuple[Trajectory, I64]]) -> int:
+    def _workingstep(self, step: Workingstep, path: list[Curve]) -> int:
         add = self.file.add
         workingstep = add(f"MACHINING_WORKINGSTEP({quoted(step_title(step))},'machining','','')")
         operation = add(f"FREEFORM_MILLING_OPERATION({quoted(operation_words(step))},"
@@ -199,16 +192,17 @@ class _Aim:
         placed = add(f"SHAPE_REPRESENTATION_WITH_PARAMETERS('',(#{self.zero}),#{self.space})")
         add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{placed})")
 
-    def _toolpaths(self, step: Workingstep, operation: int, path: list[tuple[Trajectory, I64]]) -> None:
-        first = at = self.file.points(np.concatenate([path[0][1][:1], *(p[1:] for _, p in path)]))
+    def _toolpaths(self, step: Workingstep, operation: int, path: list[Curve]) -> None:
+        first = at = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
         place = 0
-        for trajectory, points in path:
-            if len(points) < 2:
+        for curve in path:
+            trajectory, count = curve.trajectory, len(curve.points)
+            if count < 2:
                 continue
             place += 1
             toolpath = self._toolpath(f"{step.id} {trajectory.motion.value} {place}", trajectory,
-                                      range(at, at + len(points)))
-            at += len(points) - 1
+                                      range(at, at + count), curve.axes)
+            at += count - 1
             self.file.add(f"MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP('','',#{operation},#{toolpath},{place}.)")
             if trajectory.motion is not Motion.RAPID and trajectory.feed != step.feed:
                 technology = self._technology(step.spindle_rpm, trajectory.feed)
@@ -216,13 +210,16 @@ class _Aim:
         if at == first:
             raise OutputError(f"{step.id} does not move", code="empty_step", subjects=(step.id,))
 
-    def _toolpath(self, name: str, trajectory: Trajectory, points: range) -> int:
+    def _toolpath(self, name: str, trajectory: Trajectory, points: range, axes: F64 | None) -> int:
         add = self.file.add
         toolpath = add(f"MACHINING_TOOLPATH({quoted(name)},{_CLT},'','')")
         self._property("priority", _CLT, toolpath, self._symbol("required"))
         self._property("trajectory type", _CLT, toolpath, self._symbol(_TYPE[trajectory.motion]))
         line = add(f"POLYLINE('',{refs(points)})")
         self._property("basic curve", _CLT, toolpath, add(f"REPRESENTATION('',(#{line}),#{self.space})"))
+        if axes is not None:
+            leaning = add(f"POLYLINE('',{refs(self.file.vectors(axes))})")
+            self._property("tool axis", _CLT, toolpath, add(f"REPRESENTATION('',(#{leaning}),#{self.space})"))
         if trajectory.motion is Motion.RAPID:
             self._property("speed profile", _CLT, toolpath, self.rapid)
         return toolpath

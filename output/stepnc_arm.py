@@ -12,14 +12,17 @@ the right form stands here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from geometry.errors import OutputError
 from geometry.toolbody import ToolBody
-from output.grid import GRID, I64, check_plan, grid_path, link, to_grid
+from output.grid import GRID, check_plan, to_grid
 from output.model import Workplan
 from output.part21 import Part21, quoted, real, reals, refs
 from output.stepnc_words import (
+    Curve,
     header_words,
     operation_words,
     pass_plane_normal,
@@ -28,6 +31,7 @@ from output.stepnc_words import (
     setup_words,
     stock_box,
     to_and_fro,
+    ways,
 )
 from output.text import step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -105,31 +109,44 @@ class _Arm:
 
     def _elements(self) -> list[int]:
         """Executables of the workplan: a rapid before every step that the tool does not already stand at."""
-        elements, here, tool = [], None, None
-        for step in self.plan.steps:
-            path = grid_path(step)
-            start = path[0][1][0]
-            if here is None or step.tool != tool:
-                elements.append(self._rapid(f"rapid to {step.id}", None))
-            elif (here != start).any():
-                elements.append(self._rapid(f"rapid to {step.id}", link(here, start, self.clearance)))
-            elements.append(self._workingstep(step, path))
-            here, tool = path[-1][1][-1], step.tool
-        if here is not None and here[2] < self.clearance:
+        elements, here = [], None
+        for way in ways(self.plan):
+            name = f"rapid to {way.step.id}"
+            if way.fresh:
+                elements.append(self._rapid(f"rapid to above all for {way.step.id}" if way.before else name, ()))
+            if way.before:
+                elements.append(self._rapid(name, way.before))
+            elements.append(self._workingstep(way.step, way.path))
+            here = way.path[-1].points[-1]
+            if way.after:
+                elements.append(self._rapid(f"away from {way.step.id}", way.after))
+        if self.plan.clamping is None and here is not None and here[2] < self.clearance:
             up = np.array([here, [*here[:2], self.clearance]], dtype=np.int64)
-            elements.append(self._rapid("retract to the clearance plane", up))
+            rapid = Curve(Trajectory(Motion.RAPID, np.asarray(up * GRID, np.float64), 0.0), up)
+            elements.append(self._rapid("retract to the clearance plane", (rapid,)))
         return elements
 
-    def _rapid(self, name: str, points: I64 | None) -> int:
-        if points is None:
+    def _rapid(self, name: str, path: Sequence[Curve]) -> int:
+        """A rapid; one without a path comes from wherever the control left the tool."""
+        if not path:
             return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},$,$)")
-        first = self.file.points(points)
-        line = self.file.add(f"POLYLINE('',{refs(range(first, first + len(points)))})")
-        path = self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,.CONNECT.,$,$,$,$,#{line},$,$)")
-        paths = self.file.add(f"TOOLPATH_LIST((#{path}))")
+        numbers = []
+        for curve in path:
+            first = self.file.points(curve.points)
+            line = self.file.add(f"POLYLINE('',{refs(range(first, first + len(curve.points)))})")
+            numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,.CONNECT.,$,$,$,$,#{line},"
+                                         f"{self._leaning(curve)},$)"))
+        paths = self.file.add(f"TOOLPATH_LIST({refs(numbers)})")
         return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},#{paths},$)")
 
-    def _workingstep(self, step: Workingstep, path: list[tuple[Trajectory, I64]]) -> int:
+    def _leaning(self, curve: Curve) -> str:
+        """Reference to the tool axes of a curve, as many as it has points; '$' where they are Z."""
+        if curve.axes is None:
+            return "$"
+        line = f"POLYLINE('',{refs(self.file.vectors(curve.axes))})"
+        return f"#{self.file.add(line)}"
+
+    def _workingstep(self, step: Workingstep, path: Sequence[Curve]) -> int:
         add, title = self.file.add, step_title(step)
         operation = self.file.reserve()
         feature = self._region(step, operation)
@@ -143,30 +160,36 @@ class _Arm:
 
     def _region(self, step: Workingstep, operation: int) -> int:
         """The area in plan and its depth; a flat one gets the depth of the grid, since the schema wants it positive."""
-        outline = region_outline(step)
+        clamping = self.plan.clamping
+        rotation = None if clamping is None else clamping.frames[step.access].rotation
+        outline = region_outline(step, rotation)
         first = self.file.points(outline[:-1])
         loop = [*range(first, first + len(outline) - 1), first]
         curve = self.file.add(f"POLYLINE({quoted('outline of ' + step.id)},{refs(loop)})")
         width = real(max(step.chordal_tolerance, GRID))
         tolerance = self.file.add(f"PLUS_MINUS_VALUE({width},{width},4)")
         depth = self.file.add(f"TOLERANCED_LENGTH_MEASURE({real(max(step.top - step.bottom, GRID))},#{tolerance})")
+        down = self.down
+        if rotation is not None and rotation[2, 2] < 1.0:
+            down = self.file.add(f"DIRECTION('projection',{reals((-rotation[2]).tolist(), 9)})")
         return self.file.add(f"REGION_PROJECTION({quoted(region_name(step))},#{self.workpiece},(#{operation}),$,"
-                             f"#{curve},#{self.down},#{depth})")
+                             f"#{curve},#{down},#{depth})")
 
-    def _toolpaths(self, step: Workingstep, path: list[tuple[Trajectory, I64]]) -> int:
-        first = self.file.points(np.concatenate([path[0][1][:1], *(p[1:] for _, p in path)]))
+    def _toolpaths(self, step: Workingstep, path: Sequence[Curve]) -> int:
+        first = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
         at, numbers = first, []
-        for trajectory, points in path:
-            if len(points) < 2:
+        for curve in path:
+            trajectory, count = curve.trajectory, len(curve.points)
+            if count < 2:
                 continue
-            line = self.file.add(f"POLYLINE('',{refs(range(at, at + len(points)))})")
-            at += len(points) - 1
+            line = self.file.add(f"POLYLINE('',{refs(range(at, at + count))})")
+            at += count - 1
             rapid = trajectory.motion is Motion.RAPID
             speed = "SPEED_NAME(.RAPID.)" if rapid else "$"
             own = "$" if rapid or trajectory.feed == step.feed else \
                 f"#{self._technology(step.spindle_rpm, trajectory.feed)}"
             numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,{_TYPE[trajectory.motion]},{speed},{own},"
-                                         f"$,$,#{line},$,$)"))
+                                         f"$,$,#{line},{self._leaning(curve)},$)"))
         if not numbers:
             raise OutputError(f"{step.id} does not move", code="empty_step", subjects=(step.id,))
         return self.file.add(f"TOOLPATH_LIST({refs(numbers)})")

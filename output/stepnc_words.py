@@ -2,13 +2,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from geometry.errors import OutputError
-from output.grid import GRID, I64, to_grid
+from geometry.mesh import F64
+from output.clamping import Leg, sections
+from output.grid import GRID, I64, grid_path, link, to_grid
 from output.model import Workplan
 from output.text import face_words
-from toolpath.motion import Motion, Workingstep
+from toolpath.motion import Motion, Trajectory, Workingstep
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A trajectory as it is written: (m, 3) int64 grid points in the setup frame, m is 1 where it is shorter than the
+    grid; axes (m, 3) float64, unit, None where they are Z."""
+
+    trajectory: Trajectory
+    points: I64
+    axes: F64 | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """What is written of one step: the rapids that lead to it, itself, and the rapids to where its tool is put away.
+
+    fresh : the tool is put in before it, and comes to the first point from where the control left it
+    """
+
+    step: Workingstep
+    fresh: bool
+    before: tuple[Curve, ...]
+    path: tuple[Curve, ...]
+    after: tuple[Curve, ...]
+
+
+def ways(plan: Workplan) -> list[Way]:
+    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``sections``."""
+    if plan.clamping is not None:
+        return [Way(s.step, s.fresh, _curves(s.before), _curves(s.legs), _curves(s.after)) for s in sections(plan)]
+    out: list[Way] = []
+    clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
+    for k, step in enumerate(plan.steps):
+        path = tuple(Curve(*pair) for pair in grid_path(step))
+        fresh = k == 0 or plan.steps[k - 1].tool != step.tool
+        before: tuple[Curve, ...] = ()
+        if not fresh:
+            points = link(out[-1].path[-1].points[-1], path[0].points[0], clearance)
+            if len(points) > 1:
+                before = (Curve(Trajectory(Motion.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
+        out.append(Way(step, fresh, before, path, ()))
+    return out
+
+
+def _curves(legs: Sequence[Leg]) -> tuple[Curve, ...]:
+    """Legs on the grid, each from the point where the one before ended."""
+    out: list[Curve] = []
+    for leg in legs:
+        points, axes = leg.on_grid()
+        if out:
+            points[0] = out[-1].points[-1]
+        out.append(Curve(Trajectory(leg.motion, leg.tips, leg.feed), points, axes))
+    return tuple(out)
 
 
 def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
@@ -34,13 +92,17 @@ def to_and_fro(step: Workingstep) -> bool:
     return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 
 
-def region_outline(step: Workingstep) -> I64:
-    """The outline of a step at its top, closed, at least three different points: (k, 3) int64 grid points."""
+def region_outline(step: Workingstep, rotation: F64 | None = None) -> I64:
+    """The outline of a step at its top, closed, at least three different points: (k, 3) int64 grid points.
+
+    rotation : (3, 3), from the setup frame into that of the step; None: they are the same
+    """
     outline = np.asarray(step.outline, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise OutputError(f"{step.id} has no outline", code="bad_outline", subjects=(step.id,),
                           measured=list(outline.shape))
-    points = to_grid(np.column_stack([outline, np.full(len(outline), step.top)]))
+    places = np.column_stack([outline, np.full(len(outline), step.top)])
+    points = to_grid(places if rotation is None else places @ rotation)
     return points if (points[0] == points[-1]).all() else np.concatenate([points, points[:1]])
 
 

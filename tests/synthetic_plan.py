@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from geometry.toolbody import HolderSegment, ToolBody
-from output.model import StockBox, Workplan
+from output.kinematics import RotaryMachine
+from output.model import Clamping, Frame, StockBox, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
+from zones.view import access_rotation
 
 HOLDER = (HolderSegment(20.0, 20.0, 30.0),)
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
@@ -93,3 +97,27 @@ def long_plan(points: int, rows: int = 300) -> Workplan:
         out.append(Trajectory(Motion.CUT, np.ascontiguousarray(row), 600.0))
         end = row[-1]
     return plan(step(1, BALL, "zigzag", trajectories=tuple(out)))
+
+
+def leaning(x: float, z: float, size: float = 0.2) -> tuple[Trajectory, ...]:
+    """``passes`` whose first cut swings the axis to and fro, by ``size`` in its X and Y, upright at both ends."""
+    out = list(passes(x, z))
+    t = np.linspace(0.0, 1.0, len(out[2].points))
+    axes = np.column_stack([size * np.sin(np.pi * t), 0.7 * size * np.sin(2 * np.pi * t), np.ones_like(t)])
+    out[2] = Trajectory(Motion.CUT, out[2].points, 600.0, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    return tuple(out)
+
+
+def clamped(kind: str = "table-table-AC", tcp: bool = True, swings: bool = True) -> Workplan:
+    """A job of one clamping: upright, leaning two ways, one pass with an axis that swings, two tools."""
+    frames = {"A1": Frame(np.eye(3), CLEAR)}
+    for name, direction in (("I1", (0.5, -0.3, 0.9)), ("I2", (-0.8, 0.2, 0.1))):
+        frames[name] = Frame(access_rotation(direction), 40.0)
+    pivots = ((5.0, 0.0, -80.0), (7.0, 3.0, -20.0)) if kind.startswith("table") else ((0.0, 0.0, 150.0), (20.0, -7, 0))
+    machine = RotaryMachine(kind, pivots[:1] if kind.startswith("head-head") else pivots, None, tcp)
+    steps = [replace(step(1, FLAT, "layers", zone=None, faces=(), x=2.0, z=8.0), access="A1"),
+             replace(step(2, FLAT, "floor", zone="Z1", faces=(4,)), access="I1"),
+             replace(step(3, BALL, "zlevel"), access="I1"), replace(step(4, BALL, "zigzag", x=11.0), access="I2"),
+             replace(step(5, BALL, "zlevel", trajectories=leaning(4.0, 5.0) if swings else None), access="I1")]
+    clamping = Clamping(machine, frames, np.array([15.0, 10.0, 7.5]), 60.0, {1: 75.0, 2: 70.0})
+    return plan(*steps, clamping=clamping, labels={"order": "4711"}, comments=())

@@ -1,6 +1,6 @@
 """What the planner hands on: trajectories of the tool tip and the workingsteps made of them.
 
-Plain values, tool tip, setup frame, mm. Rapids move Z alone, or XY alone at the clearance height; the planner
+Plain values, tool tip, frame of the access, mm. Rapids move Z alone, or XY alone at the clearance height; the planner
 guarantees it and nothing downstream reorders.
 """
 
@@ -34,11 +34,13 @@ class Trajectory:
     motion : what it is for; RAPID is a G0, everything else a G1 at ``feed``
     points : (n, 3) float64, mm, n >= 2; the first point equals the last of the trajectory before it
     feed   : mm/min; ignored for a rapid
+    axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points all the way
     """
 
     motion: Motion
     points: F64
     feed: float
+    axes: F64 | None = None
 
     @property
     def length(self) -> float:
@@ -58,6 +60,7 @@ class Workingstep:
     strategy  : 'layers', 'zlevel', 'floor', 'zigzag', 'one_way', 'spiral', 'isoparametric'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
+    access    : id of the access in whose frame all this is; '' where the plan has one frame
     """
 
     id: str
@@ -77,6 +80,7 @@ class Workingstep:
     top: float
     bottom: float
     climb: bool = True
+    access: str = ""
 
     @property
     def seconds(self) -> float:

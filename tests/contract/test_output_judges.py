@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from output.linuxcnc import write_linuxcnc
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
-from tests.synthetic_plan import BALL, long_plan, plan, step, tiny
+from tests.synthetic_plan import BALL, clamped, long_plan, plan, step, tiny
 from toolpath.motion import Motion
 from verify.reader import read_program
 
@@ -22,6 +22,7 @@ CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
 JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40),
         "along borders": lambda: plan(step(1, BALL, "isoparametric"))}
+TURNING = {"one clamping": clamped, "a head": lambda: clamped("head-head-AC", tcp=False)}
 
 
 def flat_step():
@@ -33,7 +34,7 @@ def flat_step():
 
 
 @pytest.mark.skipif(not CHECK.exists(), reason="the schema checker ../shared/stepnc/p21check.py is not there")
-@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
+@pytest.mark.parametrize("job", (JOBS | TURNING).values(), ids=JOBS | TURNING)
 @pytest.mark.parametrize(("write", "schema"), [(write_stepnc_arm, "iso14649_milling.exp"),
                                                (write_stepnc_aim, "ap238e3_aim_lf.exp")], ids=["arm", "aim"])
 def test_schema_accepts(write, schema, job, tmp_path):
@@ -61,14 +62,14 @@ def test_the_judge_is_awake(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not GCODE.exists(), reason="the interpreter script ../shared/tools/gcode_check.sh is not there")
-@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
+@pytest.mark.parametrize("job", (JOBS | TURNING).values(), ids=JOBS | TURNING)
 def test_linuxcnc_accepts(job, tmp_path):
     """Slow because the script installs LinuxCNC where it is absent."""
     if not shutil.which("rs274") and os.geteuid() != 0:
         pytest.skip("LinuxCNC's rs274 is not installed and only root can install it")
     file = tmp_path / "program.ngc"
     file.write_text(write_linuxcnc(job()))
-    done = subprocess.run(["bash", str(GCODE), str(file)], capture_output=True, text=True, timeout=600)
+    done = subprocess.run(["bash", str(GCODE), "--tcp", str(file)], capture_output=True, text=True, timeout=600)
     if done.returncode == 2:
         pytest.skip("LinuxCNC's interpreter could not be run here: " + done.stderr.strip()[-200:])
     assert done.returncode == 0, done.stdout

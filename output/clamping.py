@@ -1,0 +1,187 @@
+"""The steps of one clamping one after the other in the setup frame, with safe ways from one tool axis to the next.
+
+Part, stock and fixtures lie in a ball. A tool whose tip stands on the plane that touches the ball square to the tool
+axis is wholly outside it. So it goes up along its axis to that plane, across to where the plane touches, and turns
+there: while the axis swings the tip stays on the ball, below the axis, so that all of the tool stays outside. Tools
+are changed with both rotary axes at zero, above the ball.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.errors import OutputError
+from geometry.mesh import F64
+from output.grid import GRID, I64, grid_path, to_grid
+from output.grid import link as grid_link
+from output.kinematics import RotaryMachine
+from output.model import Clamping, Frame, Workplan
+from toolpath.motion import Motion, Workingstep
+
+TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a turn
+SPARE = 0.5  # mm, outside the ball, for what a turn of joints leaves its chords by
+SWING = 1e-4  # rad, what a tool axis may leave the great circle between two points of a path by
+AT_REST = 1e-9  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A polyline of the tip with the tool axis all along.
+
+    motion : RAPID is a G0, everything else a G1 at ``feed``
+    tips   : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, tip to spindle
+    turns  : (n, 2) float64, rad, where the rotary axes stand
+    feed   : mm/min of the tip
+    """
+
+    motion: Motion
+    tips: F64
+    axes: F64
+    turns: F64
+    feed: float
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether a rotary axis moves."""
+        return bool(np.ptp(self.turns, axis=0).max() > AT_REST)
+
+    def on_grid(self) -> tuple[I64, F64]:
+        """Tips (m, 3) on the grid, and axes (m, 3), without points that repeat the one before."""
+        points = to_grid(self.tips)
+        keep = np.ones(len(points), np.bool_)
+        keep[1:] = (points[1:] != points[:-1]).any(axis=1) | (np.abs(np.diff(self.axes, axis=0)).max(axis=1) > AT_REST)
+        return points[keep], self.axes[keep]
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A step with the ways to it and, before a tool is put away, from it.
+
+    fresh  : its tool is put in before it; the way to it begins at ``home`` then
+    before, legs, after : the way to its start, the step itself, back to ``home``
+    """
+
+    step: Workingstep
+    fresh: bool
+    before: tuple[Leg, ...]
+    legs: tuple[Leg, ...]
+    after: tuple[Leg, ...]
+
+
+def home_of(clamping: Clamping) -> F64:
+    """(3,) float64, mm, setup frame: where the tip stands, rotary axes at zero, before and after a tool change."""
+    return np.asarray(clamping.centre + [0.0, 0.0, _outside(clamping)])
+
+
+def sections(plan: Workplan) -> list[Section]:
+    """All steps of a clamping with the ways between them.
+
+    Raises
+    ------
+    OutputError
+        As ``output.grid.grid_path``; no_clamping: the plan has none; no_frame: a step is in the frame of an access
+        that the clamping does not have; rotary_limit: the rotary axes cannot stand as a step wants.
+    """
+    if plan.clamping is None:
+        raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
+    walk, out, steps = _Walk(plan.clamping), [], plan.steps
+    for k, step in enumerate(steps):
+        fresh = k == 0 or step.tool != steps[k - 1].tool
+        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool
+        grid_path(step)
+        before = walk.enter(step, fresh)
+        legs = walk.through(step)
+        out.append(Section(step, fresh, tuple(before), tuple(legs), tuple(walk.home()) if last else ()))
+    return out
+
+
+class _Walk:
+    """Where the tool stands: the tip in the setup frame, the rotary axes, and the frame of the last step."""
+
+    def __init__(self, clamping: Clamping) -> None:
+        self.clamping, self.machine = clamping, clamping.machine
+        self.frame: Frame | None = None
+        self.tip, self.turn = home_of(clamping), np.zeros(2)
+
+    def enter(self, step: Workingstep, fresh: bool) -> list[Leg]:
+        """The way to the first point of a step."""
+        legs: list[Leg] = []
+        frame = self.clamping.frames.get(step.access)
+        if frame is None:
+            raise OutputError(f"{step.id} is planned along access '{step.access}', which its clamping does not have",
+                              code="no_frame", subjects=(step.id,), limit=sorted(self.clamping.frames))
+        if fresh:
+            self.frame, self.tip, self.turn = None, home_of(self.clamping), np.zeros(2)
+        first = step.trajectories[0]
+        axes = (first.axes if first.axes is not None else np.array([[0.0, 0.0, 1.0]])) @ frame.rotation
+        wanted = self.machine.follow(axes[:1], self.turn)[0]
+        if self.frame is not frame or np.abs(wanted - self.turn).max() > AT_REST:
+            legs += [*self._away(), *self._turned(wanted)]
+            self.frame = frame
+        start = first.points[0]
+        here, clear = frame.rotation @ self.tip, int(to_grid(np.array([frame.clearance]))[0])
+        path = grid_link(to_grid(here), to_grid(start), clear)
+        if len(path) > 1:
+            points = path * GRID
+            points[0], points[-1] = here, start
+            legs.append(self._straight(Motion.RAPID, points @ frame.rotation, 0.0))
+        self.tip = start @ frame.rotation
+        return legs
+
+    def through(self, step: Workingstep) -> list[Leg]:
+        """The trajectories of a step in the setup frame."""
+        legs, frame = [], self.clamping.frames[step.access]
+        gauge = self.clamping.gauges.get(step.tool.number, 0.0)
+        for t in step.trajectories:
+            tips = t.points @ frame.rotation
+            if t.axes is None:
+                legs.append(self._straight(t.motion, tips, t.feed))
+            else:
+                tips, turns = self.machine.course(tips, t.axes @ frame.rotation, 0.5 * step.chordal_tolerance, SWING,
+                                                  gauge, self.turn)
+                legs.append(Leg(t.motion, tips, self.machine.axes(turns), turns, t.feed))
+                self.turn = turns[-1]
+            self.tip = tips[-1]
+        return legs
+
+    def home(self) -> list[Leg]:
+        """Back to where tools are changed."""
+        return [*self._away(), *self._turned(np.zeros(2))]
+
+    def _straight(self, motion: Motion, tips: F64, feed: float) -> Leg:
+        turns = np.tile(self.turn, (len(tips), 1))
+        return Leg(motion, tips, self.machine.axes(turns), turns, feed)
+
+    def _away(self) -> list[Leg]:
+        """Up along the tool axis to the plane that touches the ball, and across to where it does."""
+        axis = self.machine.axes(self.turn[None])[0]
+        goal = self.clamping.centre + _outside(self.clamping) * axis
+        up = max(float((goal - self.tip) @ axis), 0.0)
+        path = np.array([self.tip, self.tip + up * axis, goal])
+        self.tip = goal
+        far = np.linalg.norm(np.diff(path, axis=0), axis=1) > GRID
+        keep = np.array([True, far[0], far[1]])
+        return [self._straight(Motion.RAPID, path[keep], 0.0)] if keep[1:].any() else []
+
+    def _turned(self, wanted: F64) -> list[Leg]:
+        """The turn from where the axes stand to where they shall, the tip on the ball."""
+        size = float(np.abs(wanted - self.turn).max())
+        if size <= AT_REST:
+            return []
+        share = np.linspace(0.0, 1.0, math.ceil(size / TURN_STEP) + 1)[:, None]
+        turns = (1.0 - share) * self.turn + share * wanted
+        axes = self.machine.axes(turns)
+        tips = self.clamping.centre + _outside(self.clamping) * axes
+        self.tip, self.turn = tips[-1], turns[-1]
+        return [Leg(Motion.RAPID, tips, axes, turns, 0.0)]
+
+
+def _outside(clamping: Clamping) -> float:
+    """mm from the centre, where chords of a turn stay outside the ball."""
+    return clamping.radius / math.cos(TURN_STEP) + SPARE
+
+
+__all__ = ["Leg", "RotaryMachine", "Section", "home_of", "sections"]

@@ -1,0 +1,119 @@
+"""Programs of one clamping, read back by the witness: tips, tool axes, ways from one axis to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geometry.errors import OutputError
+from output.clamping import home_of, sections
+from output.linuxcnc import write_linuxcnc
+from tests.synthetic_plan import clamped
+from toolpath.motion import Motion
+from verify.cycles import FEED
+from verify.kinematics import KINDS, Kinematics
+from verify.reader import read_program
+
+
+def read(plan):
+    machine = plan.clamping.machine
+    return read_program(write_linuxcnc(plan), kinematics=Kinematics(machine.kind, machine.pivots),
+                        gauge_length=plan.clamping.gauges)
+
+
+def wanted(plan):
+    """Tips (n, 3) and axes (n, 3) of all feed moves of a plan in the setup frame, in order, with their starts."""
+    tips, axes = [], []
+    for step in plan.steps:
+        turn = plan.clamping.frames[step.access].rotation
+        for t in step.trajectories:
+            if t.motion is not Motion.RAPID:
+                a = np.tile([0.0, 0.0, 1.0], (len(t.points), 1)) if t.axes is None else t.axes
+                tips.append(t.points @ turn)
+                axes.append(a @ turn)
+    return np.vstack(tips), np.vstack(axes)
+
+
+@pytest.mark.parametrize("tcp", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_witness_reads_the_planned_tips_and_axes(kind, tcp):
+    plan = clamped(kind, tcp)
+    p = read(plan)
+    cuts = np.flatnonzero(~np.isnan(p.feed))
+    tips, axes = wanted(plan)
+    got_tips = np.vstack([p.end[cuts], p.start[cuts]])
+    got_axes = np.vstack([p.poses.end_axis[cuts], p.poses.start_axis[cuts]])
+    far = np.linalg.norm(got_tips[:, None] - tips[None], axis=2)  # every planned point is there, and nothing far off
+    assert far.min(axis=0).max() < 3e-4
+    near = np.argmin(far, axis=0)
+    assert np.linalg.norm(got_axes[near] - axes, axis=1).max() < 5e-6
+    segments = np.array([0.0, 0.25, 0.5, 0.75, 1.0])[None, :, None]
+    way = p.start[cuts][:, None] + segments * (p.end[cuts] - p.start[cuts])[:, None]
+    a, b = tips[:-1], tips[1:]
+    d = b - a
+    for places in way:
+        t = np.clip(((places[:, None] - a) * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30), 0.0, 1.0)
+        assert np.linalg.norm(places[:, None] - a - t[..., None] * d, axis=2).min(axis=1).max() < 2.5e-3
+
+
+@pytest.mark.parametrize("tcp", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_turns_stays_out_of_the_ball(kind, tcp):
+    """While an axis turns in a rapid, and on the way there, the plane under the tip does not enter the ball."""
+    plan = clamped(kind, tcp)
+    p, c = read(plan), plan.clamping
+    turning = np.abs(p.poses.end_turn - p.poses.start_turn).max(axis=1) > 1e-9
+    rapid = np.isnan(p.feed)
+    rows = np.flatnonzero(turning & rapid)
+    assert len(rows) > 20
+    for share in np.linspace(0.0, 1.0, 9):
+        tip = (1 - share) * p.start[rows] + share * p.end[rows]
+        axis = (1 - share) * p.poses.start_axis[rows] + share * p.poses.end_axis[rows]
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        assert (np.einsum("ni,ni->n", tip - c.centre, axis) > c.radius).all()
+    for k in np.flatnonzero(rapid & ~turning):  # all others go along the tool axis or square to it
+        move, axis = p.end[k] - p.start[k], p.poses.end_axis[k]
+        if not np.isfinite(move).all():
+            continue
+        along = abs(float(move @ axis))
+        assert along < 1e-3 or np.linalg.norm(np.cross(move, axis)) < 1e-3
+    assert not (turning & ~rapid).any() or (p.kind[turning & ~rapid] == FEED).all()
+
+
+def test_a_tool_is_changed_above_the_ball_with_the_axes_at_zero():
+    plan = clamped()
+    lines = write_linuxcnc(plan).splitlines()
+    change = [k for k, line in enumerate(lines) if " M6" in line]
+    assert len(change) == 2
+    home = home_of(plan.clamping)
+    before = sections(plan)[1].after[-1]
+    assert np.allclose(before.tips[-1], home) and np.allclose(before.turns[-1], 0.0)
+    assert lines[change[1] - 4:change[1] - 1] == ["", "M5", "M9"] and lines[change[1] - 5] == "M429"
+    after = [line for line in lines[change[1]:change[1] + 8] if line.startswith(("G", "M"))]
+    assert after[:1] == ["G43 H1"] and after.index("M428") > [k for k, x in enumerate(after) if x.startswith("G0 Z")][0]
+
+
+def test_programs_of_joints_time_what_turns_block_by_block():
+    """The tip goes at its feed although XYZ are joints."""
+    plan = clamped(tcp=False)
+    text = write_linuxcnc(plan)
+    assert "G93" in text and "M428" not in text and "Made only for pivots 5 0 -80; 7 3 -20 mm" in text
+    p = read(plan)
+    turning = (np.abs(p.poses.end_turn - p.poses.start_turn).max(axis=1) > 1e-9) & ~np.isnan(p.feed)
+    length = np.linalg.norm(p.end - p.start, axis=1)[turning]
+    assert length.sum() > 10.0
+    assert length.sum() / p.minutes[turning].sum() == pytest.approx(600.0, rel=1e-3)
+
+
+def test_limits_and_missing_frames_are_refused_by_name():
+    from dataclasses import replace
+
+    plan = clamped()
+    held = replace(plan.clamping.machine, limits=np.radians([[-20.0, 20.0], [-360.0, 360.0]]))
+    with pytest.raises(OutputError) as refused:
+        write_linuxcnc(replace(plan, clamping=replace(plan.clamping, machine=held)))
+    assert refused.value.code == "rotary_limit"
+    frames = {k: v for k, v in plan.clamping.frames.items() if k != "I2"}
+    with pytest.raises(OutputError) as refused:
+        write_linuxcnc(replace(plan, clamping=replace(plan.clamping, frames=frames)))
+    assert refused.value.code == "no_frame" and refused.value.subjects == ("S04",)
