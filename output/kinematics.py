@@ -116,6 +116,17 @@ class RotaryMachine:
         out[..., 1] -= ROUND * np.ceil((out[..., 1] - math.pi) / ROUND)
         return out
 
+    def stands(self, axes: F64) -> NDArray[np.bool_]:
+        """(n,) bool: tool axes (n, 3), unit, for which the rotary axes have a place inside their limits."""
+        outside = np.isnan(self._choices(self.turns(axes)).sum(axis=2))
+        return np.asarray(~outside.all(axis=1))
+
+    def even(self, axis: F64, degrees: float) -> F64:
+        """(k, 3) unit: axes round one (3,) for which both rotary axes stand at whole multiples of some degrees."""
+        step = math.radians(degrees)
+        low = np.floor(self.turns(axis[None])[0, 0] / step)
+        return self.axes(step * np.array([low, low + [1, 0], low + [0, 1], low + [1, 1]]))
+
     def joints(self, tips: F64, turns: F64, gauge: float) -> F64:
         """Linear joints, (n, 3) mm, for tips (n, 3) mm at ``turns`` (n, 2) rad.
 
@@ -227,7 +238,10 @@ class RotaryMachine:
         rows = self._choices(both)
         least = np.full(rows.shape[:2], math.inf)
         came = np.zeros(rows.shape[:2], np.int64)
-        least[0] = np.abs(rows[0] - (np.zeros(2) if start is None else start)).max(axis=1)
+        came_from = np.zeros(2) if start is None else start
+        if self.limits is None:
+            rows[0, :, 1] += ROUND * np.rint((came_from[1] - rows[0, :, 1]) / ROUND)
+        least[0] = np.abs(rows[0] - came_from).max(axis=1)
         least[0, np.isnan(least[0])] = math.inf
         if not np.isfinite(least[0]).any():
             self._refuse(both[0], 0)

@@ -1,4 +1,4 @@
-"""The machine of a setup: plans are for one tool axis and LinuxCNC; programs of five axes can be verified."""
+"""The machine of a setup: three axes, or five that turn the part or the tool from one tool axis to the next."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ class Machine(WireModel):
         "kind": "3-axis", "dialects": ["linuxcnc"], "max_rpm": 18000, "rapid_mm_min": 10000}]}}
 
     kind: Annotated[Literal["3-axis", "5-axis"], Field(
-        description="Programs of a 5-axis machine can be verified; zones and plans for one are not built "
-                    "yet.")] = "3-axis"
+        description="A 5-axis machine is planned for with fixed tool axes (3+2), all in one program; passes whose "
+                    "axis moves can be verified, not planned yet.")] = "3-axis"
     kinematics: Annotated[Literal["table-table-AC", "table-table-BC", "head-table-BC", "head-head-BC",
                                   "head-head-AC"] | None, Field(
         description="Rotary axes of a 5-axis machine, the tilting one first, by what carries them; needed there, null "
                     "on a 3-axis one. A table turns the part by Rz(C) and then Rx(A) or Ry(B), as LinuxCNC's "
                     "xyzac-trt does; a head turns the tool by Rx(A) or Ry(B) and then Rz(C).")] = None
-    tcp: Annotated[bool, Field(description="The control keeps the tool tip in rotary moves; no effect on a 3-axis "
-                                           "machine, nor on a program that is verified: that says so by G43.4 or "
-                                           "M428.")] = True
+    tcp: Annotated[bool, Field(description="The control keeps the tool tip in rotary moves; false: programs are of "
+                                           "the linear joints, and pivots_mm is needed. No effect on a 3-axis machine, "
+                                           "nor on a program that is verified: that says so by G43.4 or M428.")] = True
     dialects: Annotated[list[str], Field(min_length=1, max_length=8,
                                          description="Controls to write for; built so far: linuxcnc.")] = ["linuxcnc"]
     travel_mm: Annotated[Triple | None, Field(
@@ -38,6 +38,13 @@ class Machine(WireModel):
     rotary_deg: Annotated[list[AngleRange] | None, Field(
         min_length=2, max_length=2, description="Least and greatest angle of the rotary axes, the tilting one first, "
                                                 "deg; null: not limited, and on a 3-axis machine.")] = None
+    table_z_mm: Annotated[BoundedNumber | None, Field(
+        description="Height of the table, or of whatever the part stands on, in the setup frame with the rotary axes "
+                    "at 0, mm: no tool comes near it. null: a tool that leans stays above the bottom of the blank; and "
+                    "on a 3-axis machine.")] = None
+    orientations: Annotated[Literal["find", "given"], Field(
+        description="find: a 5-axis machine turns to further tool axes for what the accesses of the setup leave. "
+                    "given: to those accesses alone. No effect on a 3-axis machine.")] = "find"
     rotary_rate_deg_min: Annotated[Number | None, Field(
         ge=1, le=1e7, description="Fastest a rotary axis turns in a feed move, deg/min; null: not limited, and on a "
                                   "3-axis machine.")] = None
@@ -78,7 +85,7 @@ class Machine(WireModel):
     def _check_rotary(self) -> None:
         """What belongs to rotary axes stands on a 5-axis machine only, and fits them."""
         if self.kind == "3-axis":
-            for name in ("kinematics", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
+            for name in ("kinematics", "table_z_mm", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"machine.{name} belongs to a 5-axis machine; leave it null, or say kind '5-axis'")
             return

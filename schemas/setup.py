@@ -58,9 +58,10 @@ class Access(WireModel):
     """A direction the part is machined from: tool tip to spindle, in the setup frame."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
-    direction: Annotated[Triple, Field(description="Tool axis, any length but zero. The program of this access is in "
-                                       "the frame whose Z is this axis and whose X is the part of the setup's X "
-                                       "square to it.")] = [0.0, 0.0, 1.0]
+    direction: Annotated[Triple, Field(
+        description="Tool axis, any length but zero. On a 3-axis machine the program of this access is in the frame "
+                    "whose Z is this axis and whose X is the part of the setup's X square to it; on a 5-axis one all "
+                    "accesses are one program in the setup frame.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 

@@ -44,6 +44,16 @@ class ChannelFacts(ReportModel):
                                                    "and their fillets left out, mm.")]
 
 
+class AccessFacts(ReportModel):
+    """A tool axis that zones are cut along."""
+
+    id: Annotated[str, Field(examples=["A1", "I1"])]
+    axis: Annotated[list[float], Field(min_length=3, max_length=3, description="Tip to spindle, setup frame, unit.")]
+    found: Annotated[bool, Field(description="Looked for by the planner on a 5-axis machine; else of the setup.")]
+    rotary_deg: Annotated[list[float] | None, Field(
+        description="How tilting and turning axis stand for it, but for whole turns; null on a 3-axis machine.")]
+
+
 class Rejection(ReportModel):
     """A strategy or tool that was considered and not taken."""
 
@@ -192,6 +202,7 @@ class Zones(ReportModel):
     walls: list[WallFacts]
     connections: list[ConnectionFacts]
     channels: list[ChannelFacts]
+    accesses: list[AccessFacts]
     mcz: list[ComputableZone] = []
     cutting_planes: list[CuttingPlane] = []
     machinable_area_mm2: Annotated[float | None, Field(

@@ -17,24 +17,28 @@ import numpy as np
 
 from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
-from output.linuxcnc import write_linuxcnc
-from output.model import StockBox, Workplan
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
-from schemas.setup import Access, Setup, setup_sha256
+from schemas.setup import Setup
 from service import reporting
 from service.artifacts import clear_results
 from service.blank import stock_cylinder
-from service.convert import check_plannable, check_spindle_tool, machine_kinematics, rotary_limits, tool_bodies
+from service.convert import (
+    check_plannable,
+    check_spindle_tool,
+    machine_kinematics,
+    rotary_limits,
+    tool_bodies,
+)
 from service.delivery import Files, deliver, json_bytes
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
-from service.prepare import Prepared, prepare, stock_box, turned_box
+from service.prepare import Prepared, prepare, stock_box, table_height
 from service.preview import draw_preview
+from service.programs import access_of, fixture_boxes, gauge_lengths, programs_of, proof_frame, stock_corners
 from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
-from service.sides import Side, file_name, in_first_frame, in_setup_frame, nc_program
+from service.sides import Look, Side, in_first_frame, in_setup_frame
 from service.trimmed import trimmed_faces
-from service.version import VERSION
 from toolpath.family import Target
 from toolpath.motion import RAPID_MM_MIN
 from toolpath.plan import Plan, plan_job
@@ -44,7 +48,7 @@ from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from verify.model import Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
-from zones.view import View, turned_samples
+from zones.view import View
 
 Progress = Callable[[str, float], None]
 RAMP_ANGLE = np.radians(3.0)
@@ -91,29 +95,29 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         sides.append(_side(ready, view, checks, trimmed, sum(len(s.made.steps) for s in sides), share))
     made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
     zone, given_up = scored.without(made, ready.zones)
-    first = ready.views[0]
-    programs = [nc_program(s, _access(ready, s.view).work_offset) for s in sides if s.made.steps]
-    proof = prove(programs, first.part, tool_bodies(setup), proof_setup(ready, first),
-                  ScoredSamples(scored.samples, zone), [z.id for z in ready.zones],
+    first, look = ready.views[0], proof_frame(ready)
+    written = programs_of(ready, sides)
+    dense = look.into(scored.samples, first)
+    programs = [p.given() for p in written]
+    proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
+                  ScoredSamples(dense, zone), [z.id for z in ready.zones],
                   lambda f: progress("prove", PLANNED + (PROVED - PLANNED) * f))
-    report, rest = reporting.job_report(ready, made, in_setup_frame(first, proof), scored.samples, scored.labels, zone,
+    report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
                                         given_up)
     progress("report", PROVED)
     files: Files = {}
     if report["state"] == "proved":
-        for s in sides:
-            if s.made.steps:
-                files[s.program_name] = ("program", "linuxcnc", s.view.id, s.program.encode())
-                files[file_name(s.view, "job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(s.work).encode())
-                files[file_name(s.view, "job", "arm.stpnc")] = ("stepnc-arm", "", None,
-                                                                write_stepnc_arm(s.work).encode())
+        for p in written:
+            files[p.name] = ("program", "linuxcnc", p.access, p.text.encode())
+            files[p.file_name("job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(p.work).encode())
+            files[p.file_name("job", "arm.stpnc")] = ("stepnc-arm", "", None, write_stepnc_arm(p.work).encode())
     files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
     _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
     files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
-    _deviation(ready, first, scored.samples, proof, report, out / MAP_NAME)
+    _deviation(ready, look, dense, proof, report, out / MAP_NAME)
     files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
     if mesh is not None and programs:
-        figures, data = machined_part(mesh, programs, first.part, tool_bodies(setup), proof_setup(ready, first),
+        figures, data = machined_part(mesh, programs, look.part, tool_bodies(setup), proof_setup(ready, look),
                                       lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
         report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
         files[MESH_NAME] = ("machined", "", None, data)
@@ -143,9 +147,9 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     zones = [ready.zones[k] for k in mine]
     made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
                     lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1, trimmed=trimmed)
-    share.tell("write", 0.99)
-    work = workplan(ready, view, made, settings)
-    return Side(view, made, work, write_linuxcnc(work) if made.steps else "")
+    if ready.setup.machine.kind == "5-axis":
+        made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
+    return Side(view, made, settings.clearance)
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, Any]:
@@ -169,8 +173,9 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
-    frame of one access, the first where ``access`` is None; ``spindle_tool`` is the T number that stands in the
-    spindle, its length offset on, before its first line, 0 for none.
+    frame of one access; where ``access`` is None in that of the first, on a machine with rotary axes in the setup's.
+    ``spindle_tool`` is the T number that stands in the spindle, its length offset on, before its first line, 0 for
+    none.
 
     out  : folder for the deviation map, the mesh and the report; none is written where it is None
     mesh : the machined part is wanted too; it is written into ``out``
@@ -186,22 +191,23 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         raise SetupError(f"the setup has no access {access}; it has {', '.join(known)}", code="no_such_access",
                          subjects=(access,), remedy="name one of them, or leave it out for the first")
     check_spindle_tool(setup, spindle_tool)
-    ready = prepare(part_path, setup, progress)
+    ready = prepare(part_path, setup, progress, search=False)
     view = ready.view(access or known[0])
-    dense = turned_samples(score(ready).samples, view.rotation @ view.first.T)
-    proof = prove([("program", program_text)], view.part, tool_bodies(setup), proof_setup(ready, view),
+    look = proof_frame(ready) if access is None else Look.of(view)
+    dense = look.into(score(ready).samples, ready.views[0])
+    proof = prove([("program", program_text)], look.part, tool_bodies(setup), proof_setup(ready, look, foreign=True),
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.5 * f),
                   spindle_tool=spindle_tool)
-    report = reporting.verification_report(ready, in_setup_frame(view, proof), dense)
+    report = reporting.verification_report(ready, in_setup_frame(look, proof), dense)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         files: Files = {}
-        _deviation(ready, view, dense, proof, report, out / MAP_NAME)
+        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
         files[MAP_NAME] = ("deviation", "", view.id, (out / MAP_NAME).read_bytes())
         if mesh is not None:
-            figures, data = machined_part(mesh, [("program", program_text)], view.part, tool_bodies(setup),
-                                          proof_setup(ready, view), lambda f: progress("mesh", 0.8 + 0.2 * f),
-                                          spindle_tool=spindle_tool)
+            figures, data = machined_part(mesh, [("program", program_text)], look.part, tool_bodies(setup),
+                                          proof_setup(ready, look, foreign=True),
+                                          lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
             files[MESH_NAME] = ("machined", "", view.id, data)
         deliver(out, report, files)
@@ -219,24 +225,15 @@ def cut_table(setup: Setup) -> dict[str, CutData]:
     return out
 
 
-def stock_corners(ready: Prepared, view: View) -> np.ndarray:
-    """(2, 3) corners of the nominal stock in the frame of a view, mm, uncertainty left out."""
-    box = stock_box(ready.setup, ready.part)
-    if box is not None:
-        return turned_box(box, view.rotation)
-    bounds, margin = ready.part.bounds, ready.setup.stock.margin_mm
-    grown = np.array([bounds[0] - margin, bounds[1] + margin])
-    grown[0, 2] = bounds[0, 2]
-    return turned_box(grown, view.rotation)
-
-
 def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
     stock = ready.setup.stock
     lo, hi = stock_corners(ready, view)
     step = max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
-    if stock.kind == "box":
-        return StockMap.box(view.tree, lo - stock.uncertainty_mm, hi + stock.uncertainty_mm, step)
+    box = stock_box(ready.setup, ready.part)
+    if box is not None:
+        grown = np.array([box[0] - stock.uncertainty_mm, box[1] + stock.uncertainty_mm])
+        return StockMap.block(view.tree, grown, view.rotation, step)
     return StockMap.around(view.tree, view.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
 
 
@@ -244,39 +241,18 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     """Tolerances and heights of the plan."""
     q, ops = ready.setup.quality, ready.setup.operations
     tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
-    tops.extend(float(f[1, 2]) for f in _fixtures(ready, view))
+    tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either", Pattern(ops.pattern))
 
 
-def _fixtures(ready: Prepared, view: View) -> tuple[np.ndarray, ...]:
-    """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
-    return tuple(turned_box(np.array(f.box_mm, dtype=np.float64), view.rotation) for f in ready.setup.fixtures)
+def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:
+    """The setup in the plain words of the proof, in the frame of a view.
 
-
-def _access(ready: Prepared, view: View) -> Access:
-    return next(a for a in ready.setup.access if a.id == view.id)
-
-
-def workplan(ready: Prepared, view: View, made: Plan, settings: PlanSettings) -> Workplan:
-    """The plan of one access as the writers want it."""
-    setup = ready.setup
-    used = {s.tool.id for s in made.steps}
-    lo, hi = stock_corners(ready, view)
-    comments = tuple(f"warning: {w}" for w in ready.warnings)
-    if len(ready.views) > 1:
-        d = " ".join(f"{v:.6g}" for v in view.direction)
-        comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank", *comments)
-    return Workplan(setup.labels.get("order", "zonemill job"), made.steps,
-                    tuple(t for t in tool_bodies(setup) if t.id in used), settings.clearance,
-                    _access(ready, view).work_offset, StockBox(lo, hi), reporting.material_name(setup),
-                    ready.part.sha256, setup_sha256(setup), VERSION, dict(setup.labels), comments)
-
-
-def proof_setup(ready: Prepared, view: View) -> ProofSetup:
-    """The setup in the plain words of the proof, in the frame of a view."""
+    foreign : of programs that were not planned here: a table nobody told of is not held against them
+    """
     s = ready.setup
     c, q = s.clearance_mm, s.quality
     box = stock_corners(ready, view) if s.stock.kind == "box" else None
@@ -285,20 +261,21 @@ def proof_setup(ready: Prepared, view: View) -> ProofSetup:
     return ProofSetup(
         stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm, stock_box=box,
         stock_cylinder=stock_cylinder(s, ready.part, view.rotation),
-        fixtures=_fixtures(ready, view), clearance_neck=c.neck,
+        fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=s.machine.rapid_mm_min or RAPID_MM_MIN, work_offset=_access(ready, view).work_offset,
+        rapid_feed=s.machine.rapid_mm_min or RAPID_MM_MIN, work_offset=access_of(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
-        gauge_length={body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
-                      body.stickout + sum(h.length for h in body.holder)
-                      for t, body in zip(s.tools, tool_bodies(s), strict=True)},
+        gauge_length=gauge_lengths(s),
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
         max_engaged={body.number: math.radians(t.max_engagement_deg)
                      for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
+        table=None if s.machine.kind != "5-axis" or foreign and s.machine.table_z_mm is None else
+        table_height(s, ready.part),
+        table_known=s.machine.table_z_mm is not None,
         kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
         rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
 
@@ -317,7 +294,7 @@ def _preview(ready: Prepared, sides: list[Side], report: dict[str, Any], stays: 
                  title, facts)
 
 
-def _deviation(ready: Prepared, view: View, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],
+def _deviation(ready: Prepared, view: Look, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],
                path: Path) -> None:
     """Draw the deviation map in the frame of a view; samples and findings of the proof are in that frame."""
     order = ready.setup.labels.get("order")

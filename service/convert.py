@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from geometry.errors import SetupError
+from geometry.errors import OutputError, SetupError
 from geometry.toolbody import HolderSegment, ToolBody
+from output.kinematics import RotaryMachine
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
@@ -89,12 +90,12 @@ def check_blank(setup: Setup) -> None:
 
 
 def check_plannable(setup: Setup) -> None:
-    """Refuse a machine or a blank that zones and plans are not built for.
+    """Refuse a blank that plans are not built for, and accesses the machine cannot turn to.
 
     Raises
     ------
     SetupError
-        Code 'five_axis_not_planned' or 'cylinder_not_planned'.
+        Code 'cylinder_not_planned', 'access_out_of_reach', 'two_clampings'; as ``rotary_machine``.
     """
     if setup.stock.kind == "cylinder":
         raise SetupError("plans start from a box or from the part grown by a margin so far; of a cylinder only "
@@ -102,12 +103,29 @@ def check_plannable(setup: Setup) -> None:
                          measured=setup.stock.kind, limit=["part_offset", "box"],
                          remedy="give stock.kind 'box' with the box round the cylinder, or verify a program: zonemill "
                                 "verify, POST /v1/verifications")
-    if setup.machine.kind == "5-axis":
-        raise SetupError("zones and plans are for machines of three axes so far; on a 5-axis one only finished "
-                         "programs can be verified", code="five_axis_not_planned", subjects=("machine.kind",),
-                         measured=setup.machine.kind, limit="3-axis",
-                         remedy="take machine.kind '3-axis' without rotary fields, or verify a program: zonemill "
-                                "verify, POST /v1/verifications")
+    machine = rotary_machine(setup.machine)
+    if machine is not None:
+        _check_accesses(setup, machine)
+
+
+def _check_accesses(setup: Setup, machine: RotaryMachine) -> None:
+    """Refuse tool axes that the rotary axes cannot stand for, and a second clamping."""
+    for access in setup.access:
+        axis = np.array([access.direction], dtype=np.float64)
+        axis /= np.linalg.norm(axis)
+        if not machine.stands(axis)[0]:
+            both = np.degrees(machine.turns(axis)[0]).round(3).tolist()
+            raise SetupError(f"access {access.id}, tool axis {access.direction}, cannot be turned to",
+                             code="access_out_of_reach", subjects=(access.id, "machine.rotary_deg"), measured=both,
+                             limit=setup.machine.rotary_deg,
+                             remedy=f"{machine.letters} would have to stand at one of these; give another direction, "
+                                    "or turn the setup frame by placement")
+        if access.work_offset != setup.access[0].work_offset:
+            raise SetupError(f"access {access.id} has work offset {access.work_offset} and {setup.access[0].id} has "
+                             f"{setup.access[0].work_offset}: a machine with rotary axes holds the part once",
+                             code="two_clampings", subjects=(access.id,), measured=access.work_offset,
+                             limit=setup.access[0].work_offset,
+                             remedy="give all accesses one work offset, or plan each clamping as a job of its own")
 
 
 def check_spindle_tool(setup: Setup, number: int) -> None:
@@ -131,6 +149,24 @@ def machine_kinematics(machine: Machine) -> Kinematics | None:
         return None
     pivots = machine.pivots_mm
     return Kinematics(machine.kinematics, None if pivots is None else tuple((x, y, z) for x, y, z in pivots))
+
+
+def rotary_machine(machine: Machine) -> RotaryMachine | None:
+    """Rotary axes of a machine in the words of the writers; None on one of three axes.
+
+    Raises
+    ------
+    SetupError
+        Code 'no_pivots': the control does not keep the tip, and nobody says where the rotary axes lie.
+    """
+    if machine.kinematics is None:
+        return None
+    pivots = None if machine.pivots_mm is None else tuple((x, y, z) for x, y, z in machine.pivots_mm)
+    try:
+        return RotaryMachine(machine.kinematics, pivots, rotary_limits(machine), machine.tcp)
+    except OutputError as refusal:
+        raise SetupError(refusal.message, code=refusal.code, subjects=refusal.subjects,
+                         remedy=refusal.remedy) from None
 
 
 def rotary_limits(machine: Machine) -> NDArray[np.float64] | None:

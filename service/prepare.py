@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +19,21 @@ from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_sur
 from geometry.step import read_part
 from geometry.toolbody import ToolBody
 from geometry.trim import FacePatch
-from schemas.setup import Setup
+from schemas.setup import Access, Setup
 from service.blank import check_against_part
-from service.convert import face_numbers, tool_bodies
+from service.convert import face_numbers, rotary_machine, tool_bodies
+from zones.approach import directions_over_hemisphere
 from zones.categories import Categories
 from zones.decompose import decompose
 from zones.fixtures import AIR
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
+from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches
 from zones.planview import ChannelPlan
 from zones.reach import Clearances, TipField, lattice_step
 from zones.regions import Regioner
+from zones.sight import Reach
 from zones.view import View, access_rotation, turned, turned_samples
 from zones.zoning import ZoneArea, Zoning, build_zones
 
@@ -39,6 +43,9 @@ LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
 MOST_DENSITY = 150.0
 BORDER_SPACING = 0.2  # mm
 BORDER_INSET = 0.0  # mm: on the border itself
+LEAST_TURN_MM2, LEAST_TURN_SHARE = 10.0, 0.002  # of Ma, what a further tool axis has to win
+TABLE, TABLE_SPARE = 1000.0, 0.01  # mm, what a table reaches from the part, and what planning keeps more to it
+UPRIGHT = 1.0 - 1e-12  # of an axis that does not lean
 MOST_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
 
 Progress = Callable[[str, float], None]
@@ -49,18 +56,22 @@ class Prepared:
     """A part with everything known before the first pass is laid.
 
     part          : Part in the setup frame
-    views         : one per access direction, each in its own frame
+    accesses      : of the setup, and after them those that were found on a machine with rotary axes
+    views         : one per access, each in its own frame
     decomposition : in the frame of the first view, as the samples
     samples       : of the machinable area, planning density
     zoning        : zones, each in the frame of its view
+    seen_from     : (d, 3) float64, unit, setup frame: the directions that the machinable area is seen from
     lift          : mm, distance along the normal within which a touch counts
     """
 
     setup: Setup
     part: Part
+    accesses: tuple[Access, ...]
     views: tuple[View, ...]
     decomposition: Decomposition
     zoning: Zoning
+    seen_from: F64
     lift: float
     warnings: tuple[str, ...]
 
@@ -107,13 +118,28 @@ def placement_of(setup: Setup) -> Placement:
     return Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
 
 
-def obstacle_mesh(part: Part, setup: Setup) -> TriangleMesh:
-    """The part and the fixture boxes, these grown by the rapid clearance, as one mesh."""
+def table_height(setup: Setup, part: Part) -> float:
+    """mm, setup frame: what a leaning tool stays above: the table, where that is not known the bottom of the blank."""
+    if setup.machine.table_z_mm is not None:
+        return setup.machine.table_z_mm
+    box = stock_box(setup, part)
+    return float(part.bounds[0, 2] if box is None else box[0, 2])
+
+
+def obstacle_mesh(part: Part, setup: Setup, *, leaning: bool = False) -> TriangleMesh:
+    """The part and the fixture boxes, these grown by the rapid clearance, as one mesh.
+
+    leaning : the tool leans, so that the table is in its way as well
+    """
     vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
     n = len(part.mesh.vertices)
-    for fixture in setup.fixtures:
-        lo = np.array(fixture.box_mm[0]) - setup.clearance_mm.rapid
-        hi = np.array(fixture.box_mm[1]) + setup.clearance_mm.rapid
+    boxes = [np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures]
+    if leaning:
+        top, middle = table_height(setup, part), part.bounds.mean(axis=0)
+        boxes.append(np.array([[middle[0] - TABLE, middle[1] - TABLE, top - TABLE],
+                               [middle[0] + TABLE, middle[1] + TABLE, top + TABLE_SPARE]]))
+    for box in boxes:
+        lo, hi = box[0] - setup.clearance_mm.rapid, box[1] + setup.clearance_mm.rapid
         v, f = _box(lo, hi)
         vertices.append(v)
         faces.append((f + n).astype(np.int32))
@@ -157,8 +183,10 @@ def turned_box(box: F64, rotation: F64) -> F64:
     return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
-def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
+def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True) -> Prepared:
     """Read, decompose, measure reach, build zones.
+
+    search : on a machine with rotary axes look for further tool axes; else the accesses of the setup are all
 
     Raises
     ------
@@ -169,20 +197,66 @@ def prepare(path: Path, setup: Setup, progress: Progress) -> Prepared:
     part = load(path, setup)
     check_against_part(setup, part)
     progress("zones", 0.12)
-    rotations = [access_rotation(a.direction) for a in setup.access]
+    accesses = list(setup.access)
+    rotations = [access_rotation(a.direction) for a in accesses]
     first = turned(part, rotations[0])
     decomposition = decompose(first)
-    samples = planning_samples(first, decomposition, setup, np.array([r[2] @ rotations[0].T for r in rotations]))
+    seen_from = _seen_from(setup, rotations, search)
+    samples = planning_samples(first, decomposition, setup, seen_from @ rotations[0].T)
     channels = ChannelPlan.of(first, decomposition)
     lift = max(0.1 * setup.quality.scallop_height_mm, 1.5 * part.chord)
     views: list[View] = []
-    for k, rotation in enumerate(rotations):
-        views.append(_view(setup, k, part, rotation, rotations[0], samples, decomposition, channels))
-        progress("zones", 0.14 + 0.08 * (k + 1) / len(rotations))
-    zoning = build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels))
-    progress("zones", 0.25)
+
+    def look(access: Access) -> None:
+        rotation = access_rotation(access.direction)
+        views.append(_view(setup, access.id, part, rotation, rotations[0], samples, decomposition, channels))
+
+    def zoned(known: Sequence[Mapping[str, Reach]] = ()) -> Zoning:
+        return build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels), known)
+
+    for k, access in enumerate(accesses):
+        look(access)
+        progress("zones", 0.14 + 0.08 * (k + 1) / len(accesses))
+    zoning = zoned()
+    progress("zones", 0.24)
+    for access in _further(setup, part, views, zoning, lift) if search else ():
+        accesses.append(access)
+        look(access)
+        progress("zones", 0.25)
+    if len(views) > len(zoning.reach):
+        zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
+    progress("zones", 0.27)
     warnings = (*part.warnings, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
-    return Prepared(setup, part, tuple(views), decomposition, zoning, lift, warnings)
+    return Prepared(setup, part, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
+
+
+def _seen_from(setup: Setup, rotations: list[F64], search: bool) -> F64:
+    """(d, 3) unit, setup frame: the accesses, and on a machine with rotary axes all it can turn to from above."""
+    given = np.array([r[2] for r in rotations])
+    machine = rotary_machine(setup.machine)
+    if machine is None or not search or setup.machine.orientations == "given":
+        return given
+    axes = directions_over_hemisphere(DIRECTIONS)
+    return np.vstack([given, axes[machine.stands(axes)]])
+
+
+def _further(setup: Setup, part: Part, views: list[View], zoning: Zoning, lift: float) -> list[Access]:
+    """Accesses a machine with rotary axes turns to beyond those of the setup, for what these leave."""
+    machine = rotary_machine(setup.machine)
+    if machine is None or setup.machine.orientations == "given":
+        return []
+    samples = views[0].samples
+    turn = views[0].rotation
+    here = turned_samples(samples, turn.T)
+    gatherer = Gatherer(TriangleTree(obstacle_mesh(part, setup, leaning=True)), tool_bodies(setup), clearances(setup),
+                        setup.quality.scallop_height_mm, lift, setup.quality.stock_allowance_mm)
+    worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
+    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands,
+                        machine.even, worth)
+    names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in setup.access})
+    offset = setup.access[0].work_offset
+    return [Access(id=next(names), direction=[round(v, 12) + 0.0 for v in axis], work_offset=offset)
+            for axis in axes.tolist()]
 
 
 def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tuple[str, ...]:
@@ -211,22 +285,23 @@ def tip_field(setup: Setup, part: Part, rotation: F64, obstacles: TriangleTree, 
                     setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
 
 
-def _view(setup: Setup, k: int, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
+def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
           decomposition: Decomposition, channels: ChannelPlan) -> View:
-    """The k-th access: the part turned into its frame, tip limits of all tools, regions of the samples."""
+    """An access: the part turned into its frame, tip limits of all tools, regions of the samples."""
+    is_first = rotation is first or np.array_equal(rotation, first)
     here = turned(part, rotation)
     tree = TriangleTree(here.mesh)
-    obstacles = tree
-    if setup.fixtures:
+    obstacles, leaning = tree, setup.machine.kind == "5-axis" and rotation[2, 2] < UPRIGHT
+    if setup.fixtures or leaning:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
-        obstacles = TriangleTree(obstacle_mesh(part, setup).transformed(matrix))
+        obstacles = TriangleTree(obstacle_mesh(part, setup, leaning=leaning).transformed(matrix))
     fields = {b.id: tip_field(setup, part, rotation, obstacles, here.bounds, b) for b in tool_bodies(setup)}
     seen = turned_samples(samples, rotation @ first.T)
-    regioner = Regioner(here, decomposition, channels, first=k == 0)
-    there = None if k == 0 else (samples.points, samples.normals)
+    regioner = Regioner(here, decomposition, channels, first=is_first)
+    there = None if is_first else (samples.points, samples.normals)
     labels = regioner.of(seen.points, seen.normals, seen.face, there)
-    return View(setup.access[k].id, rotation, here, tree, obstacles, seen, labels, fields, regioner, first)
+    return View(name, rotation, here, tree, obstacles, seen, labels, fields, regioner, first)
 
 
 def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> SurfaceSamples:
@@ -236,7 +311,7 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
     every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them. Normals are those
     of the exact surface: beside those of facets a tool would stand so far aside that it does not fit into a round.
 
-    directions : (d, 3) float64, unit, of the accesses, in the frame of the part
+    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
     """
     triangles = machinable_triangles(part, decomposition, setup, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
@@ -254,7 +329,7 @@ def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, dir
 def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> np.ndarray:
     """Indices of the mesh triangles of the machinable area Ma.
 
-    directions : (d, 3) float64, unit, of the accesses, in the frame of the part
+    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
 
     Raises
     ------

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from schemas.setup import Setup, setup_sha256
 from service import advice, offers
+from service.convert import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
 from toolpath.finish import ZonePlan
@@ -23,7 +24,7 @@ from zones.remainder import Remainder, explain
 from zones.zoning import ZoneArea, is_open
 
 REMAINDER_FLOOR_MM2 = 0.005
-ZONES_KEYS = ("part", "walls", "connections", "channels", "mcz", "cutting_planes", "machinable_area_mm2",
+ZONES_KEYS = ("part", "walls", "connections", "channels", "accesses", "mcz", "cutting_planes", "machinable_area_mm2",
               "machinable_by_role_mm2", "zones", "remainder", "proposal")
 
 
@@ -60,11 +61,24 @@ def _shape(ready: Prepared) -> dict[str, Any]:
                          "z_mm": [r(c.z_bottom), r(c.z_top)]} for c in d.connections],
         "channels": [{"id": c.id, "walls": list(c.walls), "gap_min_mm": r(c.gap_min),
                       "at_mm": _place(ready, c.at)} for c in d.channels],
+        "accesses": _accesses(ready),
         "mcz": [{"access": m.access, "tool": m.tool, "area_mm2": r(m.area, 3),
                  "cutter_area_mm2": r(m.cutter_area, 3)} for m in ready.zoning.mcz],
         "cutting_planes": [{"access": p.access, "z_mm": r(p.height), "region": p.region, "tool": p.tool,
                             "reason": p.reason} for p in ready.zoning.planes],
     }
+
+
+def _accesses(ready: Prepared) -> list[dict[str, Any]]:
+    """The tool axes of a job, and how the rotary axes stand for them."""
+    machine, given = rotary_machine(ready.setup.machine), {a.id for a in ready.setup.access}
+    out = []
+    for v in ready.views:
+        turn = None if machine is None else [r(a) for a in np.degrees(
+            machine.follow(v.direction[None], np.zeros(2))[0]).tolist()]
+        out.append({"id": v.id, "axis": [r(x, 9) for x in v.direction.tolist()], "found": v.id not in given,
+                    "rotary_deg": turn})
+    return out
 
 
 def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:

@@ -6,51 +6,86 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.sampling import SurfaceSamples
 from output.model import Workplan
 from toolpath.motion import Workingstep
 from toolpath.plan import Plan
 from verify.model import NcProgram, Proof
-from zones.view import View
+from zones.view import View, turned_samples
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """What was planned along one access direction, in its frame."""
+    """What was planned along one access, in its frame; ``clearance`` is its clearance plane there, mm."""
 
     view: View
     made: Plan
+    clearance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """The frame a proof is carried out in.
+
+    id       : of the access whose frame it is, or of the first where it is the setup's
+    rotation : (3, 3) float64, setup frame -> this one
+    part     : Part in this frame
+    """
+
+    id: str
+    rotation: F64
+    part: Part
+
+    @classmethod
+    def of(cls, view: View) -> Look:
+        """The frame of an access."""
+        return cls(view.id, view.rotation, view.part)
+
+    def into(self, samples: SurfaceSamples, view: View) -> SurfaceSamples:
+        """Samples of the frame of a view in this one."""
+        if np.array_equal(self.rotation, view.rotation):
+            return samples
+        return turned_samples(samples, self.rotation @ view.rotation.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """One finished program with the plan it was written from.
+
+    access : id of its access where it is the program of one of several, else of the first
+    end    : put into the names of its files, '' for the first
+    turn   : (3, 3) float64, from the frame of the proof into its own; None: the same
+    """
+
+    access: str
     work: Workplan
-    program: str
+    text: str
+    end: str = ""
+    turn: F64 | None = None
 
     @property
-    def program_name(self) -> str:
+    def name(self) -> str:
         """File name of the program."""
-        return program_name(self.view)
+        return self.file_name("program", "linuxcnc.ngc")
+
+    def file_name(self, stem: str, end: str) -> str:
+        """'job.stpnc' for the first access, 'job.A2.stpnc' for a further one."""
+        return f"{stem}{self.end}.{end}"
+
+    def given(self) -> NcProgram:
+        """The program as a proof takes it."""
+        return NcProgram(self.name, self.text, self.turn, self.work.work_offset)
 
 
-def file_name(view: View, stem: str, end: str) -> str:
-    """'job.stpnc' for the first access, 'job.A2.stpnc' for a further one."""
-    return f"{stem}.{end}" if view.is_first else f"{stem}.{view.id}.{end}"
-
-
-def program_name(view: View) -> str:
-    """File name of the program of an access."""
-    return file_name(view, "program", "linuxcnc.ngc")
-
-
-def in_setup_frame(view: View, proof: Proof) -> Proof:
+def in_setup_frame(look: Look, proof: Proof) -> Proof:
     """The proof with the places of its findings in the setup frame."""
-    if np.array_equal(view.rotation, np.eye(3)):
+    if np.array_equal(look.rotation, np.eye(3)):
         return proof
     return replace(proof, findings=tuple(
-        f if f.point is None else replace(f, point=tuple((np.array(f.point) @ view.rotation).tolist()))
+        f if f.point is None else replace(f, point=tuple((np.array(f.point) @ look.rotation).tolist()))
         for f in proof.findings))
-
-
-def nc_program(side: Side, work_offset: str) -> NcProgram:
-    """The program of a side for a proof in the frame of the first access."""
-    turn = None if side.view.is_first else side.view.rotation @ side.view.first.T
-    return NcProgram(side.program_name, side.program, turn, work_offset)
 
 
 def in_first_frame(side: Side) -> list[Workingstep]:
@@ -62,4 +97,4 @@ def in_first_frame(side: Side) -> list[Workingstep]:
             for s in side.made.steps]
 
 
-__all__ = ["Side", "file_name", "in_first_frame", "in_setup_frame", "nc_program", "program_name"]
+__all__ = ["Look", "Program", "Side", "in_first_frame", "in_setup_frame"]

@@ -23,6 +23,8 @@ from zones.reach import Disc, Lattice
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
 POOLED = 12  # nodes a side of the squares whose highest stock is kept
 AIR_TOLERANCE = 0.01  # mm
+UPRIGHT = 1e-12  # of the normal of a face of a block
+ON_EDGE = 1e-9  # mm
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
 
 
@@ -55,11 +57,31 @@ class StockMap:
     @classmethod
     def box(cls, tree: TriangleTree, lower: F64, upper: F64, step: float) -> StockMap:
         """A block between two corners (3,), mm, round the part."""
-        lat = Lattice.over(np.array([lower, upper]), 3 * step, step)
-        x = lat.x0 + step * np.arange(lat.nx)
-        y = lat.y0 + step * np.arange(lat.ny)
-        inside = ((y >= lower[1]) & (y <= upper[1]))[:, None] & ((x >= lower[0]) & (x <= upper[0]))[None, :]
-        return cls(lat, np.where(inside, upper[2], -np.inf), None, _in_cells(tree, lat))
+        return cls.block(tree, np.array([lower, upper]), np.eye(3), step)
+
+    @classmethod
+    def block(cls, tree: TriangleTree, box: F64, rotation: F64, step: float) -> StockMap:
+        """A block round the part, however it stands.
+
+        box      : (2, 3) float64, mm, lower and upper corner in a frame along its edges
+        rotation : (3, 3) float64, from there into the frame of the part
+        """
+        corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
+        lat = Lattice.over(np.array([corners.min(axis=0), corners.max(axis=0)]), 3 * step, step)
+        x, y = np.meshgrid(lat.x0 + step * np.arange(lat.nx), lat.y0 + step * np.arange(lat.ny))
+        upper, lower = np.full(x.shape, np.inf), np.full(x.shape, -np.inf)
+        # a face, n p <= d, holds the height of a vertical line from above or below, or keeps the line out
+        for axis in range(3):
+            for sense, d in ((1.0, box[1][axis]), (-1.0, -box[0][axis])):
+                n = sense * rotation[:, axis]
+                room = d - n[0] * x - n[1] * y
+                if abs(n[2]) < UPRIGHT:
+                    upper[room < -ON_EDGE] = -np.inf
+                elif n[2] > 0.0:
+                    np.minimum(upper, room / n[2], out=upper)
+                else:
+                    np.maximum(lower, room / n[2], out=lower)
+        return cls(lat, np.where(upper >= lower, upper, -np.inf), None, _in_cells(tree, lat))
 
     def copied(self) -> StockMap:
         """The same stock, to be cut on its own."""

@@ -58,6 +58,8 @@ class ProofSetup:
     kinematics    : rotary axes of the machine, or None on one of three axes
     rotary_limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, or None
     rotary_rate   : rad/min, the fastest either turns in a feed move, or None
+    table         : mm, Z of what the part stands on, or None; table_known : somebody said so, else it is held against
+                    tools that lean only
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -87,6 +89,8 @@ class ProofSetup:
     kinematics: Kinematics | None = None
     rotary_limits: F64 | None = None
     rotary_rate: float | None = None
+    table: float | None = None
+    table_known: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,7 @@ from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.stockpass import StockPass
+from verify.table import table_findings
 
 LEAST_REACH = 1.0
 READ, CUT, MET = 0.12, 0.5, 0.97  # shares of the work done when the programs are read, residuals and contacts known
@@ -96,6 +97,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     angle = engaged_angles(run.engaged, moves, tools)
     findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
+                *table_findings([p.program for p in read], tools, setup),
                 *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),

@@ -83,8 +83,11 @@ def test_malformed_forms(client, post):
         assert body["subjects"] == ["spindle_tool"]
     _is_problem(post(client, spindle_tool="1"), 422, "unknown_part")
     five = {"tools": [TOOL], "machine": {"kind": "5-axis", "kinematics": "head-head-BC"}}
+    held = {**five, "machine": {**five["machine"], "rotary_deg": [[-30, 30], [-360, 360]]},
+            "access": [{"direction": [1, 0, 0]}]}
     for path in ("/v1/jobs", "/v1/zones"):
-        _is_problem(post(client, path=path, setup=json.dumps(five)), 422, "five_axis_not_planned")
+        _is_problem(post(client, path=path, setup=json.dumps(held)), 422, "access_out_of_reach")
+        assert post(client, path=path, setup=json.dumps(five)).status_code == 202
     assert post(client, path="/v1/verifications", setup=json.dumps(five), program=b"M2\n").status_code == 202
     answer = client.post("/v1/jobs", files={"part": ("a.step", STEP)},
                          data={"setup": json.dumps({"tools": [TOOL]})})

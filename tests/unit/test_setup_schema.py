@@ -18,6 +18,7 @@ from service.convert import (
     parse_setup,
     placement_frame,
     rotary_limits,
+    rotary_machine,
     tool_bodies,
 )
 from service.materials import cutting_data, feed_per_tooth
@@ -119,19 +120,30 @@ def test_what_is_wrong_is_said(given_setup, words):
     assert caught.value.subjects and caught.value.remedy
 
 
-def test_a_machine_of_five_axes_is_read_for_verifying_and_refused_for_planning():
+def test_a_machine_of_five_axes_in_the_words_of_proof_and_writers():
     given_setup = parse_setup(setup(machine={**FIVE, "rotary_deg": [[-30, 120], [-360, 360]],
                                              "pivots_mm": [[0, 0, -50], [0, 0, -20]]}))
     found = machine_kinematics(given_setup.machine)
     assert (found.kind, found.pivots) == ("table-table-AC", ((0, 0, -50), (0, 0, -20)))
     np.testing.assert_allclose(rotary_limits(given_setup.machine), np.radians([[-30, 120], [-360, 360]]))
+    written = rotary_machine(given_setup.machine)
+    assert (written.kind, written.pivots, written.tcp) == (found.kind, found.pivots, True)
     assert machine_kinematics(parse_setup(setup(machine=FIVE)).machine).pivots is None
     plain = parse_setup(setup())
     assert machine_kinematics(plain.machine) is None and rotary_limits(plain.machine) is None
-    with pytest.raises(SetupError, match="only finished programs can be verified") as caught:
-        check_plannable(given_setup)
-    assert caught.value.code == "five_axis_not_planned" and "zonemill verify" in caught.value.remedy
+    assert rotary_machine(plain.machine) is None
+    check_plannable(given_setup)
     check_plannable(plain)
+
+
+@pytest.mark.parametrize(("machine", "access", "code", "subject"), [
+    ({"rotary_deg": [[-30, 60], [-360, 360]]}, [{}, {"id": "A2", "direction": [1, 0, 0]}], "access_out_of_reach", "A2"),
+    ({}, [{}, {"id": "A2", "direction": [1, 0, 1], "work_offset": "G55"}], "two_clampings", "A2"),
+    ({"tcp": False}, [{}], "no_pivots", "machine.pivots_mm")])
+def test_what_a_machine_of_five_axes_cannot_do_is_said(machine, access, code, subject):
+    with pytest.raises(SetupError) as caught:
+        check_plannable(parse_setup(setup(machine={**FIVE, **machine}, access=access)))
+    assert caught.value.code == code and subject in caught.value.subjects and caught.value.remedy
 
 
 def test_the_tool_in_the_spindle_is_one_of_the_setup():

@@ -13,6 +13,7 @@ from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL
 from toolpath.stock import SKIN, StockMap
 from zones.reach import Disc
+from zones.view import access_rotation
 
 STEP = 0.2
 PART = joined(box_mesh([0, 0, -2], [12, 12, 0]), box_mesh([3.05, 3.0, 0], [4.0, 9.0, 5.0]))
@@ -129,3 +130,27 @@ def test_an_eased_ramp_is_never_steeper_than_its_slope_less_the_rounding():
     written = np.round(lift, 4)
     at = np.round(points[:, 0], 4)
     assert (np.diff(written) >= -math.tan(math.radians(3.0)) * np.diff(at) - 1e-9).all()
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.5, -0.3, 0.9), (-0.8, 0.2, 0.1), (1.0, 0.0, 0.0)])
+def test_a_block_that_stands_askew_is_as_high_as_its_corners_and_edges(direction):
+    """Against 40 places a node through the block, sampled along the vertical line."""
+    rotation = access_rotation(direction)
+    box = np.array([[-2.0, -2.0, -2.0], [14.0, 14.0, 6.0]])
+    mesh = PART.transformed(np.block([[rotation, np.zeros((3, 1))], [np.zeros((1, 3)), 1.0]]))
+    stock = StockMap.block(TriangleTree(mesh), box, rotation, 0.5)
+    lat = stock.lattice
+    heights = np.linspace(-30.0, 30.0, 6001)
+    checked = 0
+    for iy in range(0, lat.ny, 5):
+        for ix in range(0, lat.nx, 5):
+            line = np.column_stack([np.full_like(heights, lat.x0 + lat.step * ix),
+                                    np.full_like(heights, lat.y0 + lat.step * iy), heights]) @ rotation
+            inside = ((line >= box[0] - 1e-9) & (line <= box[1] + 1e-9)).all(axis=1)
+            if inside.any():
+                assert abs(stock.top[iy, ix] - heights[inside].max()) < 0.011
+                checked += 1
+            elif stock.top[iy, ix] > -np.inf:  # a corner thinner than the comb
+                at = np.array([lat.x0 + lat.step * ix, lat.y0 + lat.step * iy, stock.top[iy, ix]]) @ rotation
+                assert ((at >= box[0] - 1e-6) & (at <= box[1] + 1e-6)).all()
+    assert checked > 20

@@ -1,0 +1,157 @@
+"""From planned accesses to programs, and the frame these are proved in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.errors import InternalError, PlanningError
+from geometry.toolbody import ToolBody
+from output.clamping import home_of
+from output.linuxcnc import write_linuxcnc
+from output.model import Clamping, Frame, StockBox, Workplan
+from schemas.setup import Access, Setup, setup_sha256
+from service import reporting
+from service.convert import rotary_machine, tool_bodies
+from service.prepare import Prepared, stock_box, table_height, turned_box
+from service.sides import Look, Program, Side
+from service.version import VERSION
+from toolpath.motion import Workingstep
+from zones.view import View
+
+NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
+
+
+def stock_corners(ready: Prepared, view: View | Look) -> np.ndarray:
+    """(2, 3) corners of the nominal stock in the frame of a view, mm, uncertainty left out."""
+    box = stock_box(ready.setup, ready.part)
+    if box is not None:
+        return turned_box(box, view.rotation)
+    bounds, margin = ready.part.bounds, ready.setup.stock.margin_mm
+    grown = np.array([bounds[0] - margin, bounds[1] + margin])
+    grown[0, 2] = bounds[0, 2]
+    return turned_box(grown, view.rotation)
+
+
+def fixture_boxes(ready: Prepared, view: View | Look) -> tuple[np.ndarray, ...]:
+    """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
+    return tuple(turned_box(np.array(f.box_mm, dtype=np.float64), view.rotation) for f in ready.setup.fixtures)
+
+
+def access_of(ready: Prepared, view: View | Look) -> Access:
+    """The access a view or a frame belongs to."""
+    return next(a for a in ready.accesses if a.id == view.id)
+
+
+def proof_frame(ready: Prepared) -> Look:
+    """The frame programs are proved in: of the first access, on a machine with rotary axes that of the setup."""
+    first = Look.of(ready.views[0])
+    if ready.setup.machine.kind != "5-axis":
+        return first
+    turn = np.eye(3)
+    return first if np.array_equal(first.rotation, turn) else Look(first.id, turn, ready.part)
+
+
+def programs_of(ready: Prepared, sides: Sequence[Side]) -> list[Program]:
+    """The programs: one of each access that has steps, on a machine with rotary axes one of them all."""
+    cutting = [s for s in sides if s.made.steps]
+    if not cutting:
+        return []
+    if ready.setup.machine.kind == "5-axis":
+        work = clamped_workplan(ready, cutting)
+        return [Program(ready.views[0].id, work, write_linuxcnc(work))]
+    out = []
+    for s in cutting:
+        work, view = workplan(ready, s), s.view
+        turn = None if view.is_first else view.rotation @ view.first.T
+        out.append(Program(view.id, work, write_linuxcnc(work), "" if view.is_first else f".{view.id}", turn))
+    return out
+
+
+def workplan(ready: Prepared, side: Side) -> Workplan:
+    """The plan of one access as the writers want it."""
+    view = side.view
+    comments: tuple[str, ...] = ()
+    if len(ready.views) > 1:
+        d = " ".join(f"{v:.6g}" for v in view.direction)
+        comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank",)
+    return _workplan(ready, side.made.steps, Look.of(view), side.clearance, comments)
+
+
+def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
+    """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
+    setup, look = ready.setup, Look("", np.eye(3), ready.part)
+    machine = rotary_machine(setup.machine)
+    if machine is None:
+        raise InternalError("a machine without rotary axes has no clamping")
+    spare = setup.stock.uncertainty_mm
+    boxes = [np.array(stock_corners(ready, look)) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
+    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
+    frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
+    leans = max(float(np.arccos(np.clip(s.view.rotation[2, 2], -1.0, 1.0))) for s in sides)
+    centre = 0.5 * (low + high)
+    lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
+                        table_height(setup, ready.part) + setup.clearance_mm.rapid)
+    clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
+    words = ("fixed tool axes, one after the other, each from the whole blank",)
+    work = _workplan(ready, tuple(t for s in sides for t in s.made.steps), look, 0.0, words)
+    return replace(work, clamping=clamping, clearance_plane=float(home_of(clamping)[2]),
+                   work_offset=setup.access[0].work_offset)
+
+
+def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:
+    """By how much the ball that tools turn outside of is moved up, and made greater, so that they clear the table.
+
+    height, radius : mm, of its centre and its size
+    leans  : rad, the most a tool leans
+    table  : mm, Z that no tool may come down to
+
+    Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its
+    place, h cos(lean) above the tip; that is radius cos(lean) above the centre.
+
+    Raises
+    ------
+    PlanningError
+        Code no_room_to_turn: the tool points straight up from below.
+    """
+    angles = np.linspace(0.0, leans, max(2, int(np.ceil(np.degrees(leans))) + 1))
+    up, aside = np.cos(angles), np.sin(angles)
+    deepest = np.zeros_like(angles)
+    for tool in tools:
+        rims = [(0.0, tool.radius), (tool.flute_length, tool.radius), (tool.stickout, 0.5 * tool.shank_diameter)]
+        z = tool.stickout
+        for part in tool.holder:
+            rims += [(z, 0.5 * part.diameter), (z + part.length, 0.5 * part.diameter_top)]
+            z += part.length
+        if not tool.holder:
+            rims.append((z + NO_HOLDER, 0.5 * tool.shank_diameter))
+        for h, r in rims:
+            np.maximum(deepest, r * aside - h * up, out=deepest)
+    short = table + deepest - height - radius * up
+    if float(up.min()) < -0.9 and float(short.max()) > 0.0:
+        raise PlanningError("a tool that comes from straight below does not clear the table", code="no_room_to_turn",
+                            measured=float(np.degrees(leans)), limit=150.0,
+                            remedy="turn the part over in a clamping of its own")
+    return float(np.max(np.maximum(short, 0.0) / (1.0 + up)))
+
+
+def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float,
+              words: tuple[str, ...]) -> Workplan:
+    setup = ready.setup
+    used = {s.tool.id for s in steps}
+    lo, hi = stock_corners(ready, look)
+    offset = access_of(ready, look).work_offset if look.id else ""
+    return Workplan(setup.labels.get("order", "zonemill job"), steps,
+                    tuple(t for t in tool_bodies(setup) if t.id in used), clearance, offset, StockBox(lo, hi),
+                    reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
+                    dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)))
+
+
+def gauge_lengths(setup: Setup) -> dict[int, float]:
+    """mm from the spindle face to the tip, by T number."""
+    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
+            body.stickout + sum(h.length for h in body.holder)
+            for t, body in zip(setup.tools, tool_bodies(setup), strict=True)}

@@ -1,0 +1,79 @@
+"""Does a tool reach down to the table: lowest places of whole assemblies along the moves of a program.
+
+The lowest place of a disc of radius r at the height h of a tool with tip p and axis a is p_z + h a_z - r s, with
+s = sqrt(1 - a_z²). Cutting parts are rounded: a corner of radius c has its centres on the circle of radius R - c at
+the height c, so it reaches to p_z + c a_z - (R - c) s - c. All else is made of frusta, whose lowest place is on one of
+their two rims. Along a move the tip goes straight and the axis swings by a tenth of a radian at most
+(``dividing.MOST_TURN``), so what a rim at the distance q from the tip does between the ends of a move is within
+q / 800 of the way between them; that is added where an axis swings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from verify.bodies import Bodies
+from verify.model import Finding, FindingKind, ProofSetup
+from verify.program import Program
+
+BOW = 1.0 / 800.0  # of the distance from the tip
+UPRIGHT = 1e-9  # of an axis that leans
+ROUNDING = 1e-3  # mm, coordinates of a program
+
+
+def table_findings(read: Sequence[Program], tools: Sequence[ToolBody], setup: ProofSetup) -> list[Finding]:
+    """One finding for each program with tools that come nearer to the table than rapids keep to fixtures.
+
+    A table nobody told of (``setup.table_known`` false) is held against tools that lean, for upright ones go past the
+    part as on a machine of three axes.
+    """
+    if setup.table is None or setup.kinematics is None:
+        return []
+    return [f for p in read for f in _of(p, tools, setup, setup.table + setup.clearance_rapid)]
+
+
+def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, limit: float) -> Iterator[Finding]:
+    if p.poses is None and not setup.table_known:
+        return
+    up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
+    start, end = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
+    swings = np.abs(start - end).max(axis=1) > UPRIGHT
+    low = np.full(len(p), np.inf)
+    for tool in tools:
+        mine = np.flatnonzero(p.tool == tool.number)
+        low[mine] = np.minimum(_lowest(tool, setup, p.start[mine], start[mine], swings[mine]),
+                               _lowest(tool, setup, p.end[mine], end[mine], swings[mine]))
+    asked = np.isfinite(low)
+    if not setup.table_known:
+        asked &= (np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT)
+    bad = np.flatnonzero(asked & (low < limit - ROUNDING))
+    if not len(bad):
+        return
+    m = int(bad[np.argmin(low[bad])])
+    what = "the table" if setup.table_known else "the bottom of the blank, for nobody said where the table is,"
+    at = p.end[m]
+    yield Finding(FindingKind.COLLISION, p.name, int(p.line[m]), None, None, (float(at[0]), float(at[1]), float(at[2])),
+                  float(limit - low[m]), float(limit),
+                  f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it has to stay {setup.clearance_rapid:g} mm above {what} "
+                  f"at Z{setup.table:.3f}", len(bad))
+
+
+def _lowest(tool: ToolBody, setup: ProofSetup, tip: F64, axis: F64, swings: F64) -> F64:
+    """(n,) float64, mm: how low the assembly reaches with tips and axes (n, 3); lower where an axis swings."""
+    z = axis[:, 2]
+    s = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    c, flat = tool.corner_radius, tool.radius - tool.corner_radius
+    out = tip[:, 2] + c * z - flat * s - c
+    rims = [(tool.flute_length, tool.radius)]
+    for z0, z1, r0, r1, clearance, _ in Bodies.of([tool], setup).rows.tolist():
+        rims += [(z0, r0 - clearance), (z1, r1 - clearance)]
+    for h, r in rims:
+        out = np.minimum(out, tip[:, 2] + h * z - r * s - np.where(swings, BOW * np.hypot(h, r), 0.0))
+    return np.asarray(out)
+
+
+__all__ = ["table_findings"]

@@ -1,0 +1,167 @@
+"""The fewest further tool axes that get at what is left: 3+2 on a machine that can lean its tool or its table.
+
+Every axis of an even set over the half of the sphere the machine can turn to is asked, by the exact approach of
+``zones.approach``, which of the samples left some tool reaches along it. Choosing the axes is a set cover with a
+price: area won less ``worth`` for each axis, solved exactly. Each axis chosen is then turned by smaller and smaller
+angles, for as long as the area of what it was chosen for grows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.sparse import csr_matrix, hstack, identity
+
+from geometry.bvh import TriangleTree
+from geometry.errors import InternalError
+from geometry.mesh import F64
+from geometry.sampling import SurfaceSamples
+from geometry.tilted import axis_frames
+from geometry.toolbody import ToolBody
+from zones.approach import approach, directions_over_hemisphere, resolution_of
+from zones.reach import Clearances
+from zones.sight import able
+
+DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most
+ASKED_AT_MOST = 1500
+SEED = 17
+MOST_AXES = 6
+ROUND_ANGLES = (15.0, 5.0, 1.0)  # deg, tried in turn
+AS_GOOD = 0.98  # of the area an axis wins
+STEPS = 3  # halvings of the angle by which a chosen axis is turned
+
+
+class Gatherer:
+    """Which samples some tool reaches along which axes, exactly, without the blank.
+
+    tree      : TriangleTree of part and fixtures, setup frame
+    tools     : those of the setup
+    clear     : Clearances; scallop, lift, allowance : mm, as zones have them
+    """
+
+    def __init__(self, tree: TriangleTree, tools: Sequence[ToolBody], clear: Clearances, scallop: float, lift: float,
+                 allowance: float) -> None:
+        self.tree, self.tools, self.clear = tree, tools, clear
+        self.scallop, self.lift, self.allowance = scallop, lift, allowance
+
+    def reached(self, samples: SurfaceSamples, axes: F64) -> NDArray[np.bool_]:
+        """(n, d) bool: samples, setup frame, that a tool with a strategy for them reaches along axes (d, 3)."""
+        out = np.zeros((len(samples), len(axes)), np.bool_)
+        frames = axis_frames(axes)
+        for tool in self.tools:
+            got = approach(self.tree, tool, self.clear, samples.points, samples.normals, axes, self.lift,
+                           self.allowance)
+            for k, frame in enumerate(frames):
+                rows = np.flatnonzero(got[:, k] & ~out[:, k])
+                out[rows, k] = able(tool, samples.normals[rows] @ frame.T, self.scallop)
+        return out
+
+
+def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[[F64], NDArray[np.bool_]],
+                 even: Callable[[F64, float], F64], worth: float) -> F64:
+    """Tool axes that are worth turning to.
+
+    samples : SurfaceSamples that are left, setup frame
+    allowed : says of axes (d, 3) which the machine can turn to, (d,) bool
+    even    : axes (d, 3) near one (3,) at which the rotary axes stand at whole multiples of some degrees
+    worth   : mm², the least an axis has to win
+
+    Returns
+    -------
+    (k, 3) float64
+        Unit, tip to spindle, setup frame, k at most 6; what wins most first.
+
+    Notes
+    -----
+    Of more than 1500 samples 1500 are asked, drawn with a fixed seed by area, and stand for the rest. Axes that point
+    down are not asked: a tool does not come from under the table.
+    """
+    inner = np.flatnonzero(samples.area > 0)
+    total = float(samples.area.sum())
+    if total < worth or not len(inner):
+        return np.zeros((0, 3))
+    if len(inner) > ASKED_AT_MOST:
+        share = samples.area[inner] / total
+        inner = np.sort(np.random.default_rng(SEED).choice(inner, ASKED_AT_MOST, replace=False, p=share / share.sum()))
+        each = np.full(len(inner), total / len(inner))
+    else:
+        each = samples.area[inner]
+    few = samples.subset(inner)
+    axes = directions_over_hemisphere(DIRECTIONS)
+    axes = axes[allowed(axes)]
+    if not len(axes):
+        return np.zeros((0, 3))
+    got = gatherer.reached(few, axes)
+    chosen = _chosen(got, each, worth)
+    spacing = resolution_of(directions_over_hemisphere(DIRECTIONS))
+    found: list[F64] = []
+    rest = np.ones(len(few), np.bool_)
+    order = sorted(chosen, key=lambda k: -float(each[got[:, k]].sum()))
+    for k in order:
+        mine = np.flatnonzero(rest & got[:, k])
+        if float(each[mine].sum()) < worth:
+            continue
+        left = few.subset(np.flatnonzero(rest))
+        axis = _turned(axes[k], left, each[rest], gatherer, allowed, spacing)
+        axis = _evened(axis, left, each[rest], gatherer, allowed, even)
+        rest &= ~gatherer.reached(few, axis[None])[:, 0]
+        found.append(axis)
+    return np.array(found).reshape(-1, 3)
+
+
+def _chosen(got: NDArray[np.bool_], area: F64, worth: float) -> list[int]:
+    """Columns of (n, d) that win the most area less ``worth`` each, exactly; of equals those that come first."""
+    n, d = got.shape
+    gain = got.T.astype(np.float64) @ area
+    if float(gain.max(initial=0.0)) < worth:
+        return []
+    # x: axes taken; y: samples won, each no more than the axes that reach it
+    price = worth * (1.0 + 1e-6 * np.arange(d) / d)
+    cost = np.concatenate([price, -area])
+    cover = hstack([csr_matrix(-got.astype(np.float64)), identity(n)])
+    limits = [LinearConstraint(cover, -np.inf, 0.0),
+              LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MOST_AXES)]
+    answer = milp(cost, integrality=np.concatenate([np.ones(d), np.zeros(n)]), bounds=Bounds(0, 1), constraints=limits)
+    if answer.x is None:
+        raise InternalError(f"the choice of tool axes ended without an answer: {answer.message}")
+    return [int(k) for k in np.flatnonzero(answer.x[:d] > 0.5)]
+
+
+def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+            allowed: Callable[[F64], NDArray[np.bool_]], spacing: float) -> F64:
+    """The axis, turned to where it wins most of the samples near by."""
+    best, most = axis, float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    step = 0.5 * spacing
+    ring = np.arange(8) * np.pi / 4
+    for _ in range(STEPS):
+        frame = axis_frames(best[None])[0]
+        around = np.stack([np.sin(step) * np.cos(ring), np.sin(step) * np.sin(ring), np.full(8, np.cos(step))],
+                          axis=1) @ frame
+        around = around[(around[:, 2] >= 0.0) & allowed(around)]
+        if len(around):
+            won = area @ gatherer.reached(samples, around)
+            k = int(np.argmax(won))
+            if won[k] > most * (1.0 + 1e-9):
+                best, most = around[k], float(won[k])
+        step *= 0.5
+    return np.asarray(best)
+
+
+def _evened(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+            allowed: Callable[[F64], NDArray[np.bool_]], even: Callable[[F64, float], F64]) -> F64:
+    """An axis near by at which the rotary axes stand at round angles, where that wins about as much."""
+    most = float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    for degrees in ROUND_ANGLES:
+        near = even(axis, degrees)
+        near = near[(near[:, 2] >= -1e-12) & allowed(near)]
+        if len(near):
+            won = area @ gatherer.reached(samples, near)
+            if won.max() >= AS_GOOD * most:
+                return np.asarray(near[int(np.argmax(won))])
+    return axis
+
+
+__all__ = ["Gatherer", "orientations"]
