@@ -93,9 +93,9 @@ def to_and_fro(step: Workingstep) -> bool:
 
 
 def region_outline(step: Workingstep, rotation: F64 | None = None) -> I64:
-    """The outline of a step at its top, closed, at least three different points: (k, 3) int64 grid points.
+    """The outline of a step at its top, closed, three different points or more: (k, 3) int64, 0.0001 mm.
 
-    rotation : (3, 3), from the setup frame into that of the step; None: they are the same
+    rotation : (3, 3) float64, from the setup frame into that of the step; None: they are the same
     """
     outline = np.asarray(step.outline, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
