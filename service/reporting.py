@@ -61,7 +61,7 @@ def _shape(ready: Prepared) -> dict[str, Any]:
                          "z_mm": [r(c.z_bottom), r(c.z_top)]} for c in d.connections],
         "channels": [{"id": c.id, "walls": list(c.walls), "gap_min_mm": r(c.gap_min),
                       "at_mm": _place(ready, c.at)} for c in d.channels],
-        "accesses": _accesses(ready),
+        "accesses": accesses_of(ready),
         "mcz": [{"access": m.access, "tool": m.tool, "area_mm2": r(m.area, 3),
                  "cutter_area_mm2": r(m.cutter_area, 3)} for m in ready.zoning.mcz],
         "cutting_planes": [{"access": p.access, "z_mm": r(p.height), "region": p.region, "tool": p.tool,
@@ -69,7 +69,7 @@ def _shape(ready: Prepared) -> dict[str, Any]:
     }
 
 
-def _accesses(ready: Prepared) -> list[dict[str, Any]]:
+def accesses_of(ready: Prepared) -> list[dict[str, Any]]:
     """The tool axes of a job, and how the rotary axes stand for them."""
     machine, given = rotary_machine(ready.setup.machine), {a.id for a in ready.setup.access}
     out = []

@@ -231,16 +231,17 @@ class Finish:
             whole = linker.add(layer, thin)
             if linker.refused > refused:  # what it would have taken is too much for the layer below
                 break
-        for points in (t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT):
+        cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
+        for points in cuts:
             self.residual.cut(points, tool)
-        if whole:
-            self.walked.add(line)
+        for points in [line.points] if whole else cuts:
+            self.walked.add(points)
 
     def _unwalked(self, line: Line) -> list[Line]:
         """What of a line was not walked whole before by this tool; the rest is only measured, it would leave the same.
 
-        Lines of one level are cut to the samples they serve, so those of a later round may be part of an earlier one,
-        and those of zones side by side part of each other.
+        Lines are cut to the samples they serve, so those of a later round may be part of an earlier one, and those of
+        zones side by side part of each other.
         """
         fresh = self.walked.fresh(line)
         if fresh.all():

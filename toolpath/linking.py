@@ -63,6 +63,7 @@ class Linker:
     skipped : lines left out: no safe way in, or stock in the way of shank or holder
     refused : how many of them found no safe way in
     _lowest : mm, Z of the lowest cut by place of a tip
+    _deepest : (ny, nx) mm, the same by cell of the stock's lattice, along the moves too
     """
 
     field: TipField
@@ -74,6 +75,10 @@ class Linker:
     skipped: list[Line] = fresh(default_factory=list)
     refused: int = 0
     _lowest: dict[bytes, float] = fresh(default_factory=dict, repr=False)
+    _deepest: F64 = fresh(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._deepest = np.full(self.stock.top.shape, math.inf)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
@@ -114,7 +119,8 @@ class Linker:
             lifted = Line(points + np.array([0.0, 0.0, k * height]), line.closed)
             for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                if len(walk) > 1 and not self._pass(walk, piece.closed):
+                # where the tool has been as deep, what the stock still shows is out of its reach
+                if len(walk) > 1 and self._above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
                     return False
         return True
 
@@ -207,7 +213,12 @@ class Linker:
         seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
         highest = max(float(self.stock.overlap(points[:1], tool, SURE_RIM)[0]),
                       float(self.stock.under_end(points[:1], tool)[0]))
-        for over in (seen + 0.1, max(seen, self.motions.step_down) + 0.1, highest + 0.1):
+        # where the tool has been before nothing is left that it could take; an open line is gone down along its head
+        slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
+        head = points if closed else _head(points, 0.5 * (seen + 0.1) / slope)
+        above = max(float(self._above(head).max()), 0.0)
+        for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
+                     highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
             entry = self._beside(ramp[0]) if ramp is not None else None
             if ramp is not None and entry is not None:
@@ -270,6 +281,12 @@ class Linker:
 
     # -- moves ------------------------------------------------------------------------------------------------
 
+    def _above(self, points: F64) -> F64:
+        """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
+        way = dense(points, self.stock.lattice.step)
+        lat = self.stock.lattice
+        return np.where(lat.inside(way), self._deepest[lat.cells(way)] - way[:, 2], math.inf)
+
     def _here(self) -> F64:
         assert self.at is not None
         return self.at
@@ -292,6 +309,9 @@ class Linker:
         if motion is Motion.CUT:
             for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
                 self._lowest[place] = min(z, self._lowest.get(place, math.inf))
+            way = dense(points, 0.5 * self.stock.lattice.step)
+            way = way[self.stock.lattice.inside(way)]
+            np.minimum.at(self._deepest, self.stock.lattice.cells(way), way[:, 2])
 
     def _rapid(self, points: F64) -> None:
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
@@ -325,6 +345,13 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
+
+
+def _head(points: F64, length: float) -> F64:
+    """The beginning of a polyline (n, 3), mm, as long as ``length`` in plan, two points at least."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
+    head, at = _with_knot(points, s, length)
+    return head[:max(2, int(np.searchsorted(at, length, side="right")))]
 
 
 def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:

@@ -85,6 +85,11 @@ class Lattice:
         i = np.clip(np.rint((xy[:, 1] - self.y0) / self.step).astype(np.int64), 0, self.ny - 1)
         return i, j
 
+    def inside(self, xy: F64) -> NDArray[np.bool_]:
+        """(n,) bool: which of (n, 2) mm lie within half a step of the lattice."""
+        j, i = (xy[:, 0] - self.x0) / self.step, (xy[:, 1] - self.y0) / self.step
+        return np.asarray((j >= -0.5) & (j <= self.nx - 0.5) & (i >= -0.5) & (i <= self.ny - 0.5))
+
     def nodes(self, i: NDArray[np.int64], j: NDArray[np.int64], z: float) -> F64:
         """(n, 3) mm: nodes in rows i and columns j (n,), at height z, mm."""
         return np.column_stack([self.x0 + self.step * j, self.y0 + self.step * i, np.full(len(i), z)])

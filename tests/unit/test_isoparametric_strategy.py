@@ -164,7 +164,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             rest = np.where(np.arange(4) < left[k], 0.03, 0.01)
             steps = [] if seconds[k] is None else [SimpleNamespace(seconds=seconds[k])]
             walked = self.walked.copied()
-            walked.add(ways[k])
+            walked.add(ways[k].points)
             return SimpleNamespace(strategy=strategy, stock=None, residual=SimpleNamespace(residual=rest),
                                    walked=walked, _rounds=lambda _id, _wanted: steps)
 

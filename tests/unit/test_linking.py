@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,32 @@ def test_rings_of_layer_after_layer_are_gone_down_to_where_the_tool_has_been():
     assert min(tops[:2]) >= TOP
     assert np.allclose(tops[2:], [2.5, 2.5, 1.7, 1.7], atol=0.01)  # every ramp begins a tenth above what it comes to
     assert len({tuple(m) for m in moves}) == len(moves)  # no way is run twice
+
+
+def test_stock_that_stays_beside_a_wall_is_not_gone_over_layer_after_layer():
+    """Stock higher than the flutes that nothing takes away: it was walked above once, and that is enough."""
+    mesh = box_mesh([0, 0, -2], [30, 30, 0])
+    body = replace(ball(2.0), flute_length=1.5)
+    field = field_of(mesh, body)
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 8.0]), 0.15)
+    stays = stock.cover.copy()
+    stays[:, :] = -np.inf
+    i, j = stock.lattice.cells(np.array([[15.0, 15.6]]))
+    stays[i, j] = 8.0
+    cut = stock.cut
+
+    def leaves(points, tool):
+        cut(points, tool)
+        np.maximum(stock.cover, stays, out=stock.cover)
+
+    stock.cut = leaves
+    link = Linker(field, stock, Motions(800, 200, 3000, 14.0, 12.0, RAMP, 0.5, 0.001))
+    passes = []
+    for z in (7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0):
+        before = link.passes
+        assert link.add(straight(5, 25, 15, z))
+        passes.append(link.passes - before)
+    assert passes == [1] * 8
 
 
 @pytest.mark.parametrize("length", [3.0, 12.0, 24.0])

@@ -18,7 +18,7 @@ def line(*x, z=1.0, closed=False):
 def walked(*lines):
     out = Walked()
     for q in lines:
-        out.add(q)
+        out.add(q.points)
     return out
 
 
@@ -41,17 +41,21 @@ def test_places_from_different_lines_are_no_move():
     assert w.fresh(cross).all()
 
 
-def test_of_lines_that_go_up_and_down_only_the_whole_is_known():
+def test_of_lines_that_go_up_and_down_the_moves_are_known_too():
     up = Line(np.array([[0.0, 0, 0], [1, 0, 0.5], [2, 0, 0.7]]), False)
     w = walked(up)
     assert not w.fresh(up).any()
-    assert w.fresh(Line(up.points[:2], False)).all()
+    assert not w.fresh(Line(up.points[:2], False)).any()
+    raised = up.points + [0.0, 0.0, 0.01]  # a layer above it
+    assert w.fresh(Line(raised, False)).all()
+    on = Line(np.array([[0.0, 0, 0], [1, 0, 0.5], [3, 0, 0.9]]), False)
+    assert w.fresh(on).tolist() == [False, True]
 
 
 def test_a_copy_is_added_to_on_its_own_until_it_is_taken_over():
     w = walked(line(0, 1))
     other = w.copied()
-    other.add(line(1, 2))
+    other.add(line(1, 2).points)
     assert w.fresh(line(1, 2)).all() and not other.fresh(line(1, 2)).any()
     w.become(other)
     assert not w.fresh(line(0, 1, 2)).any()
