@@ -25,6 +25,7 @@ TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a tu
 SPARE = 0.5  # mm, outside the ball, for what a turn of joints leaves its chords by
 SWING = 1e-4  # rad, what a tool axis may leave the great circle between two points of a path by
 AT_REST = 1e-9  # rad
+JUMP = 1e-6  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +138,12 @@ class _Walk:
         gauge = self.clamping.gauges.get(step.tool.number, 0.0)
         for t in step.trajectories:
             tips = t.points @ frame.rotation
+            axis = frame.rotation[2] if t.axes is None else t.axes[0] @ frame.rotation
+            if np.abs(self.machine.axes(self.turn[None])[0] - axis).max() > JUMP:
+                raise OutputError(f"{step.id}: the tool axis jumps between two trajectories", code="axis_jump",
+                                  subjects=(step.id,), measured=axis.tolist(),
+                                  limit=self.machine.axes(self.turn[None])[0].tolist(),
+                                  remedy="turn it along a trajectory, or in a step of its own")
             if t.axes is None:
                 legs.append(self._straight(t.motion, tips, t.feed))
             else:

@@ -32,6 +32,7 @@ from geometry.mesh import F64
 POLE = 1e-9  # rad, an axis nearer to Z than this has no azimuth
 ROUND = 2.0 * math.pi
 MOST_ROUNDS = 24  # halvings of a block
+STANDS = 1e-6  # rad, from where it is said to stand
 LEAST_AXIS = 1e-7  # rad, an axis that swings less in a block is not cut again
 SHARES = (0.25, 0.5, 0.75)  # of a block, where it is held against the straight way
 _LETTER = {"A": 0, "B": 1}
@@ -144,11 +145,12 @@ class RotaryMachine:
             place = pivots[0] + _applied(self._tilt(turns).transpose(0, 2, 1), place - pivots[0])
         return np.asarray(pivots[1] + _applied(_turn_matrix(2, -turns[:, 1]), place - pivots[1]))
 
-    def follow(self, axes: F64, start: F64 | None = None) -> F64:
+    def follow(self, axes: F64, start: F64 | None = None, *, held: bool = False) -> F64:
         """Rotary axes along a path, turning least in all.
 
         axes  : (n, 3) float64, unit, along the path; neighbours less than half a turn apart
-        start : (2,) rad, where they stand before the path; None: anywhere, the least angles first
+        start : (2,) float64, rad, where they stand before the path; None: anywhere, the least angles first
+        held  : they stand at the first axis already, and are not turned to its other place
 
         Returns
         -------
@@ -166,8 +168,12 @@ class RotaryMachine:
         known = np.flatnonzero(~free)
         out[:, 0] = np.where(axes[:, 2] < 0.0, math.pi, 0.0)
         if len(known):
-            out[known] = self._least_turning(self.turns(axes[known]), start)
-            out[:, 1] = np.interp(np.arange(len(axes)), known, out[known, 1])
+            first = start if held and known[0] == 0 else None
+            out[known] = self._least_turning(self.turns(axes[known]), start, first)
+            at, turned = known, out[known, 1]
+            if held and known[0] > 0 and start is not None:  # at the pole, where any C will do, it is what it is
+                at, turned = np.concatenate([[0], known]), np.concatenate([start[1:], turned])
+            out[:, 1] = np.interp(np.arange(len(axes)), at, turned)
         else:
             out[:, 1] = 0.0 if start is None else start[1]
         self._check(out)
@@ -181,7 +187,7 @@ class RotaryMachine:
         tolerance  : mm, what the tip may leave its way by where the program is one of joints
         swing      : rad, what the axis may leave its great circle by
         gauge      : mm, spindle face to tip
-        start      : as of ``follow``
+        start      : (2,) float64, rad, where the rotary axes stand at its first point; None: anywhere
 
         Returns
         -------
@@ -192,7 +198,7 @@ class RotaryMachine:
         OutputError
             As ``follow``; pole_crossing: the axis passes so near Z that no step is short enough.
         """
-        turns = self.follow(axes, start)
+        turns = self.follow(axes, start, held=start is not None)
         for _ in range(MOST_ROUNDS):
             off = np.flatnonzero(self._off(tips, axes, turns, tolerance, swing, gauge))
             if not len(off):
@@ -233,8 +239,11 @@ class RotaryMachine:
                 out |= np.linalg.norm(at - (1.0 - share) * tips[:-1] - share * tips[1:], axis=1) > tolerance
         return out
 
-    def _least_turning(self, both: F64, start: F64 | None) -> F64:
-        """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all."""
+    def _least_turning(self, both: F64, start: F64 | None, first: F64 | None) -> F64:
+        """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all.
+
+        first : (2,) rad, the place it begins with, or None
+        """
         rows = self._choices(both)
         least = np.full(rows.shape[:2], math.inf)
         came = np.zeros(rows.shape[:2], np.int64)
@@ -242,6 +251,8 @@ class RotaryMachine:
         if self.limits is None:
             rows[0, :, 1] += ROUND * np.rint((came_from[1] - rows[0, :, 1]) / ROUND)
         least[0] = np.abs(rows[0] - came_from).max(axis=1)
+        if first is not None:
+            least[0, least[0] > STANDS] = math.inf
         least[0, np.isnan(least[0])] = math.inf
         if not np.isfinite(least[0]).any():
             self._refuse(both[0], 0)

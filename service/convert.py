@@ -95,7 +95,7 @@ def check_plannable(setup: Setup) -> None:
     Raises
     ------
     SetupError
-        Code 'cylinder_not_planned', 'access_out_of_reach', 'two_clampings'; as ``rotary_machine``.
+        Code 'cylinder_not_planned', 'no_rotary_zero', 'access_out_of_reach', 'two_clampings'; as ``rotary_machine``.
     """
     if setup.stock.kind == "cylinder":
         raise SetupError("plans start from a box or from the part grown by a margin so far; of a cylinder only "
@@ -110,6 +110,12 @@ def check_plannable(setup: Setup) -> None:
 
 def _check_accesses(setup: Setup, machine: RotaryMachine) -> None:
     """Refuse tool axes that the rotary axes cannot stand for, and a second clamping."""
+    for letter, limits in zip(machine.letters, setup.machine.rotary_deg or (), strict=False):
+        if not limits[0] <= 0.0 <= limits[1]:
+            raise SetupError(f"machine.rotary_deg of {letter}, {limits[0]:g} to {limits[1]:g}, leaves out 0, where the "
+                             "setup frame lies and tools are changed", code="no_rotary_zero",
+                             subjects=("machine.rotary_deg",), measured=limits, limit=0.0,
+                             remedy="count the angle from where the part stands as in the setup frame")
     for access in setup.access:
         axis = np.array([access.direction], dtype=np.float64)
         axis /= np.linalg.norm(axis)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,9 +107,18 @@ def test_programs_of_joints_time_what_turns_block_by_block():
     assert length.sum() / p.minutes[turning].sum() == pytest.approx(600.0, rel=1e-3)
 
 
-def test_limits_and_missing_frames_are_refused_by_name():
-    from dataclasses import replace
+def test_an_axis_that_jumps_from_one_trajectory_to_the_next_is_refused():
+    plan = clamped(swings=False)
+    last = plan.steps[-1]
+    lean = np.tile([0.1, 0.0, np.sqrt(0.99)], (len(last.trajectories[2].points), 1))
+    jumps = replace(last, trajectories=(*last.trajectories[:2], replace(last.trajectories[2], axes=lean),
+                                        *last.trajectories[3:]))
+    with pytest.raises(OutputError) as refused:
+        write_linuxcnc(replace(plan, steps=(*plan.steps[:-1], jumps)))
+    assert refused.value.code == "axis_jump" and refused.value.subjects == ("S05",)
 
+
+def test_limits_and_missing_frames_are_refused_by_name():
     plan = clamped()
     held = replace(plan.clamping.machine, limits=np.radians([[-20.0, 20.0], [-360.0, 360.0]]))
     with pytest.raises(OutputError) as refused:

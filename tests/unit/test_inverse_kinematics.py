@@ -120,3 +120,15 @@ def test_an_axis_that_passes_close_by_the_pole_is_followed():
     got = here.axes(np.linspace(turns[:-1], turns[1:], 20).reshape(-1, 2))
     assert np.abs(got @ unit(np.cross(axes[0], axes[1]))).max() < 1.2e-3
     assert len(path) < 200
+
+
+def test_a_path_begins_where_the_axes_stand_even_where_the_other_place_would_turn_less():
+    """From A30 a path that ends where only a negative tilt is allowed would rather have begun at the other place."""
+    here = machine("table-table-AC")
+    axes = unit(np.stack([np.linspace(0.4, -0.4, 41), np.full(41, 0.02), np.ones(41)], axis=1))
+    for start in here.turns(axes[:1])[0]:
+        turns = here.follow(axes, start, held=True)
+        assert np.allclose(turns[0], start) and np.allclose(here.axes(turns), axes)
+    pole = unit(np.stack([np.linspace(0.0, 0.4, 41), np.zeros(41), np.ones(41)], axis=1))
+    turns = here.follow(pole, np.radians([0.0, 33.0]), held=True)
+    assert np.allclose(turns[0], np.radians([0.0, 33.0])) and np.allclose(here.axes(turns), pole)

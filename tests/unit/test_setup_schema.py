@@ -139,6 +139,7 @@ def test_a_machine_of_five_axes_in_the_words_of_proof_and_writers():
 @pytest.mark.parametrize(("machine", "access", "code", "subject"), [
     ({"rotary_deg": [[-30, 60], [-360, 360]]}, [{}, {"id": "A2", "direction": [1, 0, 0]}], "access_out_of_reach", "A2"),
     ({}, [{}, {"id": "A2", "direction": [1, 0, 1], "work_offset": "G55"}], "two_clampings", "A2"),
+    ({"rotary_deg": [[10, 60], [-360, 360]]}, [{}], "no_rotary_zero", "machine.rotary_deg"),
     ({"tcp": False}, [{}], "no_pivots", "machine.pivots_mm")])
 def test_what_a_machine_of_five_axes_cannot_do_is_said(machine, access, code, subject):
     with pytest.raises(SetupError) as caught:
