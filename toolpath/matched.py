@@ -29,7 +29,8 @@ TRIALS = 14
 TURNS = np.radians(np.arange(-20.0, 21.0, 5.0))
 TURN_COST = 0.5  # of the radius, in width of the strip, by rad of turning from one station to the next
 EVEN = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0  # by which turns of neighbours are meant
-MOST_RUN_OUT = 0.1  # of the unit square
+MOST_RUN_OUT = 0.2  # of the unit square
+SPARE_RUN_OUT = 1.15  # of what the edges of a strip lag behind
 MARGIN = 0.02  # of the domain: so much farther than passes run out the surface is carried on
 FINEST = 12  # halvings of the way between two stations
 
@@ -92,7 +93,7 @@ class Matched:
         Raises
         ------
         GeometryError
-            Code 'bad_surface': it cannot be carried on so far (``NurbsSurface.extended``).
+            Code 'bad_surface': it cannot be carried on so far (``NurbsSurface.extended``); as ``strip``.
         """
         xi = np.linspace(0.0, 1.0, STATIONS)
         length = min(float(np.linalg.norm(np.diff(iso.contact(xi, np.full(STATIONS, eta))[0], axis=0), axis=1).sum())
@@ -101,7 +102,25 @@ class Matched:
         # the nose, which there is 1 - cos(30) of the radius behind, and half the radius aside
         lag = tool.radius * (1.0 - np.sqrt(0.75) + 0.5 * float(np.sin(TURNS[-1])))
         run_out = min(lag / length, MOST_RUN_OUT)
-        return cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
+        first = cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
+        farthest = min(SPARE_RUN_OUT * first.lag(0.5), MOST_RUN_OUT)
+        if farthest <= run_out:
+            return first
+        return cls(replace(iso, surface=iso.surface.extended(farthest + MARGIN)), tool, wanted, farthest)
+
+    def lag(self, eta: float) -> float:
+        """How far behind its contact, in xi, a pass at eta cuts the edges of its strip, at most.
+
+        Raises
+        ------
+        GeometryError
+            As ``strip``.
+        """
+        turn = np.zeros(STATIONS)
+        s = self.strip(eta, turn)
+        at = self.contacts(s.xi, eta)
+        edges = strip_edges(*self.nose.heights(at, s.tilt, turn), self.wanted.scallop)
+        return max(float(np.abs(self.iso.square(e, s.xi, np.full(STATIONS, eta))[0] - s.xi).max()) for e in edges)
 
     @property
     def nose(self) -> Nose:

@@ -60,6 +60,38 @@ def test_the_proof_finds_no_more_left_and_no_deeper_cut_than_asked(surface, leas
     assert all(b > a for a, b in zip(etas, etas[1:], strict=False))
 
 
+@pytest.mark.parametrize(("surface", "least", "body", "most"), [
+    (bowl(1e9, 1e9), 0.02, tool(12.0, 0.0), 4), (bowl(60.0, 60.0), 0.0, tool(6.0, 0.0), 9)], ids=["plane", "sphere"])
+def test_strips_as_wide_as_the_tool_are_cut_to_the_ends_of_the_face(surface, least, body, most):
+    """The edges of such strips lie the whole radius behind the contact: passes go on so far, and do not crawl."""
+    made = Matched.over(passes_along_y(surface), body, Wanted(0.0045, 0.001, np.radians(least), 0.0003))
+    strips = made.lay_out()
+    assert len(strips) <= most
+    left = measured(surface, body, [made.located(s) for s in strips])
+    assert left.max() <= 0.005 and left.min() >= -0.002
+
+
+def test_a_level_plane_without_a_least_tilt_takes_a_strip_a_tool_wide():
+    made = Matched.over(passes_along_y(bowl(1e9, 1e9)), tool(12.0, 0.0), Wanted(0.0045, 0.001, 0.0, 0.0003))
+    assert len(made.lay_out()) == 4
+
+
+def test_a_place_whose_height_is_not_known_counts_as_one_the_nose_enters(monkeypatch):
+    """At a pole there is no normal: no tilt may be called free there."""
+    surface, body = bowl(60.0, 150.0), tool(6.0, 0.0)
+    at = Contacts.on(surface, np.array([[0.5, 0.5], [0.3, 0.4]]), np.tile([0.0, 1.0], (2, 1)))
+    nose, heights = Nose(surface, body, surface.domain), Nose.heights
+    assert np.isfinite(nose.least_tilt(at, np.zeros(2), 1e-3, 0.0)).all()
+
+    def blind(self, *args):
+        high, feet = heights(self, *args)
+        high[0, 0, 5], feet[0, 0, 5] = np.nan, np.nan
+        return high, feet
+
+    monkeypatch.setattr(Nose, "heights", blind)
+    assert np.isnan(nose.least_tilt(at, np.zeros(2), 1e-3, 0.0)).tolist() == [True, False]
+
+
 def test_few_passes_where_the_nose_matches():
     """On the hollow of 60 by 150 mm a flat of 12 mm cuts strips of 6.6 mm, a ball of 12 mm such of 0.5 mm."""
     body = tool(12.0, 0.0)
@@ -92,9 +124,8 @@ def test_a_tilt_below_the_least_enters_and_one_above_does_not():
 
 
 def test_where_no_tilt_is_enough_it_is_said():
-    made = Matched.over(passes_along_y(bowl(5.0, 5.0)), tool(12.0, 0.0), Wanted(0.005, 0.0, 0.0, 0.0003))
     with pytest.raises(GeometryError, match="no tilt keeps its end out") as found:
-        made.strip(0.5, np.zeros(len(made.stations)))
+        Matched.over(passes_along_y(bowl(5.0, 5.0)), tool(12.0, 0.0), Wanted(0.005, 0.0, 0.0, 0.0003))
     assert found.value.code == "bad_pass" and "T1" in found.value.subjects
 
 
