@@ -61,12 +61,13 @@ class Leg:
 class Section:
     """A step with the ways to it and, before a tool is put away, from it.
 
-    fresh  : its tool is put in before it; the way to it begins at ``home`` then
+    fresh, last : its tool is put in before it, and the way to it begins at ``home`` then; it is put away after it
     before, legs, after : the way to its start, the step itself, back to ``home``
     """
 
     step: Workingstep
     fresh: bool
+    last: bool
     before: tuple[Leg, ...]
     legs: tuple[Leg, ...]
     after: tuple[Leg, ...]
@@ -95,7 +96,7 @@ def sections(plan: Workplan) -> list[Section]:
         grid_path(step)
         before = walk.enter(step, fresh)
         legs = walk.through(step)
-        out.append(Section(step, fresh, tuple(before), tuple(legs), tuple(walk.home()) if last else ()))
+        out.append(Section(step, fresh, last, tuple(before), tuple(legs), tuple(walk.home()) if last else ()))
     return out
 
 
@@ -135,7 +136,7 @@ class _Walk:
     def through(self, step: Workingstep) -> list[Leg]:
         """The trajectories of a step in the setup frame."""
         legs, frame = [], self.clamping.frames[step.access]
-        gauge = self.clamping.gauges.get(step.tool.number, 0.0)
+        gauge = self.clamping.gauges[step.tool.number]
         for t in step.trajectories:
             tips = t.points @ frame.rotation
             axis = frame.rotation[2] if t.axes is None else t.axes[0] @ frame.rotation
@@ -166,8 +167,9 @@ class _Walk:
         """Up along the tool axis to the plane that touches the ball, and across to where it does."""
         axis = self.machine.axes(self.turn[None])[0]
         goal = self.clamping.centre + _outside(self.clamping) * axis
-        up = max(float((goal - self.tip) @ axis), 0.0)
-        path = np.array([self.tip, self.tip + up * axis, goal])
+        up = float((goal - self.tip) @ axis)
+        level = self.tip + up * axis if up > 0.0 else goal - up * axis  # from above: across first, then down
+        path = np.array([self.tip, level, goal])
         self.tip = goal
         far = np.linalg.norm(np.diff(path, axis=0), axis=1) > GRID
         keep = np.array([True, far[0], far[1]])

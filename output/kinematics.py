@@ -166,7 +166,8 @@ class RotaryMachine:
         out = np.zeros((len(axes), 2))
         free = np.hypot(axes[:, 0], axes[:, 1]) <= POLE
         known = np.flatnonzero(~free)
-        out[:, 0] = np.where(axes[:, 2] < 0.0, math.pi, 0.0)
+        over = math.pi if self.limits is None or self.limits[0, 1] >= math.pi else -math.pi
+        out[:, 0] = np.where(axes[:, 2] < 0.0, over, 0.0)
         if len(known):
             first = start if held and known[0] == 0 else None
             out[known] = self._least_turning(self.turns(axes[known]), start, first)

@@ -32,7 +32,7 @@ from geometry.toolbody import ToolBody
 from output.clamping import Leg, Section, home_of, sections
 from output.grid import GRID, I64, PER_MM, check_plan, grid_path, link, to_grid
 from output.model import Clamping, Workplan
-from output.text import ascii_text, decimal, face_words, step_title, tool_name
+from output.text import ascii_text, decimal, face_words, height_word, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
 LINE = 100
@@ -209,7 +209,7 @@ class _Turning(_Program):
             self._arrive()
         for leg in (*section.before, *section.legs, *section.after):
             self._walk(leg)
-        if section.after and self.machine.tcp:
+        if section.last and self.machine.tcp:
             self.lines.append("M429")
             self.motion = ""
 
@@ -226,7 +226,7 @@ class _Turning(_Program):
     def _walk(self, leg: Leg) -> None:
         """The blocks of a leg; it begins where the tool stands."""
         turns = to_grid(np.degrees(leg.turns))
-        gauge = self.clamping.gauges.get(self.tool.number, 0.0) if self.tool else 0.0
+        gauge = 0.0 if self.tool is None else self.clamping.gauges[self.tool.number]
         linear = leg.tips if self.machine.tcp else self.machine.joints(leg.tips, np.radians(turns * GRID), gauge)
         points = np.column_stack([to_grid(linear), turns])
         if self.position is not None:
@@ -317,7 +317,7 @@ def _heights(plan: Workplan) -> list[str]:
            *(f"Access {name}, tool axis " + " ".join(decimal(v, 6) for v in f.rotation[2].tolist()) + ": "
              + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
                         zip(c.machine.letters, c.machine.follow(f.rotation[2:], np.zeros(2))[0], strict=True))
-             + " or whole turns of C from there" for name, f in c.frames.items())]
+             + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items())]
     if c.machine.tcp:
         return [*out, "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"]
     pivots = "; ".join(" ".join(decimal(v, 4) for v in p) for p in c.machine.pivots or ())
@@ -350,7 +350,7 @@ def _step_words(step: Workingstep) -> str:
     faces = face_words(step) or "no faces"
     words = [
         f"{step.id} {zone} {step.operation} {step.strategy} T{step.tool.number}: {faces}",
-        f"Z {decimal(step.top, 3)} down to {decimal(step.bottom, 3)}",
+        f"{height_word(step)} {decimal(step.top, 3)} down to {decimal(step.bottom, 3)}",
     ]
     title = step_title(step)
     if any(w not in words[0] for w in title.split()):

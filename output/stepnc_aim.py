@@ -19,7 +19,7 @@ from output.grid import check_plan
 from output.model import Workplan
 from output.part21 import Part21, quoted, real, reals, refs
 from output.stepnc_words import Curve, header_words, operation_words, region_name, setup_words, stock_box, ways
-from output.text import decimal, step_title, tool_name
+from output.text import decimal, height_word, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
@@ -256,4 +256,4 @@ def _purpose(step: Workingstep) -> str:
     """What the strategy was asked for: class 1 carries no strategy object."""
     return (f"{step.strategy}, {'climb' if step.climb else 'conventional'}, side step {decimal(step.side_step)} mm, "
             f"scallop {decimal(step.scallop_height)} mm, chordal tolerance {decimal(step.chordal_tolerance)} mm, "
-            f"Z {decimal(step.top)} to {decimal(step.bottom)} mm")
+            f"{height_word(step)} {decimal(step.top)} to {decimal(step.bottom)} mm")

@@ -85,7 +85,8 @@ class _Arm:
         self.down = add("DIRECTION('projection',(0.,0.,-1.))")
         top = add(f"CARTESIAN_POINT('',(0.,0.,{real(self.plan.clearance_plane)}))")
         self.secplane = add(f"PLANE('security plane',#{self._placement('security plane placement', top)})")
-        self.three_axes = add("THREE_AXES()")
+        if self.plan.clamping is None:
+            self.three_axes = add("THREE_AXES()")
         self.functions = add("MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(),.F.,$,$,())")
 
     def _placement(self, name: str, point: int) -> int:
@@ -153,10 +154,20 @@ class _Arm:
         paths = self._toolpaths(step, path)
         technology = self._technology(step.spindle_rpm, step.feed)
         self.file.fill(operation, (
-            f"FREEFORM_OPERATION(#{paths},#{self.three_axes},{quoted(operation_words(step))},"
+            f"FREEFORM_OPERATION(#{paths},{self._direction(step)},{quoted(operation_words(step))},"
             f"{real(self.plan.clearance_plane)},$,#{self._tool(step.tool)},#{technology},#{self.functions},"
             f"$,$,$,#{self._strategy(step)})"))
         return add(f"MACHINING_WORKINGSTEP({quoted(title)},#{self.secplane},#{feature},#{operation},$)")
+
+    def _normal(self, step: Workingstep) -> list[float]:
+        """Of the planes of the passes, in the setup frame."""
+        normal = np.array(pass_plane_normal(step))
+        clamping = self.plan.clamping
+        return (normal if clamping is None else normal @ clamping.frames[step.access].rotation).tolist()
+
+    def _direction(self, step: Workingstep) -> str:
+        """Three axes along Z; left open where every trajectory has its own tool axis, which overrides it."""
+        return f"#{self.three_axes}" if self.plan.clamping is None else "$"
 
     def _region(self, step: Workingstep, operation: int) -> int:
         """The area in plan and its depth; a flat one gets the depth of the grid, since the schema wants it positive."""
@@ -224,5 +235,5 @@ class _Arm:
             along = add(f"DIRECTION('along the passes in parameters',{reals((1.0, 0.0, 0.0), 6)})")
             across = add(f"DIRECTION('across the passes in parameters',{reals((0.0, 1.0, 0.0), 6)})")
             return add(f"UV_STRATEGY({mode},{cut},#{tolerances},{side},#{along},#{across})")
-        plane = add(f"DIRECTION('normal of the pass planes',{reals(pass_plane_normal(step), 6)})")
+        plane = add(f"DIRECTION('normal of the pass planes',{reals(self._normal(step), 6)})")
         return add(f"PLANE_CL_STRATEGY({mode},{cut},#{tolerances},{side},#{plane})")

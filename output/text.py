@@ -50,6 +50,11 @@ def face_words(step: Workingstep) -> str:
     return " ".join(f"F{n}" for n in step.faces)
 
 
+def height_word(step: Workingstep) -> str:
+    """'Z', or where a step is in the frame of an access what its heights are along: 'height along the axis of I1'."""
+    return f"height along the axis of {step.access}" if step.access else "Z"
+
+
 def step_title(step: Workingstep) -> str:
     """The name of a step, opened by its id."""
     return step.name if step.name.split(" ", 1)[0] == step.id else f"{step.id} {step.name}".strip()

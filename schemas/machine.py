@@ -40,8 +40,9 @@ class Machine(WireModel):
                                                 "deg; null: not limited, and on a 3-axis machine.")] = None
     table_z_mm: Annotated[BoundedNumber | None, Field(
         description="Height of the table, or of whatever the part stands on, in the setup frame with the rotary axes "
-                    "at 0, mm: no tool comes near it. null: a tool that leans stays above the bottom of the blank; and "
-                    "on a 3-axis machine.")] = None
+                    "at 0, mm: no tool comes near it; a spindle nose wider than the holder belongs into "
+                    "tools[].holder. null: a tool that leans stays above the bottom of the blank; and on a 3-axis "
+                    "machine.")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine turns to further tool axes for what the accesses of the setup leave. "
                     "given: to those accesses alone. No effect on a 3-axis machine.")] = "find"

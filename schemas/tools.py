@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from schemas.base import Count, Number, WireModel
 
@@ -65,6 +65,7 @@ class Tool(WireModel):
     stickout_mm: Annotated[Length | None, Field(
         description="Tip to holder nose, mm. Must be given with a holder; without one the default is the greater of "
                     "neck_length_mm and 10 x diameter_mm.")] = None
+    _gauge_given: bool = PrivateAttr(default=False)
     gauge_length_mm: Annotated[Length | None, Field(
         description="Tip to spindle face, mm, for the length offset, the travel in Z and kinematics only; default: "
                     "stickout_mm + the holder's lengths.")] = None
@@ -121,8 +122,14 @@ class Tool(WireModel):
             if self.holder:
                 raise ValueError(f"tool {self.id}: a tool with a holder needs stickout_mm (tip to holder nose)")
             self.stickout_mm = max(self.neck_length_mm, 10 * self.diameter_mm)
+        self._gauge_given = self.gauge_length_mm is not None
         if self.gauge_length_mm is None:
             self.gauge_length_mm = self.stickout_mm + sum(s.length_mm for s in self.holder)
+
+    @property
+    def gauge_given(self) -> bool:
+        """Whether somebody gave the gauge length; else it is the default."""
+        return self._gauge_given
 
     def _check_lengths(self) -> None:
         chain = [(n, _given(getattr(self, n)))

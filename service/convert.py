@@ -19,6 +19,7 @@ from schemas.setup import Placement, Setup
 from schemas.tools import Tool
 from verify.kinematics import Kinematics
 
+LOWEST_AXIS = -0.5  # Z of the unit tool axis: 30 degrees below level
 OBJECT_WANTED = ("model_type", "model_attributes_type", "dict_type")
 Library = Mapping[str, Mapping[str, Any]]
 
@@ -95,7 +96,8 @@ def check_plannable(setup: Setup) -> None:
     Raises
     ------
     SetupError
-        Code 'cylinder_not_planned', 'no_rotary_zero', 'access_out_of_reach', 'two_clampings'; as ``rotary_machine``.
+        Code 'cylinder_not_planned', 'dogleg_rapids', 'no_gauge_length', 'no_rotary_zero',
+        'access_out_of_reach', 'access_from_below', 'two_clampings'; as ``rotary_machine``.
     """
     if setup.stock.kind == "cylinder":
         raise SetupError("plans start from a box or from the part grown by a margin so far; of a cylinder only "
@@ -110,6 +112,18 @@ def check_plannable(setup: Setup) -> None:
 
 def _check_accesses(setup: Setup, machine: RotaryMachine) -> None:
     """Refuse tool axes that the rotary axes cannot stand for, and a second clamping."""
+    if setup.machine.rapid_motion == "dogleg":
+        raise SetupError("a job that turns needs rapids along straight lines; on this machine each axis runs at its "
+                         "own speed, so where the tool is while it turns cannot be known", code="dogleg_rapids",
+                         subjects=("machine.rapid_motion",), measured="dogleg", limit="linear",
+                         remedy="set the control to linear rapids and say machine.rapid_motion 'linear', or plan on "
+                                "three axes")
+    if machine.tilts_head and not machine.tcp:
+        bare = [t.id for t in setup.tools if not t.gauge_given]
+        if bare:
+            raise SetupError(f"tools {', '.join(bare)}: the head swings the tool and the program is of joints, so "
+                             "every tip depends on the length from the spindle face", code="no_gauge_length",
+                             subjects=tuple(bare), remedy="give gauge_length_mm as measured, tip to spindle face")
     for letter, limits in zip(machine.letters, setup.machine.rotary_deg or (), strict=False):
         if not limits[0] <= 0.0 <= limits[1]:
             raise SetupError(f"machine.rotary_deg of {letter}, {limits[0]:g} to {limits[1]:g}, leaves out 0, where the "
@@ -126,6 +140,10 @@ def _check_accesses(setup: Setup, machine: RotaryMachine) -> None:
                              limit=setup.machine.rotary_deg,
                              remedy=f"{machine.letters} would have to stand at one of these; give another direction, "
                                     "or turn the setup frame by placement")
+        if axis[0, 2] < LOWEST_AXIS:
+            raise SetupError(f"access {access.id}, tool axis {access.direction}, comes from below: there the table is",
+                             code="access_from_below", subjects=(access.id,), measured=float(axis[0, 2]),
+                             limit=LOWEST_AXIS, remedy="turn the part over in a clamping of its own")
         if access.work_offset != setup.access[0].work_offset:
             raise SetupError(f"access {access.id} has work offset {access.work_offset} and {setup.access[0].id} has "
                              f"{setup.access[0].work_offset}: a machine with rotary axes holds the part once",

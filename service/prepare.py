@@ -251,8 +251,9 @@ def _further(setup: Setup, part: Part, views: list[View], zoning: Zoning, lift: 
     gatherer = Gatherer(TriangleTree(obstacle_mesh(part, setup, leaning=True)), tool_bodies(setup), clearances(setup),
                         setup.quality.scallop_height_mm, lift, setup.quality.stock_allowance_mm)
     worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
-    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands,
-                        machine.even, worth)
+    known = np.array([v.direction for v in views])
+    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands, machine.even, known,
+                        worth)
     names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in setup.access})
     offset = setup.access[0].work_offset
     return [Access(id=next(names), direction=[round(v, 12) + 0.0 for v in axis], work_offset=offset)
@@ -291,7 +292,8 @@ def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, sample
     is_first = rotation is first or np.array_equal(rotation, first)
     here = turned(part, rotation)
     tree = TriangleTree(here.mesh)
-    obstacles, leaning = tree, setup.machine.kind == "5-axis" and rotation[2, 2] < UPRIGHT
+    told = setup.machine.table_z_mm is not None
+    obstacles, leaning = tree, setup.machine.kind == "5-axis" and (told or rotation[2, 2] < UPRIGHT)
     if setup.fixtures or leaning:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.errors import InternalError, PlanningError
+from geometry.errors import InternalError
 from geometry.toolbody import ToolBody
 from output.clamping import home_of
 from output.linuxcnc import write_linuxcnc
@@ -21,6 +21,7 @@ from service.version import VERSION
 from toolpath.motion import Workingstep
 from zones.view import View
 
+BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
 
 
@@ -106,16 +107,12 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     """By how much the ball that tools turn outside of is moved up, and made greater, so that they clear the table.
 
     height, radius : mm, of its centre and its size
-    leans  : rad, the most a tool leans
+    leans  : rad, the most a tool leans, well below a half turn (``service.convert.check_plannable``)
     table  : mm, Z that no tool may come down to
 
     Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its
-    place, h cos(lean) above the tip; that is radius cos(lean) above the centre.
-
-    Raises
-    ------
-    PlanningError
-        Code no_room_to_turn: the tool points straight up from below.
+    place, h cos(lean) above the tip; that is radius cos(lean) above the centre. While an axis swings the proof takes
+    1/800 of the distance from the tip off that (``verify.table``), and so it is here.
     """
     angles = np.linspace(0.0, leans, max(2, int(np.ceil(np.degrees(leans))) + 1))
     up, aside = np.cos(angles), np.sin(angles)
@@ -129,12 +126,8 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
         if not tool.holder:
             rims.append((z + NO_HOLDER, 0.5 * tool.shank_diameter))
         for h, r in rims:
-            np.maximum(deepest, r * aside - h * up, out=deepest)
-    short = table + deepest - height - radius * up
-    if float(up.min()) < -0.9 and float(short.max()) > 0.0:
-        raise PlanningError("a tool that comes from straight below does not clear the table", code="no_room_to_turn",
-                            measured=float(np.degrees(leans)), limit=150.0,
-                            remedy="turn the part over in a clamping of its own")
+            np.maximum(deepest, r * aside - h * up + BOW * np.hypot(h, r), out=deepest)
+    short = table + deepest + SPARE - height - radius * up
     return float(np.max(np.maximum(short, 0.0) / (1.0 + up)))
 
 

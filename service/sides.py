@@ -90,7 +90,7 @@ def in_setup_frame(look: Look, proof: Proof) -> Proof:
 
 def in_first_frame(side: Side) -> list[Workingstep]:
     """The steps of a side with their points in the frame of the first access, for a picture."""
-    turn = side.view.rotation.T @ side.view.first.T
+    turn = side.view.rotation @ side.view.first.T
     if np.array_equal(turn, np.eye(3)):
         return list(side.made.steps)
     return [replace(s, trajectories=tuple(replace(t, points=t.points @ turn) for t in s.trajectories))

@@ -69,7 +69,7 @@ class StockMap:
         corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
         lat = Lattice.over(np.array([corners.min(axis=0), corners.max(axis=0)]), 3 * step, step)
         x, y = np.meshgrid(lat.x0 + step * np.arange(lat.nx), lat.y0 + step * np.arange(lat.ny))
-        upper, lower = np.full(x.shape, np.inf), np.full(x.shape, -np.inf)
+        upper, lower, bound = np.full(x.shape, np.inf), np.full(x.shape, -np.inf), np.full(x.shape, np.inf)
         # a face, n p <= d, holds the height of a vertical line from above or below, or keeps the line out
         for axis in range(3):
             for sense, d in ((1.0, box[1][axis]), (-1.0, -box[0][axis])):
@@ -79,9 +79,15 @@ class StockMap:
                     upper[room < -ON_EDGE] = -np.inf
                 elif n[2] > 0.0:
                     np.minimum(upper, room / n[2], out=upper)
+                    grade = (abs(n[0]) + abs(n[1])) / n[2]
+                    np.minimum(bound, room / n[2] + 0.5 * step * grade, out=bound)
                 else:
                     np.maximum(lower, room / n[2], out=lower)
-        return cls(lat, np.where(upper >= lower, upper, -np.inf), None, _in_cells(tree, lat))
+        stands = upper >= lower
+        # the highest of a cell is on no plane above what that has at the cell's worst corner, nor above the block
+        near = ndimage.binary_dilation(stands, np.ones((3, 3)))
+        cover = np.where(near, np.minimum(bound, corners[:, 2].max()), -np.inf)
+        return cls(lat, np.where(stands, upper, -np.inf), cover, _in_cells(tree, lat))
 
     def copied(self) -> StockMap:
         """The same stock, to be cut on its own."""
@@ -165,7 +171,7 @@ class StockMap:
     @property
     def highest(self) -> float:
         """Highest point of the stock, mm; -inf where there is none."""
-        return float(self.top.max()) if self.top.size else float("-inf")
+        return float(self.cover.max()) if self.cover.size else float("-inf")
 
 
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:

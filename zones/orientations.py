@@ -29,6 +29,7 @@ DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most
 ASKED_AT_MOST = 1500
 SEED = 17
 MOST_AXES = 6
+SAME = np.radians(1.0)  # axes nearer than that to a known one are not asked
 ROUND_ANGLES = (15.0, 5.0, 1.0)  # deg, tried in turn
 AS_GOOD = 0.98  # of the area an axis wins
 STEPS = 3  # halvings of the angle by which a chosen axis is turned
@@ -61,12 +62,13 @@ class Gatherer:
 
 
 def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[[F64], NDArray[np.bool_]],
-                 even: Callable[[F64, float], F64], worth: float) -> F64:
+                 even: Callable[[F64, float], F64], known: F64, worth: float) -> F64:
     """Tool axes that are worth turning to.
 
     samples : SurfaceSamples that are left, setup frame
     allowed : says of axes (d, 3) which the machine can turn to, (d,) bool
     even    : axes (d, 3) near one (3,) at which the rotary axes stand at whole multiples of some degrees
+    known   : (k, 3) float64, unit, axes the samples were left by
     worth   : mm², the least an axis has to win
 
     Returns
@@ -91,7 +93,7 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
         each = samples.area[inner]
     few = samples.subset(inner)
     axes = directions_over_hemisphere(DIRECTIONS)
-    axes = axes[allowed(axes)]
+    axes = axes[allowed(axes) & (axes @ known.T < np.cos(SAME)).all(axis=1)]
     if not len(axes):
         return np.zeros((0, 3))
     got = gatherer.reached(few, axes)
@@ -124,7 +126,8 @@ def _chosen(got: NDArray[np.bool_], area: F64, worth: float) -> list[int]:
     cover = hstack([csr_matrix(-got.astype(np.float64)), identity(n)])
     limits = [LinearConstraint(cover, -np.inf, 0.0),
               LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MOST_AXES)]
-    answer = milp(cost, integrality=np.concatenate([np.ones(d), np.zeros(n)]), bounds=Bounds(0, 1), constraints=limits)
+    answer = milp(cost, integrality=np.concatenate([np.ones(d), np.zeros(n)]), bounds=Bounds(0, 1), constraints=limits,
+                  options={"mip_rel_gap": 0.0})
     if answer.x is None:
         raise InternalError(f"the choice of tool axes ended without an answer: {answer.message}")
     return [int(k) for k in np.flatnonzero(answer.x[:d] > 0.5)]

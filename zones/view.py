@@ -81,7 +81,7 @@ class View:
 
     def label(self, samples: SurfaceSamples) -> Labels:
         """Regions of other samples, given in this frame."""
-        turn = self.rotation.T @ self.first.T
+        turn = self.rotation @ self.first.T  # of rows of points: into the setup frame and on into the first
         there = None if self.is_first else (np.asarray(samples.points @ turn), np.asarray(samples.normals @ turn))
         return self.regioner.of(samples.points, samples.normals, samples.face, there)
 

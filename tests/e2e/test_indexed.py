@@ -12,6 +12,7 @@ import pytest
 from schemas.setup import Setup
 from service import chain
 from service.convert import parse_setup
+from service.prepare import prepare
 from verify.kinematics import Kinematics
 from verify.reader import read_program
 
@@ -80,6 +81,26 @@ def test_one_program_in_the_setup_frame_and_one_of_each_stepnc(job: tuple[Path, 
     wanted = {tuple(np.round(a["axis"], 4).tolist()) for a in report["accesses"]}
     assert axes == wanted
     assert "'tool axis'" in (out / "job.stpnc").read_text()
+
+
+def test_samples_of_an_oblique_view_have_the_regions_they_had(part: Path) -> None:
+    """What is labelled in the frame of a view is looked up in that of the first, where channels are drawn."""
+    setup = parse_setup(json.dumps({**SETUP, "access": [{}, {"id": "A2", "direction": [0.4, -0.7, 0.5]}],
+                                    "machine": {**MACHINE, "orientations": "given"}}))
+    view = prepare(part, setup, quiet).views[1]
+    again = view.label(view.samples)
+    assert (again.names == view.labels.names).all()
+    assert len(set(again.names.tolist())) > 3
+
+
+@pytest.mark.slow
+def test_a_level_tool_clears_the_table_and_an_upright_one_what_is_told_of_it(part: Path) -> None:
+    """Level first and then upright; on a table that is known the upright tool ends above it."""
+    for access, table in (([{"direction": [1, 0, 0]}, {"id": "A2"}], None), ([{}], 0.0)):
+        setup = parse_setup(json.dumps({**SETUP, "access": access, "machine": {
+            **MACHINE, "orientations": "given", "table_z_mm": table}}))
+        report = chain.plan(part, setup, part.parent / "level", quiet)
+        assert report["state"] == "proved", report["findings"]
 
 
 @pytest.mark.slow

@@ -22,8 +22,7 @@ from zones.reach import Clearances
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 24.0, 6.0, 36.0, (HolderSegment(20.0, 20.0, 30.0),))
 
 
-def everywhere(axes):
-    return np.ones(len(axes), np.bool_)
+UP = np.array([[0.0, 0.0, 1.0]])
 
 
 def shelf():
@@ -41,7 +40,7 @@ def test_under_a_roof_one_axis_from_the_open_side_does():
     few = every.subset(under)
     assert not gatherer.reached(few, np.array([[0.0, 0.0, 1.0]])).any()
     machine = RotaryMachine("table-table-AC", None, np.radians([[-100.0, 100.0], [-360.0, 360.0]]))
-    axes = orientations(few, gatherer, machine.stands, machine.even, 5.0)
+    axes = orientations(few, gatherer, machine.stands, machine.even, UP, 5.0)
     assert 1 <= len(axes) <= 2 and axes[0] @ [1.0, 0.0, 0.0] > 0.3
     got = gatherer.reached(few, axes).any(axis=1)
     best = gatherer.reached(few, directions_over_hemisphere(241)).any(axis=1)
@@ -49,7 +48,7 @@ def test_under_a_roof_one_axis_from_the_open_side_does():
     turns = np.degrees(machine.turns(axes)[:, 0])
     assert np.allclose(turns, np.round(turns), atol=1e-6)  # whole degrees
     limited = RotaryMachine("table-table-AC", None, np.radians([[-10.0, 10.0], [-360.0, 360.0]]))
-    assert len(orientations(few, gatherer, limited.stands, limited.even, 5.0)) == 0
+    assert len(orientations(few, gatherer, limited.stands, limited.even, UP, 5.0)) == 0
 
 
 def test_the_choice_is_the_best_of_all_choices():
@@ -122,5 +121,5 @@ def test_the_ball_is_lifted_just_enough_to_turn_over_the_table(leans):
         axis = np.array([np.sin(a), 0.0, np.cos(a)])
         tip = np.array([0.0, 0.0, height + lift]) + (radius + lift) * axis
         lows.append(drawn(BALL, tip, axis))
-    assert min(lows) >= table - 0.02
-    assert lift == 0.0 or min(lows) < table + 0.05
+    assert min(lows) >= table
+    assert lift == 0.0 or min(lows) < table + 0.35  # less what the proof takes off for an axis that swings, 0.09 mm

@@ -140,6 +140,9 @@ def test_a_machine_of_five_axes_in_the_words_of_proof_and_writers():
     ({"rotary_deg": [[-30, 60], [-360, 360]]}, [{}, {"id": "A2", "direction": [1, 0, 0]}], "access_out_of_reach", "A2"),
     ({}, [{}, {"id": "A2", "direction": [1, 0, 1], "work_offset": "G55"}], "two_clampings", "A2"),
     ({"rotary_deg": [[10, 60], [-360, 360]]}, [{}], "no_rotary_zero", "machine.rotary_deg"),
+    ({}, [{}, {"id": "A2", "direction": [0, 0.3, -1]}], "access_from_below", "A2"),
+    ({"rapid_motion": "dogleg"}, [{}], "dogleg_rapids", "machine.rapid_motion"),
+    ({"kinematics": "head-head-BC", "tcp": False, "pivots_mm": [[0, 0, 90]]}, [{}], "no_gauge_length", "T1"),
     ({"tcp": False}, [{}], "no_pivots", "machine.pivots_mm")])
 def test_what_a_machine_of_five_axes_cannot_do_is_said(machine, access, code, subject):
     with pytest.raises(SetupError) as caught:

@@ -150,6 +150,10 @@ def test_a_block_that_stands_askew_is_as_high_as_its_corners_and_edges(direction
             if inside.any():
                 assert abs(stock.top[iy, ix] - heights[inside].max()) < 0.011
                 checked += 1
+                for dx, dy in ((-0.25, -0.25), (-0.25, 0.25), (0.25, -0.25), (0.25, 0.25), (0.1, -0.2), (0.0, 0.25)):
+                    near = (line @ rotation.T + [dx, dy, 0.0]) @ rotation
+                    there = ((near >= box[0]) & (near <= box[1])).all(axis=1)
+                    assert stock.cover[iy, ix] >= (heights[there].max() if there.any() else -np.inf) - 1e-9
             elif stock.top[iy, ix] > -np.inf:  # a corner thinner than the comb
                 at = np.array([lat.x0 + lat.step * ix, lat.y0 + lat.step * iy, stock.top[iy, ix]]) @ rotation
                 assert ((at >= box[0] - 1e-6) & (at <= box[1] + 1e-6)).all()
