@@ -21,7 +21,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import Line, pieces_where, serving, true_runs
+from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Workingstep
 from toolpath.residual import ResidualMap
@@ -40,6 +40,7 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
 OVERLAP = 4  # moves of a line walked once more where only what goes on from there is new
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
 WORTH_A_TRY = 1.5  # of the way of the usual passes: iso-parametric ones that are more are not walked
@@ -221,7 +222,14 @@ class Finish:
             if not self.strategy.ordered:
                 line = turned(line, settings)
             for piece in self._unwalked(line):
-                self._add_one(linker, piece, skin, slope, thin)
+                # two lines may differ in their points and be the same once these are thinned out
+                way = Line(thinned(piece.points, linker.motions.tolerance if thin is None else thin), piece.closed)
+                left = self._unwalked(way)
+                if len(left) == 1 and left[0] is way:
+                    self._add_one(linker, piece, skin, slope, thin)
+                else:
+                    for rest in left:
+                        self._add_one(linker, rest, skin, slope, AS_IT_IS)
 
     def _add_one(self, linker: Linker, line: Line, skin: float, slope: float, thin: float | None) -> None:
         """Walk a line with the layers above it and measure them."""
@@ -234,7 +242,7 @@ class Finish:
         cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
         for points in cuts:
             self.residual.cut(points, tool)
-        for points in [line.points] if whole else cuts:
+        for points in [line.points, *cuts] if whole else cuts:
             self.walked.add(points)
 
     def _unwalked(self, line: Line) -> list[Line]:

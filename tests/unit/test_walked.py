@@ -83,3 +83,41 @@ def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkey
                 true.cut(points, body)
             done = f.residual.residual <= c.settings.scallop_height
             assert (true.residual[done] <= c.settings.scallop_height + c.settings.chordal_tolerance).all(), (seed, kind)
+
+
+def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
+    """Two rings of a floor with other points on the same straight moves: the second is measured, not walked."""
+    from types import SimpleNamespace
+
+    from toolpath.finish import Finish, _Strategy
+
+    added = []
+
+    class Stub(Finish):
+        def __init__(self):
+            self.field, self.walked = SimpleNamespace(tool=SHORT_TOOLS["flat"]), Walked()
+            self.strategy = _Strategy("spiral", 1.0, None, True)
+            self.settings = SimpleNamespace(chordal_tolerance=0.01, ramp_angle=0.05, either_way=False, climb=True)
+            self.residual = SimpleNamespace(cut=lambda points, tool: None)
+
+        def _add_one(self, linker, line, skin, slope, thin):
+            added.append(line)
+            self.walked.add(line.points)
+            self.walked.add(corners)
+
+    corners = np.array([[0.0, 0, 1], [4, 0, 1], [4, 3, 1], [0, 3, 1], [0, 0, 1]])
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+
+    def ring(spacing):
+        at = np.unique(np.concatenate([way, np.arange(0.0, way[-1], spacing)]))
+        return Line(np.column_stack([np.interp(at, way, corners[:, k]) for k in range(3)]), True)
+
+    linker = SimpleNamespace(motions=SimpleNamespace(tolerance=0.002), at=None)
+    stub = Stub()
+    stub._add(linker, [ring(0.31)], 0)
+    assert len(added) == 1 and len(added[0].points) > 20  # with its own points
+    stub._add(linker, [ring(0.47)], 0)
+    assert len(added) == 1
+    other = Line(corners + [0.0, 0.0, 0.5], True)
+    stub._add(linker, [other], 0)
+    assert len(added) == 2
