@@ -40,6 +40,7 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+LEAST_AGAIN = 4  # moves of a line that it walks a second time, to be left out
 AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
 OVERLAP = 4  # moves of a line walked once more where only what goes on from there is new
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
@@ -252,10 +253,14 @@ class Finish:
         zones side by side part of each other.
         """
         fresh = self.walked.fresh(line)
-        if fresh.all():
-            return [line]
         for a, b in true_runs(~fresh):
             self.residual.cut(line.points[a:b + 1], self.field.tool)
+        again = Walked.again(line)
+        for a, b in true_runs(again):
+            again[a:b] &= b - a >= LEAST_AGAIN  # places where a line crosses or touches itself
+        fresh &= ~again  # that is measured where it is walked first
+        if fresh.all():
+            return [line]
         wanted = np.concatenate([fresh, [False]]) | np.concatenate([[False], fresh])
         grown = wanted.copy()
         for k in range(1, OVERLAP + 1):

@@ -37,6 +37,20 @@ class Walked:
         return np.array([not (self._along(keys[k], points[k], points[k + 1])
                               or self._along(keys[k + 1], points[k + 1], points[k])) for k in range(count)])
 
+    @staticmethod
+    def again(line: Line) -> NDArray[np.bool_]:
+        """Which moves (n - 1,) of a line go where it has been itself, as turns of a spiral do that a border holds."""
+        keys = place_keys(line.points)
+        out = np.zeros(len(keys) - 1, np.bool_)
+        if len(set(keys)) >= len(keys) - 1:  # a ring comes back to its beginning
+            return out
+        so_far = Walked()
+        for k in range(len(out)):
+            move = line.points[k:k + 2]
+            out[k] = not so_far.fresh(Line(move, False))[0]
+            so_far.add(move)
+        return out
+
     def _along(self, key: bytes, start: F64, end: F64) -> bool:
         """Whether a walked move from ``start`` goes over ``end``."""
         for q in self._moves.get(key, ()):

@@ -121,3 +121,15 @@ def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
     other = Line(corners + [0.0, 0.0, 0.5], True)
     stub._add(linker, [other], 0)
     assert len(added) == 2
+
+
+def test_turns_of_a_line_that_fall_on_one_another_are_found():
+    a = np.linspace(0.0, 4.0 * np.pi, 81)
+    turns = np.column_stack([np.cos(a), np.sin(a), np.zeros(81)])
+    turns[41:] = turns[1:41]  # exactly the same again
+    assert Walked.again(Line(turns, False)).tolist() == [False] * 40 + [True] * 40
+    assert not Walked.again(Line(turns[:41], True)).any()
+    back = Line(np.vstack([turns[:20], turns[18::-1]]), False)  # out and back
+    assert Walked.again(back).tolist() == [False] * 19 + [True] * 19
+    spiral = turns * (1.0 + 0.01 * np.arange(81)[:, None])
+    assert not Walked.again(Line(spiral, False)).any()
