@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
-from toolpath.levels import Line
+from toolpath.finish import Finish, _Strategy
+from toolpath.levels import Line, true_runs
 from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
 from toolpath.walked import Walked
+from verify.repeats import WINDOW
 
 
 def line(*x, z=1.0, closed=False):
@@ -87,10 +92,6 @@ def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkey
 
 def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
     """Two rings of a floor with other points on the same straight moves: the second is measured, not walked."""
-    from types import SimpleNamespace
-
-    from toolpath.finish import Finish, _Strategy
-
     added = []
 
     class Stub(Finish):
@@ -133,3 +134,27 @@ def test_turns_of_a_line_that_fall_on_one_another_are_found():
     assert Walked.again(back).tolist() == [False] * 19 + [True] * 19
     spiral = turns * (1.0 + 0.01 * np.arange(81)[:, None])
     assert not Walked.again(Line(spiral, False)).any()
+
+
+@pytest.mark.parametrize("known", range(1, 20))
+def test_less_is_walked_again_than_the_proof_takes_for_a_stretch_run_twice(known):
+    """What lies between two new stretches of a line: all of it where it is short, three moves at each end else."""
+    class Stub(Finish):
+        def __init__(self):
+            self.walked, self.field = Walked(), SimpleNamespace(tool=None)
+            self.residual = SimpleNamespace(cut=lambda points, tool: None)
+
+    stub = Stub()
+    whole = line(*range(31))
+    stub.walked.add(whole.points[5:6 + known])
+    pieces = stub._unwalked(whole)
+    keys = [tuple(p) for p in whole.points.tolist()]
+    walked = np.zeros(30, int)
+    for p in pieces:
+        first = keys.index(tuple(p.points[0].tolist()))
+        walked[first:first + len(p.points) - 1] += 1
+    assert walked[:5].all() and walked[5 + known:].all() and walked.max() == 1
+    again = walked[5:5 + known]
+    longest = max((b - a for a, b in true_runs(again.astype(bool))), default=0)
+    assert longest < WINDOW
+    assert again.all() == (known <= 7)
