@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from schemas.report import Report
-from service import chain
+from service import programs
 from service.app import create_app
 from service.cli import app
 from service.settings import Settings
@@ -53,10 +53,10 @@ def test_an_older_proved_program_is_gone_when_the_job_is_no_longer_proved(part, 
     (out / "program.linuxcnc.ngc.part").write_text(proved)  # of one that was cut off while it wrote
     (out / "program.mine.txt").write_text("kept")
     monkeypatch.syspath_prepend(str(FAKES))
-    monkeypatch.setattr(chain, "write_linuxcnc", chain.write_linuxcnc)
+    monkeypatch.setattr(programs, "write_linuxcnc", programs.write_linuxcnc)
     import gouging_chain
 
-    monkeypatch.setattr(chain, "write_linuxcnc", gouging_chain.gouging)
+    monkeypatch.setattr(programs, "write_linuxcnc", gouging_chain.gouging)
     got = call(part, tmp_path)
     assert got.exit_code == 3
     report = json.loads(got.stdout)

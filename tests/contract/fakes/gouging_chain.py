@@ -1,8 +1,9 @@
 """The real chain with a writer that ends every program with a cut half a mm into the floor of the small step part."""
 
 import service.chain as chain
+import service.programs as programs
 
-write = chain.write_linuxcnc
+write = programs.write_linuxcnc
 
 
 def gouging(work):
@@ -11,5 +12,5 @@ def gouging(work):
     return f"{text[:at]}\nG0 X3 Y6\nG1 Z1.5 F100\nG1 X4\nG0 Z30{text[at:]}"
 
 
-chain.write_linuxcnc = gouging
+programs.write_linuxcnc = gouging
 plan, zones_only, verify_program = chain.plan, chain.zones_only, chain.verify_program
