@@ -30,7 +30,7 @@ from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import floor, isoparametric, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
-from toolpath.walked import Walked
+from toolpath.walked import Depths, Walked
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -71,11 +71,12 @@ class Finish:
     """The finish of one zone: walked once, and again where stock was in the way that is gone since.
 
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them; faces : of the zone, exact and trimmed
-    walked : what its tool has walked whole, shared by its zones
+    walked, depths : where its tool has been, shared by its zones
     """
 
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None) -> None:
+                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
+                 depths: Depths | None = None) -> None:
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
@@ -91,6 +92,7 @@ class Finish:
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
         self.walked = Walked() if walked is None else walked
+        self.depths = Depths(stock.lattice) if depths is None else depths
 
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingstep of the zone; none where no pass is walked.
@@ -116,11 +118,12 @@ class Finish:
         elif made[lost]:
             why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[lost], 1),
                    "limit": round(seconds[best], 1)}
-        stock, walked, taken = self.stock, self.walked, tries[best]
+        stock, walked, depths, taken = self.stock, self.walked, self.depths, tries[best]
         stock.become(taken.stock)
         walked.become(taken.walked)
+        depths.become(taken.depths)
         rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[lost].strategy.name, **why})
-        self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked,
+        self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked, "depths": depths,
                                                "strategy": replace(taken.strategy, rejected=rejected)})
         return made[best]
 
@@ -170,7 +173,8 @@ class Finish:
         """This finish with another strategy, to be walked on its own."""
         out = copy.copy(self)
         out.residual, out.stock = self.residual.copied(), self.stock.copied()
-        out.met, out.walked, out.strategy = self.met.copy(), self.walked.copied(), strategy
+        out.met, out.strategy = self.met.copy(), strategy
+        out.walked, out.depths = self.walked.copied(), self.depths.copied()
         return out
 
     def walk_again(self, step_id: str, least: float) -> list[Workingstep]:
@@ -182,7 +186,7 @@ class Finish:
 
     def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
         """All rounds for the samples ``wanted``, as one workingstep."""
-        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings))
+        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths)
         budget = PASS_SHARE * self.settings.scallop_height
         failing = np.flatnonzero(wanted & (self.residual.residual > budget))
         for k in range(REFINEMENTS + 2):
@@ -247,7 +251,7 @@ class Finish:
             self.walked.add(points)
 
     def _unwalked(self, line: Line) -> list[Line]:
-        """What of a line was not walked whole before by this tool; the rest is only measured, it would leave the same.
+        """What of a line was not walked before by this tool; the rest is only measured, it would leave the same.
 
         Lines are cut to the samples they serve, so those of a later round may be part of an earlier one, and those of
         zones side by side part of each other.

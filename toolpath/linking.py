@@ -21,9 +21,10 @@ import numpy as np
 
 from geometry.mesh import F64
 from toolpath.kernels.ramp import ease
-from toolpath.levels import Line, dense, pieces_where, place_keys, thinned
+from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.stock import SURE_RIM, StockMap
+from toolpath.walked import Depths
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
@@ -62,23 +63,18 @@ class Linker:
     motions : Motions
     skipped : lines left out: no safe way in, or stock in the way of shank or holder
     refused : how many of them found no safe way in
-    _lowest : mm, Z of the lowest cut by place of a tip
-    _deepest : (ny, nx) mm, the same by cell of the stock's lattice, along the moves too
+    depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
     """
 
     field: TipField
     stock: StockMap
     motions: Motions
+    depths: Depths
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
     refused: int = 0
-    _lowest: dict[bytes, float] = fresh(default_factory=dict, repr=False)
-    _deepest: F64 = fresh(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        self._deepest = np.full(self.stock.top.shape, math.inf)
 
     def add(self, line: Line, tolerance: float | None = None) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
@@ -120,7 +116,7 @@ class Linker:
             for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
                 # where the tool has been as deep, what the stock still shows is out of its reach
-                if len(walk) > 1 and self._above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
+                if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
                     return False
         return True
 
@@ -216,7 +212,7 @@ class Linker:
         # where the tool has been before nothing is left that it could take; an open line is gone down along its head
         slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
         head = points if closed else _head(points, 0.5 * (seen + 0.1) / slope)
-        above = max(float(self._above(head).max()), 0.0)
+        above = max(float(self.depths.above(head).max()), 0.0)
         for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
                      highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
@@ -231,8 +227,7 @@ class Linker:
         Where this tool has cut as deep nothing can be left, however close the stock stands all round.
         """
         tool = self.field.tool
-        lowest = self._lowest.get(place_keys(top[None, :2])[0], math.inf)
-        if lowest <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
+        if self.depths.lowest(top) <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
             return top[None, :]
         for far in (0.06, 0.12, 0.25, 0.5, 1.0):
             ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
@@ -281,12 +276,6 @@ class Linker:
 
     # -- moves ------------------------------------------------------------------------------------------------
 
-    def _above(self, points: F64) -> F64:
-        """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
-        way = dense(points, self.stock.lattice.step)
-        lat = self.stock.lattice
-        return np.where(lat.inside(way), self._deepest[lat.cells(way)] - way[:, 2], math.inf)
-
     def _here(self) -> F64:
         assert self.at is not None
         return self.at
@@ -307,11 +296,7 @@ class Linker:
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
         if motion is Motion.CUT:
-            for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
-                self._lowest[place] = min(z, self._lowest.get(place, math.inf))
-            way = dense(points, 0.5 * self.stock.lattice.step)
-            way = way[self.stock.lattice.inside(way)]
-            np.minimum.at(self._deepest, self.stock.lattice.cells(way), way[:, 2])
+            self.depths.cut(points)
 
     def _rapid(self, points: F64) -> None:
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))

@@ -22,7 +22,7 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.strategies.isoparametric import Faces
-from toolpath.walked import Walked
+from toolpath.walked import Depths, Walked
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -73,15 +73,16 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     for tid in order:
         mine = [z for z in zones if z.tool.id == tid]
         field, cut = fields[tid], cut_data[tid]
+        walked, depths = Walked(), Depths(stock.lattice)
         if settings.roughing:
-            step = _layers(mine, field, cut, stock, settings, following())
+            step = _layers(mine, field, cut, stock, settings, depths, following())
             steps.extend([] if step is None else [step])
         own: list[Finish] = []
-        walked = Walked()
         for zone in mine:
             if settings.finishing:
                 faces = (trimmed or {}).get(zone.id, ())
-                own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces, walked))
+                own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces, walked,
+                                  depths))
                 steps.extend(own[-1].walk(following()))
             done += 1
             if progress is not None:
@@ -97,12 +98,12 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
 
 
 def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap, settings: PlanSettings,
-            step_id: str) -> Workingstep | None:
+            depths: Depths, step_id: str) -> Workingstep | None:
     """One workingstep that takes the stock above all zones of a tool off in depth layers."""
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    linker = Linker(field, stock, motions_of(cut, settings))
+    linker = Linker(field, stock, motions_of(cut, settings), depths)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance

@@ -1,14 +1,54 @@
-"""What a tool has walked, so that it need not walk it again."""
+"""Where a tool has been, so that it need not go there again."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.levels import Line, place_keys
+from toolpath.levels import Line, dense, place_keys
+from zones.reach import Lattice
 
 ON = 1e-5  # mm off a move, and still on it
+
+
+class Depths:
+    """How deep one tool has cut, by place: what the stock still shows there is out of its reach."""
+
+    def __init__(self, lattice: Lattice) -> None:
+        self._lattice = lattice
+        self._places: dict[bytes, float] = {}  # mm, Z of the lowest cut by place of a tip
+        self._cells = np.full((lattice.ny, lattice.nx), math.inf)  # mm, the same by cell, along the moves too
+
+    def cut(self, points: F64) -> None:
+        """Remember a cut with the tip along points (n, 3), mm."""
+        for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
+            self._places[place] = min(z, self._places.get(place, math.inf))
+        way = dense(points, 0.5 * self._lattice.step)
+        way = way[self._lattice.inside(way)]
+        np.minimum.at(self._cells, self._lattice.cells(way), way[:, 2])
+
+    def lowest(self, place: F64) -> float:
+        """Z of the lowest cut at the very place of a tip (3,), mm; inf where there was none."""
+        return self._places.get(place_keys(place[None, :2])[0], math.inf)
+
+    def above(self, points: F64) -> F64:
+        """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
+        way = dense(points, self._lattice.step)
+        there = self._cells[self._lattice.cells(way)] - way[:, 2]
+        return np.where(self._lattice.inside(way), there, math.inf)
+
+    def copied(self) -> Depths:
+        """The same, to be added to on its own."""
+        out = Depths(self._lattice)
+        out._places, out._cells = dict(self._places), self._cells.copy()
+        return out
+
+    def become(self, other: Depths) -> None:
+        """Take over what a copy of this has come to."""
+        self._places, self._cells = other._places, other._cells
 
 
 class Walked:

@@ -15,8 +15,9 @@ from toolpath.levels import Line
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import TrimmedFace, course, laid
 from toolpath.strategies.zigzag import Pattern
-from toolpath.walked import Walked
+from toolpath.walked import Depths, Walked
 from verify.removal import Moves, residual_on_normals
+from zones.reach import Lattice
 
 SCALLOP, CHORD = 0.02, 0.004
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
@@ -154,7 +155,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
         def __init__(self):
             self.checks, self.given, self.walked = SimpleNamespace(points=np.zeros((4, 3))), 4, Walked()
             self.settings, self.stock = SimpleNamespace(scallop_height=0.02), SimpleNamespace(become=lambda _: None)
-            self.strategy = _Strategy("zlevel", 1.0, None, False)
+            self.strategy, self.depths = _Strategy("zlevel", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
 
         def _along_borders(self):
             return _Strategy("isoparametric", 1.0, None, False), ()
@@ -163,15 +164,18 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             k = int(strategy.name == "isoparametric")
             rest = np.where(np.arange(4) < left[k], 0.03, 0.01)
             steps = [] if seconds[k] is None else [SimpleNamespace(seconds=seconds[k])]
-            walked = self.walked.copied()
+            walked, depths = self.walked.copied(), self.depths.copied()
             walked.add(ways[k].points)
+            depths.cut(ways[k].points)
             return SimpleNamespace(strategy=strategy, stock=None, residual=SimpleNamespace(residual=rest),
-                                   walked=walked, _rounds=lambda _id, _wanted: steps)
+                                   walked=walked, depths=depths, _rounds=lambda _id, _wanted: steps)
 
     finish = Stub()
-    remembered = finish.walked
+    remembered, depths = finish.walked, finish.depths
     finish.walk("S01")
-    assert finish.walked is remembered  # the zones of a tool share it
+    assert finish.walked is remembered and finish.depths is depths  # the zones of a tool share them
+    assert [depths.lowest(way.points[0]) for way in ways] == [1.0 if kept == name else np.inf
+                                                              for name in ("zlevel", "isoparametric")]
     assert [not remembered.fresh(way).any() for way in ways] == [kept == "zlevel", kept == "isoparametric"]
     assert finish.strategy.name == kept
     assert finish.strategy.rejected[-1]["reason"] == reason

@@ -14,6 +14,7 @@ from toolpath.levels import Line
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion
 from toolpath.stock import StockMap
+from toolpath.walked import Depths
 
 TOP = 4.0
 
@@ -25,7 +26,7 @@ def linker(body=None, top=TOP, post=False, step_down=1.0):
         mesh = joined(mesh, box_mesh([13, 13, 0], [17, 17, 3]))
     field = field_of(mesh, body or ball(4.0))
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
-    return Linker(field, stock, Motions(800, 200, 3000, 8.0, 6.0, RAMP, step_down, 0.001))
+    return Linker(field, stock, Motions(800, 200, 3000, 8.0, 6.0, RAMP, step_down, 0.001), Depths(stock.lattice))
 
 
 def straight(x0, x1, y, z):
@@ -101,7 +102,7 @@ def test_stock_that_stays_beside_a_wall_is_not_gone_over_layer_after_layer():
         np.maximum(stock.cover, stays, out=stock.cover)
 
     stock.cut = leaves
-    link = Linker(field, stock, Motions(800, 200, 3000, 14.0, 12.0, RAMP, 0.5, 0.001))
+    link = Linker(field, stock, Motions(800, 200, 3000, 14.0, 12.0, RAMP, 0.5, 0.001), Depths(stock.lattice))
     passes = []
     for z in (7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0):
         before = link.passes

@@ -12,8 +12,9 @@ from toolpath.finish import Finish, _Strategy
 from toolpath.levels import Line, true_runs
 from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
-from toolpath.walked import Walked
+from toolpath.walked import Depths, Walked
 from verify.repeats import WINDOW
+from zones.reach import Lattice
 
 
 def line(*x, z=1.0, closed=False):
@@ -158,3 +159,21 @@ def test_less_is_walked_again_than_the_proof_takes_for_a_stretch_run_twice(known
     longest = max((b - a for a, b in true_runs(again.astype(bool))), default=0)
     assert longest < WINDOW
     assert again.all() == (known <= 7)
+
+
+def test_depths_know_the_lowest_cut_by_place_and_by_cell():
+    lattice = Lattice(0.0, 0.0, 0.5, 21, 11)
+    depths = Depths(lattice)
+    depths.cut(np.array([[1.0, 2.0, 3.0], [6.0, 2.0, 3.0]]))
+    depths.cut(np.array([[4.0, 2.0, 1.0], [4.0, 4.0, 1.0]]))
+    assert depths.lowest(np.array([1.0, 2.0, 0.0])) == 3.0
+    assert depths.lowest(np.array([3.0, 2.0, 0.0])) == np.inf  # between two points of it
+    assert (depths.above(np.array([[2.0, 2.0, 2.5], [3.0, 2.0, 2.5]])) == 0.5).all()
+    assert depths.above(np.array([[4.0, 2.5, 1.2], [4.0, 3.5, 1.2]])).max() == pytest.approx(-0.2)
+    assert depths.above(np.array([[3.0, 2.0, 2.5], [3.0, 3.0, 2.5]])).max() == np.inf  # where it never was
+    assert depths.above(np.array([[-3.0, 2.0, 2.5], [-2.0, 2.0, 2.5]])).min() == np.inf  # off the lattice
+    other = depths.copied()
+    other.cut(np.array([[1.0, 2.0, 0.0], [2.0, 2.0, 0.0]]))
+    assert depths.lowest(np.array([1.0, 2.0, 0.0])) == 3.0
+    depths.become(other)
+    assert depths.lowest(np.array([1.0, 2.0, 0.0])) == 0.0
