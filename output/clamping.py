@@ -17,7 +17,6 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 from output.grid import GRID, I64, grid_path, to_grid
 from output.grid import link as grid_link
-from output.kinematics import RotaryMachine
 from output.model import Clamping, Frame, Workplan
 from toolpath.motion import Motion, Workingstep
 
@@ -193,4 +192,4 @@ def _outside(clamping: Clamping) -> float:
     return clamping.radius / math.cos(TURN_STEP) + SPARE
 
 
-__all__ = ["Leg", "RotaryMachine", "Section", "home_of", "sections"]
+__all__ = ["Leg", "Section", "home_of", "sections"]

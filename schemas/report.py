@@ -82,7 +82,8 @@ class MachinedPart(ReportModel):
     """machined.stl: the stock as all programs leave it, in the coordinates of the program."""
 
     file: str
-    access: Annotated[str, Field(description="Access direction whose coordinates the mesh has; of several the first.")]
+    access: Annotated[str, Field(description="Access direction whose coordinates the mesh has, of several the first; "
+                                             "on a 5-axis machine they are those of the setup frame.")]
     volume_mm3: Annotated[float, Field(description="What stands, in the window where one was asked for.")]
     step_mm: Annotated[float, Field(description="Distance of the nodes; wider than asked for where that would take "
                                                 "over 24 million.")]

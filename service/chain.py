@@ -63,7 +63,7 @@ PREPARED, PLANNED, PROVED = 0.28, 0.75, 0.96  # shares of the work done
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
-    mesh : also write the machined part as a mesh, in the frame of the first access
+    mesh : also write the machined part as a mesh, in the frame of the proof (``service.programs.proof_frame``)
 
     Returns
     -------
@@ -255,6 +255,9 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
     """
     s = ready.setup
     c, q = s.clearance_mm, s.quality
+    # its height is one of the setup frame: a program read in the frame of an oblique access is not held against it
+    tabled = (s.machine.kind == "5-axis" and np.array_equal(view.rotation, np.eye(3))
+              and not (foreign and s.machine.table_z_mm is None))
     box = stock_corners(ready, view) if s.stock.kind == "box" else None
     if box is not None:
         box = np.array([box[0] - s.stock.uncertainty_mm, box[1] + s.stock.uncertainty_mm])
@@ -273,8 +276,7 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
                      for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
-        table=None if s.machine.kind != "5-axis" or foreign and s.machine.table_z_mm is None else
-        table_height(s, ready.part),
+        table=table_height(s, ready.part) if tabled else None,
         table_known=s.machine.table_z_mm is not None,
         kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
         rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))

@@ -107,11 +107,11 @@ def check_plannable(setup: Setup) -> None:
                                 "verify, POST /v1/verifications")
     machine = rotary_machine(setup.machine)
     if machine is not None:
-        _check_accesses(setup, machine)
+        _check_turning(setup, machine)
 
 
-def _check_accesses(setup: Setup, machine: RotaryMachine) -> None:
-    """Refuse tool axes that the rotary axes cannot stand for, and a second clamping."""
+def _check_turning(setup: Setup, machine: RotaryMachine) -> None:
+    """Refuse what a job that turns cannot be planned for: rapids, lengths, limits, accesses, a second clamping."""
     if setup.machine.rapid_motion == "dogleg":
         raise SetupError("a job that turns needs rapids along straight lines; on this machine each axis runs at its "
                          "own speed, so where the tool is while it turns cannot be known", code="dogleg_rapids",

@@ -78,12 +78,13 @@ def workplan(ready: Prepared, side: Side) -> Workplan:
     if len(ready.views) > 1:
         d = " ".join(f"{v:.6g}" for v in view.direction)
         comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank",)
-    return _workplan(ready, side.made.steps, Look.of(view), side.clearance, comments)
+    return _workplan(ready, side.made.steps, Look.of(view), side.clearance, access_of(ready, view), comments)
 
 
 def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
-    setup, look = ready.setup, Look("", np.eye(3), ready.part)
+    setup, first = ready.setup, ready.views[0]
+    look = Look(first.id, np.eye(3), ready.part)
     machine = rotary_machine(setup.machine)
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
@@ -98,9 +99,9 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
                         table_height(setup, ready.part) + setup.clearance_mm.rapid)
     clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
     words = ("fixed tool axes, one after the other, each from the whole blank",)
-    work = _workplan(ready, tuple(t for s in sides for t in s.made.steps), look, 0.0, words)
-    return replace(work, clamping=clamping, clearance_plane=float(home_of(clamping)[2]),
-                   work_offset=setup.access[0].work_offset)
+    steps = tuple(t for s in sides for t in s.made.steps)
+    work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
+    return replace(work, clamping=clamping)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:
@@ -131,15 +132,15 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     return float(np.max(np.maximum(short, 0.0) / (1.0 + up)))
 
 
-def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float,
+def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float, access: Access,
               words: tuple[str, ...]) -> Workplan:
+    """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
     setup = ready.setup
     used = {s.tool.id for s in steps}
     lo, hi = stock_corners(ready, look)
-    offset = access_of(ready, look).work_offset if look.id else ""
     return Workplan(setup.labels.get("order", "zonemill job"), steps,
-                    tuple(t for t in tool_bodies(setup) if t.id in used), clearance, offset, StockBox(lo, hi),
-                    reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
+                    tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
+                    StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
                     dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)))
 
 
