@@ -116,9 +116,10 @@ class _Walk:
                               code="no_frame", subjects=(step.id,), limit=sorted(self.clamping.frames))
         if fresh:
             self.frame, self.tip, self.turn = None, home_of(self.clamping), np.zeros(2)
-        first = step.trajectories[0]
-        axes = (first.axes if first.axes is not None else np.array([[0.0, 0.0, 1.0]])) @ frame.rotation
-        wanted = self.machine.follow(axes[:1], self.turn)[0]
+        first, up = step.trajectories[0], np.array([[0.0, 0.0, 1.0]])
+        # of the places for the first axis one from which they get along the whole step
+        axes = np.vstack([up if t.axes is None else t.axes for t in step.trajectories]) @ frame.rotation
+        wanted = self.machine.follow(axes, self.turn)[0]
         if self.frame is not frame or np.abs(wanted - self.turn).max() > AT_REST:
             legs += [*self._away(), *self._turned(wanted)]
             self.frame = frame

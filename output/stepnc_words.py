@@ -59,10 +59,12 @@ def ways(plan: Workplan) -> list[Way]:
 
 
 def _curves(legs: Sequence[Leg]) -> tuple[Curve, ...]:
-    """Legs on the grid, each from the point where the one before ended."""
+    """Legs on the grid, each from the point where the one before ended; C alone, round the tool, is no curve."""
     out: list[Curve] = []
     for leg in legs:
         points, axes = leg.on_grid()
+        if len(points) < 2:
+            continue
         if out:
             points[0] = out[-1].points[-1]
         out.append(Curve(Trajectory(leg.motion, leg.tips, leg.feed), points, axes))

@@ -34,7 +34,15 @@ from service.delivery import Files, deliver, json_bytes
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
 from service.prepare import Prepared, prepare, stock_box, table_height
 from service.preview import draw_preview
-from service.programs import access_of, fixture_boxes, gauge_lengths, programs_of, proof_frame, stock_corners
+from service.programs import (
+    access_of,
+    fixture_boxes,
+    gauge_lengths,
+    programs_of,
+    proof_frame,
+    stock_corners,
+    turning_of,
+)
 from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Look, Side, in_first_frame, in_setup_frame
@@ -245,7 +253,7 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
-                        ops.cut_direction == "either", Pattern(ops.pattern))
+                        ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view))
 
 
 def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:

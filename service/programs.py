@@ -7,18 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.errors import InternalError
+from geometry.errors import InternalError, OutputError
+from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from output.clamping import home_of
+from output.clamping import SWING, home_of
 from output.linuxcnc import write_linuxcnc
 from output.model import Clamping, Frame, StockBox, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import rotary_machine, tool_bodies
-from service.prepare import Prepared, stock_box, table_height, turned_box
+from service.prepare import TABLE_SPARE, Prepared, stock_box, table_height, turned_box
 from service.sides import Look, Program, Side
 from service.version import VERSION
 from toolpath.motion import Workingstep
+from toolpath.settings import Turning
 from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
@@ -93,7 +95,10 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
     frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
-    leans = max(float(np.arccos(np.clip(s.view.rotation[2, 2], -1.0, 1.0))) for s in sides)
+    rises = [float(s.view.rotation[2, 2]) for s in sides]
+    rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in sides for step in s.made.steps
+              for t in step.trajectories if t.axes is not None]
+    leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
     lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
                         table_height(setup, ready.part) + setup.clearance_mm.rapid)
@@ -102,6 +107,25 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     steps = tuple(t for s in sides for t in s.made.steps)
     work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
     return replace(work, clamping=clamping)
+
+
+def turning_of(ready: Prepared, view: View) -> Turning | None:
+    """What the rotary axes can do in the frame of a view; None on a machine without."""
+    setup, turn = ready.setup, view.rotation
+    machine = rotary_machine(setup.machine)
+    if machine is None:
+        return None
+    longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
+
+    def follows(tips: F64, axes: F64) -> bool:
+        try:
+            machine.course(tips @ turn, axes @ turn, tolerance, SWING, longest)
+        except OutputError:
+            return False
+        return True
+
+    table = table_height(setup, ready.part) + setup.clearance_mm.rapid + TABLE_SPARE
+    return Turning(lambda axes: machine.stands(axes @ turn), follows, turn[:, 2], table)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:

@@ -21,15 +21,18 @@ WIDE = 1e3  # mm between places a face is looked at for a change of label, of wh
 
 
 def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
-    """The faces, planes left out, that every steep or shallow zone is part of, by its id, in the frame of its access.
+    """The faces that every steep or shallow zone is part of, by its id, in the frame of its access.
 
-    Those of a zone that join smoothly are one.
+    Those of a zone that join smoothly are one. Planes are left out, but on steep zones where tools may lean; there each
+    is alone.
 
     path : the STEP file ``ready`` was read from
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
+    leans = ready.setup.machine.kind == "5-axis"
     wanted = [z for z in ready.zones if z.form is not Form.LEVEL and z.tool.corner_radius > 0.0]
-    numbers = sorted({f for z in wanted for f in z.faces} & curved)
+    flat = {f for z in wanted if leans and z.form is Form.STEEP for f in z.faces} - curved
+    numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
     setup = ready.setup
@@ -50,10 +53,11 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
         for p in pieces:
             patch = exact[p.face]
             loops = tuple(patch.parameters(loop) for loop in p.loops)
-            own.setdefault(p.face, []).append(TrimmedFace(p.face, patch.surface.moved(turn), loops, p.area))
+            own.setdefault(p.face, []).append(TrimmedFace(p.face, patch.surface.moved(turn), loops, p.area,
+                                                              p.face in flat))
     for z in wanted:
         mine: list[Faces] = []
-        for group in _together([f for f in z.faces if f in there[z.access]], smooth):
+        for group in _together([f for f in z.faces if f in there[z.access] and f in curved], smooth):
             alone = tuple(face for f in group for face in there[z.access][f])
             if len(group) == 1 or len(alone) > len(group):  # a face in pieces is not one sheet with others
                 mine += alone
@@ -62,6 +66,8 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
             if key not in joined:
                 joined[key] = SmoothFaces(alone, ready.view(z.access).part.mesh, uv)
             mine.append(joined[key])
+        if z.form is Form.STEEP:
+            mine += [face for f in z.faces if f in flat for face in there[z.access].get(f, ())]
         out[z.id] = tuple(mine)
     return out
 

@@ -1,4 +1,4 @@
-"""The finish of one zone: its strategy, walked round by round until nothing is left, and the choice between two.
+"""The finish of one zone: its strategy, walked round by round until nothing is left, and the choice among several.
 
 The passes of a zone are laid out by formula and then measured at the zone's samples; where more is left than
 the budget allows, passes are put in between, only there, each time half as far apart. So the narrowest spot
@@ -23,11 +23,12 @@ from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
-from toolpath.motion import Motion, Workingstep
+from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.posed import enters
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SKIN, StockMap
-from toolpath.strategies import floor, isoparametric, spot, zigzag, zlevel
+from toolpath.strategies import flank, floor, isoparametric, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from toolpath.walked import Depths, Walked
@@ -37,6 +38,7 @@ from zones.zoning import ZoneArea
 
 LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
+TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
@@ -89,50 +91,86 @@ class Finish:
         self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points))
         self.faces = faces
         self.step: str | None = None
+        self.begun_with = ""  # name of the strategy that went before the usual one
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
         self.walked = Walked() if walked is None else walked
         self.depths = Depths(stock.lattice) if depths is None else depths
 
     def walk(self, step_id: str) -> list[Workingstep]:
-        """The workingstep of the zone; none where no pass is walked.
+        """The workingsteps of the zone; none where no pass is walked.
 
-        Where passes along the borders of its faces are not much more way than the usual ones, both are walked, each
-        until no more than the scallop is left. The one that leaves fewer samples above it stays, of two that leave as
-        many the faster.
+        Where passes along the borders of its faces are not much more way than the usual ones, or where the flank of a
+        tool that leans lies on its walls, these are walked as well, each until no more than the scallop is left. What
+        leaves the fewest samples above it stays, of those that leave as many the fastest.
         """
         every = np.ones(len(self.checks.points), np.bool_)
         other, refused = self._along_borders()
-        if other is None:
+        runs, unflanked = self._beside_walls()
+        refused += unflanked
+        if other is None and not runs:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)
-        tries = [self._copied(self.strategy), self._copied(other)]
-        made = [t._rounds(step_id, every) for t in tries]
-        left = [int((t.residual.residual[:self.given] > self.settings.scallop_height).sum()) for t in tries]
+        tries = [self._copied(s) for s in (self.strategy, other, self.strategy if runs else None) if s is not None]
+        made = [t._rounds(step_id, every) for t in (tries[:-1] if runs else tries)]
         seconds = [sum(step.seconds for step in steps) for steps in made]
-        best = int((not made[1], left[1], seconds[1]) < (not made[0], left[0], seconds[0]))
-        lost = 1 - best
-        why: dict[str, object] = {"reason": "no pass is walked", "value": 0, "limit": 0}
-        if made[lost] and left[lost] > left[best]:
-            why = {"reason": "more samples are left above the scallop", "value": left[lost], "limit": left[best]}
-        elif made[lost]:
-            why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[lost], 1),
-                   "limit": round(seconds[best], 1)}
+        if runs:
+            made.append(tries[-1]._flanked(step_id, runs, every))
+            seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
+        left = [int((t.residual.residual[:self.given] > self.settings.scallop_height).sum()) for t in tries]
+        best = min(range(len(tries)), key=lambda k: (not made[k], left[k], seconds[k]))
+        rejected = [*tries[best].strategy.rejected, *refused]
+        for k, lost in enumerate(tries):
+            why: dict[str, object] = {"reason": "no pass is walked", "value": 0, "limit": 0}
+            if made[k] and left[k] > left[best]:
+                why = {"reason": "more samples are left above the scallop", "value": left[k], "limit": left[best]}
+            elif made[k]:
+                why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[k], 1),
+                       "limit": round(seconds[best], 1)}
+            if k != best:
+                rejected.append({"strategy": lost.begun_with or lost.strategy.name, **why})
         stock, walked, depths, taken = self.stock, self.walked, self.depths, tries[best]
         stock.become(taken.stock)
         walked.become(taken.walked)
         depths.become(taken.depths)
-        rejected = (*taken.strategy.rejected, *refused, {"strategy": tries[lost].strategy.name, **why})
         self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked, "depths": depths,
-                                               "strategy": replace(taken.strategy, rejected=rejected)})
+                                               "strategy": replace(taken.strategy, rejected=tuple(rejected))})
         return made[best]
+
+    def _beside_walls(self) -> tuple[tuple[tuple[Trajectory, ...], ...], tuple[dict[str, object], ...]]:
+        """Passes of the leaning flank along the walls of the zone, and why there are none."""
+        turning, field, settings = self.settings.turning, self.field, self.settings
+        if turning is None or self.zone.form is not Form.STEEP or not (self.faces and len(self.checks.points)):
+            return (), ()
+        met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
+        around = flank.Surroundings(met, turning, self.stock, field.discs)
+        walls = [wall for face in self.faces for wall in face.alone or (face,)]
+        found = flank.flanked(walls, self.checks, field.tool, self.cut, settings, around, field.allowance)
+        return found.runs, tuple({"strategy": flank.NAME, "reason": reason} for reason in found.refused)
+
+    def _flanked(self, step_id: str, runs: Sequence[tuple[Trajectory, ...]],
+                 wanted: NDArray[np.bool_]) -> list[Workingstep]:
+        """A workingstep for each pass of the flank, and one for what these leave."""
+        zone, name, number = self.zone, flank.NAME, int(step_id[1:])
+        steps, faces = [], " ".join(f"F{f}" for f in self.zone.faces[:12])
+        for k, run in enumerate(runs):
+            here = f"S{number + k:02d}"
+            steps.append(step_of(here, f"{here} {zone.id} {name} {self.field.tool.id} {faces}", zone.id, [zone],
+                                 "finishing", name, self.field.tool, self.cut, 0.0, run, self.settings))
+            for t in run:
+                if t.motion is Motion.CUT and t.axes is not None:
+                    self.residual.cut_leaning(t.points, t.axes, self.field.tool)
+        rest = self._rounds(f"S{number + len(runs):02d}", wanted)
+        self.step, self.passes, self.begun_with = step_id, self.passes + len(runs), name
+        return [*steps, *rest]
 
     def _along_borders(self) -> tuple[_Strategy | None, tuple[dict[str, object], ...]]:
         """Passes along the borders of the faces, None where there are none worth a try, and why."""
         settings, usual, steep = self.settings, self.strategy, self.zone.form is Form.STEEP
         asked = not steep and settings.pattern is not Pattern.AUTO
         suited = isoparametric.suits(self.field.tool) and self.zone.form is not Form.LEVEL and not asked
-        if not (suited and self.faces and len(self.checks.points)):
+        faces = [face for face in self.faces if not face.flat]
+        if not (suited and faces and len(self.checks.points)):
             return None, ()
         every, scallop = np.arange(len(self.checks.points)), LAID_SHARE * settings.scallop_height
         link = LINK_S * self.cut.feed / 60.0  # between passes that end elsewhere than the next begins
@@ -144,7 +182,7 @@ class Finish:
         if least > WORTH_A_TRY * way:
             return None, (_not_taken("more way even on a plane, links counted, mm", least, way),)
         chord = 0.5 * settings.chordal_tolerance
-        found = isoparametric.course(self.faces, self.checks, self.field, scallop, chord,
+        found = isoparametric.course(faces, self.checks, self.field, scallop, chord,
                                      self._flank() if steep else None)
         refused = _refused(found.refused)
         if not found.groups:
@@ -202,13 +240,13 @@ class Finish:
         self.step, self.passes = self.step or step_id, self.passes + linker.passes
         faces = " ".join(f"F{f}" for f in zone.faces[:12])
         return [step_of(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing",
-                      name, self.field.tool, self.cut, self.strategy.side_step, linker, self.settings)]
+                      name, self.field.tool, self.cut, self.strategy.side_step, linker.finish(), self.settings)]
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
         left = np.flatnonzero(self.residual.residual[:self.given] > self.settings.scallop_height)
-        return ZonePlan(self.zone, self.step, self.strategy.name, self.strategy.side_step, self.passes, left,
-                        self.strategy.rejected)
+        name = self.begun_with or self.strategy.name
+        return ZonePlan(self.zone, self.step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
@@ -366,12 +404,13 @@ def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
 
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,
-            tool: ToolBody, cut: CutData, side_step: float, linker: Linker, settings: PlanSettings) -> Workingstep:
-    """The workingstep of what a linker walked for some zones; side_step in mm, the rest as ``Workingstep`` has it."""
+            tool: ToolBody, cut: CutData, side_step: float, walked: tuple[Trajectory, ...],
+            settings: PlanSettings) -> Workingstep:
+    """The workingstep of what was walked for some zones; side_step in mm, the rest as ``Workingstep`` has it."""
     faces = tuple(sorted({f for z in zones for f in z.faces}))
     tips = np.vstack([z.tips for z in zones])
     lo, hi = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
     outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
-                       settings.scallop_height, settings.chordal_tolerance, linker.finish(), outline,
+                       settings.scallop_height, settings.chordal_tolerance, walked, outline,
                        max(z.top for z in zones), min(z.bottom for z in zones), settings.climb)

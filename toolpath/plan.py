@@ -126,7 +126,7 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
         return None
     ids = " ".join(z.id for z in zones)
     return step_of(step_id, f"{step_id} layers {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
-                 0.8 * tool.radius, linker, settings)
+                   0.8 * tool.radius, linker.finish(), settings)
 
 
 def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:

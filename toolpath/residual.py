@@ -1,17 +1,26 @@
-"""What passes leave at samples of a zone, so that the planner can put passes in where it is too much."""
+"""What passes leave at samples of a zone, so that the planner can put passes in where it is too much.
+
+Upright tools are measured by ``kernels.residual``, which knows level planes and walls and stops at what is cut;
+leaning ones by ``kernels.leaning``: plain signed distance to the cutting part, so that a gouge has its depth.
+"""
 
 from __future__ import annotations
 
 import copy
 
 import numpy as np
+from numpy.typing import NDArray
 
+from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from toolpath.kernels.leaning import lower_leaning
 from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
 
+CELL = 0.6  # mm
 LEAST_MARGIN = 0.02  # mm
 UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
+UNIT = 1e-6  # what the length of an axis may be off 1
 
 
 class ResidualMap:
@@ -19,25 +28,16 @@ class ResidualMap:
 
     points   : (n, 3) float64, mm; normals : (n, 3) float64 unit
     margin   : mm, a cutter farther than this counts as not having come near
-    residual : (n,) float64, mm, distance to the nearest swept cutting part so far
+    residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one went in
     """
 
-    def __init__(self, points: F64, normals: F64, cell: float = 0.6, margin: float = LEAST_MARGIN) -> None:
+    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = LEAST_MARGIN) -> None:
         self.points = np.ascontiguousarray(points)
         upright = np.abs(normals[:, 2]) < 0.5
         self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
         self.cell, self.margin = cell, max(margin, LEAST_MARGIN)
-        lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
-        hi = points[:, :2].max(axis=0) if len(points) else np.zeros(2)
-        self.origin = lo
-        self.ncx, self.ncy = (np.floor((hi - lo) / cell).astype(int) + 1).tolist()
-        key = np.zeros(0, np.int64)
-        if len(points):
-            c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
-            key = c[:, 1] * self.ncx + c[:, 0]
-        self.items = np.argsort(key, kind="stable")
-        self.starts = np.searchsorted(key[self.items], np.arange(self.ncx * self.ncy + 1))
+        self.origin, self.ncx, self.ncy, self.starts, self.items = _binned(points, cell)
 
     def copied(self) -> ResidualMap:
         """The same, to be lowered on its own."""
@@ -50,3 +50,83 @@ class ResidualMap:
         lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
               self.ncy, np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.margin,
               self.residual)
+
+    def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
+        """Lower the residual by poses of a leaning tool: to the least signed distance, below 0 where it gouges.
+
+        tips : (m, 3) float64, mm; axes : (m, 3) float64, unit, tip to spindle, as for ``leaning_depths``
+
+        Samples that nothing comes near by ``margin`` keep theirs, and so do those that would be lowered by no more
+        than 1e-6 mm. ``level`` is not asked: a leaning end has no plane of its own.
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_axis', as ``leaning_depths``.
+        """
+        tips, axes = _poses(tips, axes)
+        lower_leaning(self.points, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
+                      self.ncy, tips, axes, tool.flute_length, tool.radius, tool.corner_radius, self.margin,
+                      self.residual)
+
+
+def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: float) -> F64:
+    """Least signed distance from points to the cutting part of a tool over all poses of a pass.
+
+    points : (n, 3) float64, mm
+    tips   : (m, 3) float64, mm; one alone is a tool that stands
+    axes   : (m, 3) float64, unit, tip to spindle, neighbours less than a right angle apart
+    tool   : its cutting part counts: nose, and cylinder up to the end of the flutes, where a disc closes it
+    margin : mm
+
+    Returns (n,) float64, mm: below 0 as deep as a point lay under the surface of the cutting part, the disc at the end
+    of the flutes with it; UNTOUCHED where that is more than ``margin``.
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_axis': an axis is not unit, or a right angle or more from the one before.
+
+    Notes
+    -----
+    From pose to pose the tip goes straight and the axis turns on the great circle at an even rate, by sine and cosine:
+    no error comes of that. (Chords of the turn made unit lag and lead by 0.016 theta^3 rad, 0.3 um at the end of a
+    20 mm tool that turns 0.1 rad.) A result is never too low and at most 1e-6 mm too high, whatever the turn, by the
+    bound in ``kernels.leaning``.
+    """
+    points = np.ascontiguousarray(points, float)
+    tips, axes = _poses(tips, axes)
+    origin, ncx, ncy, starts, items = _binned(points, CELL)
+    least = np.full(len(points), UNTOUCHED)
+    lower_leaning(points, starts, items, origin[0], origin[1], CELL, ncx, ncy, tips, axes, tool.flute_length,
+                  tool.radius, tool.corner_radius, float(margin), least)
+    return least
+
+
+def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
+    """Tips and axes as the kernel takes them, a single one as a move that goes nowhere."""
+    tips, axes = np.ascontiguousarray(tips, float), np.ascontiguousarray(axes, float)
+    size = np.linalg.norm(axes, axis=1)
+    bad = ~(np.abs(size - 1.0) <= UNIT)
+    bad[1:] |= (axes[1:] * axes[:-1]).sum(axis=1) <= 0.0
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        at = "({})".format(", ".join(f"{x:.3f}" for x in tips[k]))
+        raise GeometryError(f"the tool axis at {at} is not unit, or a right angle or more from the one before",
+                            code="bad_axis", subjects=(at,), measured=None, limit=None,
+                            remedy="give axes of length 1 and poses between which they turn less")
+    axes = axes / size[:, None]
+    return (np.repeat(tips, 2, axis=0), np.repeat(axes, 2, axis=0)) if len(tips) == 1 else (tips, axes)
+
+
+def _binned(points: F64, cell: float) -> tuple[F64, int, int, NDArray[np.int64], NDArray[np.int64]]:
+    """Points (n, 3), mm, in square cells in plan: corner (2,), columns and rows, first item of each cell, the items."""
+    lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
+    hi = points[:, :2].max(axis=0) if len(points) else np.zeros(2)
+    ncx, ncy = (np.floor((hi - lo) / cell).astype(int) + 1).tolist()
+    key = np.zeros(0, np.int64)
+    if len(points):
+        c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
+        key = c[:, 1] * ncx + c[:, 0]
+    items = np.argsort(key, kind="stable")
+    return lo, ncx, ncy, np.searchsorted(key[items], np.arange(ncx * ncy + 1)), items

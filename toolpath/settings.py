@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
 from toolpath.strategies.zigzag import Pattern
 
 
@@ -19,6 +24,22 @@ class CutData:
 
 
 @dataclass(frozen=True)
+class Turning:
+    """What rotary axes can do, in the frame of an access.
+
+    stands  : for which tool axes (n, 3), unit, they have a place, (n,) bool
+    follows : whether they get along a path of tips (n, 3), mm, and axes (n, 3)
+    up      : (3,) float64, unit, away from the table
+    table   : mm along ``up``, below which nothing of a leaning tool may come
+    """
+
+    stands: Callable[[F64], NDArray[np.bool_]]
+    follows: Callable[[F64, F64], bool]
+    up: F64
+    table: float
+
+
+@dataclass(frozen=True)
 class PlanSettings:
     """Tolerances and heights of a plan; mm and rad.
 
@@ -27,6 +48,7 @@ class PlanSettings:
     rapid_floor     : height down to which a rapid may go
     either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
     pattern         : of passes over shallow area
+    turning         : what the rotary axes can do; None on a machine without
     """
 
     scallop_height: float
@@ -41,3 +63,4 @@ class PlanSettings:
     climb: bool = True
     either_way: bool = False
     pattern: Pattern = Pattern.AUTO
+    turning: Turning | None = None

@@ -68,7 +68,7 @@ def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
     Returns (k, 3) float64, mm: radius, corner radius, height above the tip, all grown by the allowance. Bodies that
     stand in the shadow of one as wide below them are left out.
     """
-    rows = [(tool.radius + allowance, tool.corner_radius + allowance, -allowance)]
+    rows = [(tool.radius + allowance, max(tool.corner_radius + allowance, 0.0), -allowance)]
     for d in sorted(discs_of(tool, clear), key=lambda d: (d.height, -d.radius)):
         if d.radius + allowance > rows[-1][0]:
             rows.append((d.radius + allowance, 0.0, d.height - allowance))

@@ -144,7 +144,7 @@ class TipField:
 
     def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
                  step: float, allowance: float = 0.0, cusp: float = 0.0) -> None:
-        self.tree, self.tool, self.allowance, self.cusp = tree, tool, allowance, cusp
+        self.tree, self.tool, self.clear, self.allowance, self.cusp = tree, tool, clear, allowance, cusp
         self.lattice = Lattice.over(bounds, margin, step)
         self.coarse = Lattice.over(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
         self.discs = discs_of(tool, clear)

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.clamping import home_of, sections
+from output.clamping import Leg, home_of, sections
+from output.kinematics import RotaryMachine
 from output.linuxcnc import write_linuxcnc
+from output.stepnc_words import _curves
 from tests.synthetic_plan import clamped
-from toolpath.motion import Motion
+from toolpath.motion import Motion, Trajectory
 from verify.cycles import FEED
 from verify.kinematics import KINDS, Kinematics
 from verify.reader import read_program
@@ -128,3 +130,32 @@ def test_limits_and_missing_frames_are_refused_by_name():
     with pytest.raises(OutputError) as refused:
         write_linuxcnc(replace(plan, clamping=replace(plan.clamping, frames=frames)))
     assert refused.value.code == "no_frame" and refused.value.subjects == ("S04",)
+
+
+def test_c_alone_round_an_upright_tool_is_no_curve():
+    """After a pass that ends upright C goes home while nothing else moves."""
+    tips, up = np.array([[0.0, 0.0, 20.0], [5.0, 0.0, 20.0]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    across = Leg(Motion.RAPID, tips, up, np.array([[0.0, 0.4], [0.0, 0.4]]), 0.0)
+    home = Leg(Motion.RAPID, tips[[1, 1]], up, np.array([[0.0, 0.4], [0.0, 0.0]]), 0.0)
+    (curve,) = _curves([across, home])
+    assert len(curve.points) == 2
+    assert len(_curves([home, across])) == 1
+
+
+def test_the_place_of_the_rotary_axes_is_chosen_for_the_whole_step():
+    """Both places do for the first axis; from the nearer one C would run into its limit in the middle of the pass."""
+    plan = clamped("table-table-AC", True)
+    a = np.radians(np.linspace(0.0, 200.0, 101))
+    lean = np.radians(20.0)
+    axes = np.column_stack([np.sin(lean) * np.sin(a), -np.sin(lean) * np.cos(a), np.full(101, np.cos(lean))])
+    tips = np.column_stack([np.linspace(-4.0, 4.0, 101), np.zeros(101), np.full(101, 12.0)])
+    step = replace(plan.steps[0], trajectories=(Trajectory(Motion.CUT, tips, 500.0, axes),))
+    clamping = replace(plan.clamping, machine=RotaryMachine("table-table-AC", limits=np.radians(
+        [[-60.0, 60.0], [-190.0, 190.0]])))
+    (section,) = sections(replace(plan, steps=(step,), clamping=clamping))
+    turns = np.vstack([leg.turns for leg in section.legs])
+    assert np.abs(turns[:, 1]).max() <= np.radians(190.0) + 1e-9
+    wanted_axes = axes @ plan.clamping.frames[step.access].rotation
+    assert np.abs(clamping.machine.axes(turns)[[0, -1]] - wanted_axes[[0, -1]]).max() < 1e-9
+    alone = clamping.machine.follow(wanted_axes[:1], np.zeros(2))[0]
+    assert np.abs(alone - turns[0]).max() > 1.0  # it would have been the other place

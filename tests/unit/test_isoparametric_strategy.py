@@ -160,6 +160,9 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
         def _along_borders(self):
             return _Strategy("isoparametric", 1.0, None, False), ()
 
+        def _beside_walls(self):
+            return (), ()
+
         def _copied(self, strategy):
             k = int(strategy.name == "isoparametric")
             rest = np.where(np.arange(4) < left[k], 0.03, 0.01)
@@ -167,8 +170,8 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             walked, depths = self.walked.copied(), self.depths.copied()
             walked.add(ways[k].points)
             depths.cut(ways[k].points)
-            return SimpleNamespace(strategy=strategy, stock=None, residual=SimpleNamespace(residual=rest),
-                                   walked=walked, depths=depths, _rounds=lambda _id, _wanted: steps)
+            return SimpleNamespace(strategy=strategy, begun_with="", stock=None, walked=walked, depths=depths,
+                                   residual=SimpleNamespace(residual=rest), _rounds=lambda _id, _wanted: steps)
 
     finish = Stub()
     remembered, depths = finish.walked, finish.depths

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as fresh
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +51,14 @@ class TrimmedFace:
     surface : NurbsSurface, mm, access frame, its normal out of the material
     loops   : (k, 2) float64 each, parameters of the surface, closed, the outer one first
     area    : mm²
+    flat    : it is a plane, for which there are other passes
     """
 
     face: int
     surface: NurbsSurface
     loops: tuple[F64, ...]
     area: float
+    flat: bool = False
     _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
 
     @cached_property
@@ -64,6 +67,11 @@ class TrimmedFace:
         d = self.surface.derivatives(self.loops[0])
         scale = float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())
         return squared(self.loops, scale)
+
+    @property
+    def over_square(self) -> list[Laid]:
+        """The pieces with their surface."""
+        return [IsoSurface(self.surface, p.map) for p in self.pieces]
 
     @property
     def name(self) -> str:
@@ -83,7 +91,7 @@ class TrimmedFace:
         """
         key = radius, scallop, flank
         if key not in self._laid:
-            self._laid[key] = _passes([IsoSurface(self.surface, p.map) for p in self.pieces], *key)
+            self._laid[key] = _passes(self.over_square, *key)
         return self._laid[key]
 
 
@@ -99,6 +107,7 @@ class SmoothFaces:
     alone: tuple[TrimmedFace, ...]
     mesh: TriangleMesh
     uv: F64
+    flat: ClassVar[bool] = False
     _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
 
     @property
@@ -116,6 +125,11 @@ class SmoothFaces:
         """The pieces of them over the unit square; a GeometryError where they are no sheet, or fold."""
         joined = Joined.of(self.mesh, self.uv, {face.face: face.surface for face in self.alone})
         return [JoinedSurface.of(joined, p.map) for p in squared((joined.border,), (1.0, 1.0))]
+
+    @property
+    def over_square(self) -> list[Laid]:
+        """The same."""
+        return list(self.pieces)
 
     def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
         """As for one face."""
@@ -302,12 +316,12 @@ def suits(tool: ToolBody) -> bool:
 
 
 def _passes(pieces: Sequence[Laid], radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
-    ways = [_leveller(p) for p in pieces] if flank is not None else pieces
+    ways = [leveller(p) for p in pieces] if flank is not None else pieces
     return [(iso, lay_out(iso, radius, scallop, flank)) for iso in ways]
 
 
-def _leveller(iso: Laid) -> Laid:
-    """The surface with passes along the longer sides, or along the others where they are far more level."""
+def leveller(iso: Laid) -> Laid:
+    """A surface with passes along the longer sides, or along the others where they are far more level."""
     other = replace(iso, turned=True)
     return other if _rise(other) < LEVEL_GAIN * _rise(iso) else iso
 

@@ -1,0 +1,342 @@
+"""Passes of a tool's flank along walls that are ruled, or nearly so.
+
+Notation
+    xi, eta : the unit square over the wall; xi along it, more level, eta up
+    P, n    : place of the wall and its normal, out of the material
+    R, r    : radius of the flank, and of the tool's corner
+    A       : P + (R + o) n, a place of the tool's axis, o what it stands off
+
+The axis of a pose goes from A at the lower border of a band, at xi, to A at its upper border, at xi + s. On a
+developable wall there is an s with which both normals are alike: there runs a ruling, and the flank lies on the wall
+all along it. On any other ruled wall normals turn along a ruling by an angle w, and a straight flank misses the wall by
+about R w² / 8, in the middle or at the ends: half as high it leaves a quarter. So what is too high is divided into
+bands; but the flank goes on above its band, so that only walls that bend away from it are the better for that.
+
+s is looked for along the whole wall at once: of a few at every station the chain is taken that misses least, less a
+price on turning (dynamic programming), three times, each time finer. What the flank truly leaves, and where it goes
+into the wall, is not what one pose shows but what all of them sweep: that is measured, and where it is too deep the
+tool stands off by as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import maximum_filter1d
+from scipy.spatial import cKDTree
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.isoparametric import Laid
+from toolpath.levels import true_runs
+from toolpath.posed import Blocked
+from toolpath.residual import leaning_depths
+
+STATIONS = 65  # along a wall, at which s is looked for
+ALONG, UP = 257, 33  # places of the wall that feet are looked for among, each way
+HEIGHTS = np.linspace(0.0, 1.0, 9)  # of a band, at which a pose is held against the wall
+SIDEWAYS = np.arange(-8, 9)  # trials at each station, a step apart
+FIRST_REACH = 1.0  # of the height of a band: so far to the side its top is looked for
+FINER, TIMES = 4.0, 3  # from one search to the next, and how many
+TURNING, LEANING = 0.02, 0.002  # of what may be left: the price of 1 mm of s, from station to station, and at all
+LOOKED, ROWS = 193, 25  # places at which what is swept is measured, along and up
+CORRECTIONS = 5
+AIMED = 0.5  # of the depth allowed: what a correction leaves
+FAR_OFF = 8.0  # times what may be left: deeper than that no standing off will mend
+MOST_BANDS = 4
+LEFT_SHARE = 0.95  # of a band must keep to what may be left
+DENSE = 0.25  # of the radius, at most, between poses before they are thinned out
+RAISES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the radius, along the axis, where the end of the tool is in the way
+RISE = 0.3  # mm a mm: how fast a pass is raised and lowered again
+LEAST_PIECE = 1.0  # of the radius: what is shorter is left to others
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of flank passes, mm: what may be left, how deep they may be, and what thinning out may add."""
+
+    left: float
+    depth: float
+    chord: float
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A pass, or part of one, as the tool walks it.
+
+    tips : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
+    away : (k, 3) float64, unit, out of the wall
+    """
+
+    tips: F64
+    axes: F64
+    away: F64
+
+    def reversed(self) -> Piece:
+        """The same, walked the other way."""
+        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A wall over the unit square.
+
+    iso : faces laid over it, passes along xi
+    """
+
+    iso: Laid
+
+    @cached_property
+    def _upwards(self) -> bool:
+        """Whether the wall rises with the eta of ``iso``."""
+        ends = self.iso.contact(np.full(2, 0.5), np.array([0.0, 1.0]))[0]
+        return bool(ends[1, 2] >= ends[0, 2])
+
+    def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        """Places (n, 3) mm and unit normals (n, 3) at xi and eta, both (n,)."""
+        return self.iso.contact(xi, eta if self._upwards else 1.0 - eta)
+
+    @cached_property
+    def length(self) -> float:
+        """mm, along the middle."""
+        return self._between(np.linspace(0.0, 1.0, STATIONS), np.full(STATIONS, 0.5))
+
+    @cached_property
+    def height(self) -> float:
+        """mm, up the middle."""
+        return self._between(np.full(STATIONS, 0.5), np.linspace(0.0, 1.0, STATIONS))
+
+    def lattice(self, along: int, up: int) -> tuple[F64, F64, F64]:
+        """Places and normals (up, along, 3), and the eta (up,) of the rows."""
+        at = np.linspace(0.0, 1.0, up)
+        xi, eta = np.meshgrid(np.linspace(0.0, 1.0, along), at)
+        place, normal = self.contact(xi.ravel(), eta.ravel())
+        if not (np.isfinite(place).all() and np.isfinite(normal).all()):
+            raise GeometryError("a wall has a place without a normal", code="bad_pass",
+                                remedy="machine it by another strategy")
+        return place.reshape(up, along, 3), normal.reshape(up, along, 3), at
+
+    def off(self, points: F64) -> F64:
+        """(n,) mm: how far points (n, 3) near the wall stand off it.
+
+        Along the normal at the nearest of a lattice of places: right to half the curvature of the wall times the square
+        of half their distance.
+        """
+        near = self._tree.query(points)[1]
+        place, normal = self._feet
+        return np.asarray(((points - place[near]) * normal[near]).sum(axis=1))
+
+    @cached_property
+    def _feet(self) -> tuple[F64, F64]:
+        place, normal, _ = self.lattice(ALONG, UP)
+        return place.reshape(-1, 3), normal.reshape(-1, 3)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._feet[0])
+
+    def _between(self, xi: F64, eta: F64) -> float:
+        return float(np.linalg.norm(np.diff(self.contact(xi, eta)[0], axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """A pass of the flank over part of the height of a wall.
+
+    wall       : Wall
+    tool       : ToolBody
+    allowance  : mm, to leave on the wall
+    low, high  : eta of its borders; the flank begins at the lower one
+    xi         : (n,) stations along it
+    shift      : (n,) what is added to xi at the upper border
+    off        : (n,) mm, what the axis stands off the wall more than R
+    left, deep : mm, the most that stays on 95 % of the band, and the most the wall is cut into
+    """
+
+    wall: Wall
+    tool: ToolBody
+    allowance: float
+    low: float
+    high: float
+    xi: F64
+    shift: F64
+    off: F64
+    left: float = np.inf
+    deep: float = np.inf
+
+    def poses(self, count: int) -> tuple[F64, F64]:
+        """Tips (count, 3) mm and axes (count, 3), unit, from one end of the wall to the other."""
+        xi = np.linspace(0.0, 1.0, count)
+        shift = PchipInterpolator(self.xi, self.shift)(xi)
+        stands = self.tool.radius + self.allowance + np.interp(xi, self.xi, self.off)
+        begin, end = axis_ends(self.wall, xi, shift, (self.low, self.high), stands)
+        axis = end - begin
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        return begin - self.tool.corner_radius * axis, axis
+
+    def pieces(self, blocked: Blocked, chord: float, served: NDArray[np.bool_] | None = None) -> list[Piece]:
+        """The pass where the tool is free.
+
+        Where the end of the tool is in the way it is raised along its axis, evenly, and what is under it is left.
+
+        blocked : whether the tool enters something
+        chord   : mm, what leaving out poses may move tip and upper end of the flank by
+        served  : (m,) where along the wall the pass is wanted, evenly from end to end; None: everywhere
+        """
+        spacing = min(DENSE * self.tool.radius, 0.5)
+        tip, axis = self.poses(int(np.ceil(max(self.wall.length / spacing, 2.0))) + 1)
+        xi = np.linspace(0.0, 1.0, len(tip))
+        away = self.wall.contact(xi, np.full(len(xi), 0.5 * (self.low + self.high)))[1]
+        height = (self.high - self.low) * self.wall.height
+        raised, met = _raised(tip, axis, blocked, self.tool.radius, height)
+        tip = tip + raised[:, None] * axis
+        if served is not None:
+            met |= ~served[np.rint(xi * (len(served) - 1)).astype(np.int64)]
+        gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
+        out = []
+        for i, j in true_runs(~met):
+            if gone[j - 1] - gone[i] >= LEAST_PIECE * self.tool.radius:
+                rows = i + thinned_poses(tip[i:j], axis[i:j], height + self.tool.corner_radius, chord)
+                out.append(Piece(tip[rows], axis[rows], away[rows]))
+        return out
+
+
+def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: float = 1.0,
+          allowance: float = 0.0) -> list[Band]:
+    """The passes of the flank over a wall, from the highest down: as few bands as leave little enough.
+
+    low, high : eta between which the wall is wanted
+    allowance : mm, to leave on it
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_pass': not even ``MOST_BANDS`` do, or the flutes are too short for the bands.
+    """
+    room = tool.flute_length - tool.corner_radius
+    least = int(np.ceil((high - low) * wall.height / room))
+    told, xi = np.inf, np.linspace(0.0, 1.0, STATIONS)
+    for count in range(max(least, 1), MOST_BANDS + 1):
+        borders = np.linspace(low, high, count + 1)
+        made: list[Band] = []
+        for a, b in zip(borders[:-1], borders[1:], strict=True):
+            made.append(_fitted(Band(wall, tool, allowance, float(a), float(b), xi, np.zeros(STATIONS),
+                                     np.zeros(STATIONS)), wanted))
+            if made[-1].left > wanted.left or made[-1].deep > wanted.depth:
+                break
+        else:
+            return made[::-1]
+        told = max(made[-1].left, made[-1].deep)
+    raise GeometryError(f"{tool.id}: its flank misses the wall by {told:.4f} mm in {MOST_BANDS} bands; allowed is "
+                        f"{wanted.left:.4f} mm" if np.isfinite(told) else
+                        f"{tool.id}: a wall {wall.height:.1f} mm high takes more than {MOST_BANDS} bands of its flutes",
+                        code="bad_pass", subjects=(tool.id,), measured=told, limit=wanted.left,
+                        remedy="machine it in levels")
+
+
+def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], stands: F64 | float) -> tuple[F64, F64]:
+    """Where the tool's axis passes a band's lower and upper border, (n, 3) mm each; stands : mm off the wall."""
+    ends = []
+    for at, eta in zip((xi, np.clip(xi + shift, 0.0, 1.0)), borders, strict=True):
+        place, normal = wall.contact(at, np.full(len(at), eta))
+        ends.append(place + np.reshape(stands, (-1, 1)) * normal)
+    return ends[0], ends[1]
+
+
+def thinned_poses(tips: F64, axes: F64, reach: float, tolerance: float) -> NDArray[np.int64]:
+    """Rows (k,) of poses that will do: between them tip and the place ``reach`` mm up the axis stay within a tolerance.
+
+    tips, axes : (n, 3) float64, mm and unit, evenly spaced; tolerance : mm
+    """
+    way = np.hstack([tips, tips + reach * axes])
+    keep = np.zeros(len(way), np.bool_)
+    keep[[0, -1]] = True
+    todo = [(0, len(way) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        share = np.arange(1, b - a)[:, None] / (b - a)
+        off = way[a + 1:b] - ((1.0 - share) * way[a] + share * way[b])
+        miss = np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1))
+        worst = int(miss.argmax())
+        if miss[worst] > tolerance:
+            keep[a + 1 + worst] = True
+            todo += [(a, a + 1 + worst), (a + 1 + worst, b)]
+    return np.flatnonzero(keep)
+
+
+def _fitted(band: Band, wanted: Wanted) -> Band:
+    """A band with its shift, standing off as far as what it sweeps wants."""
+    wall, tool, low, high = band.wall, band.tool, band.low, band.high
+    band = replace(band, shift=_paired(wall, band.xi, (low, high), tool.radius, wanted.left))
+    place, normal, eta = wall.lattice(LOOKED, ROWS)
+    place = (place + band.allowance * normal).reshape(-1, 3)
+    own = (eta >= low - 1e-9) & (eta <= high + 1e-9)
+    margin = 2.0 * wanted.left + wanted.depth
+    of_station = np.rint(np.linspace(0.0, 1.0, LOOKED) * (STATIONS - 1)).astype(np.int64)
+    for _ in range(CORRECTIONS):
+        depth = leaning_depths(place, *band.poses(4 * STATIONS), tool, margin).reshape(ROWS, LOOKED)
+        deep = -depth.min(axis=0)
+        band = replace(band, left=float(np.quantile(depth[own], LEFT_SHARE)), deep=max(float(deep.max()), 0.0))
+        if band.deep <= wanted.depth or band.deep > FAR_OFF * (wanted.left + wanted.depth):
+            break
+        more = np.zeros(STATIONS)
+        np.maximum.at(more, of_station, deep - AIMED * wanted.depth)
+        band = replace(band, off=band.off + maximum_filter1d(np.maximum(more, 0.0), 3, mode="nearest"))
+    return band
+
+
+def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
+    """(n,) what is added to xi at the upper border, so that the axis misses the wall least."""
+    height = (borders[1] - borders[0]) * wall.height
+    step = FIRST_REACH * height / wall.length / len(SIDEWAYS[SIDEWAYS > 0])
+    shift = np.zeros(len(xi))
+    for _ in range(TIMES):
+        trials = np.clip(shift + step * SIDEWAYS[:, None], -xi, 1.0 - xi)
+        miss = np.array([_missed(wall, xi, s, borders, radius) for s in trials])
+        cost = miss / left + LEANING * wall.length * np.abs(trials)
+        best, back = cost[:, 0], np.zeros((len(xi), len(SIDEWAYS)), np.int64)
+        for k in range(1, len(xi)):
+            through = best[None, :] + TURNING * wall.length * np.abs(trials[:, k, None] - trials[None, :, k - 1])
+            back[k] = through.argmin(axis=1)
+            best = cost[:, k] + through.min(axis=1)
+        rows = [int(best.argmin())]
+        for k in range(len(xi) - 1, 0, -1):
+            rows.append(int(back[k, rows[-1]]))
+        shift, step = trials[rows[::-1], np.arange(len(xi))], step / FINER
+    return shift
+
+
+def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> F64:
+    """(n,) mm: between how far the axis stands off the wall at the nearest and at the farthest of its places."""
+    begin, end = axis_ends(wall, xi, shift, borders, radius)
+    places = begin[:, None] + HEIGHTS[:, None] * (end - begin)[:, None]
+    return np.asarray(np.ptp(wall.off(places.reshape(-1, 3)).reshape(len(xi), -1), axis=1))
+
+
+def _raised(tip: F64, axis: F64, blocked: Blocked, radius: float, most: float) -> tuple[F64, NDArray[np.bool_]]:
+    """By how much (n,) mm poses are raised along their axes, ``most`` at most, and where they are not free even so."""
+    need = np.full(len(tip), np.nan)
+    todo = np.arange(len(tip))
+    for share in RAISES:
+        if share * radius > most or not len(todo):
+            break
+        met = blocked(tip[todo] + share * radius * axis[todo], axis[todo])
+        need[todo[~met]] = share * radius
+        todo = todo[met]
+    # what is met may begin before the pose that meets it
+    out = maximum_filter1d(np.nan_to_num(need), 3, mode="nearest")
+    way = RISE * np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    for order in (range(1, len(out)), range(len(out) - 2, -1, -1)):
+        for k in order:
+            before, gone = (k - 1, way[k - 1]) if order.step > 0 else (k + 1, way[k])
+            out[k] = max(out[k], out[before] - gone)
+    met = np.isnan(need)
+    met[~met] = blocked((tip + out[:, None] * axis)[~met], axis[~met])
+    return out, met
