@@ -279,6 +279,8 @@ class Finish:
         tool, steep = self.field.tool, self.zone.form is Form.STEEP
         before, refused, whole = len(linker.trajectories), linker.refused, False
         for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, steep):
+            if layer is not line and self._is_known(layer, linker.motions.tolerance):
+                continue  # what the stock still shows there is out of the reach of the tool
             whole = linker.add(layer, thin)
             if linker.refused > refused:  # what it would have taken is too much for the layer below
                 break
@@ -287,6 +289,10 @@ class Finish:
             self.residual.cut(points, tool)
         for points in [line.points, *cuts] if whole else cuts:
             self.walked.add(points)
+
+    def _is_known(self, line: Line, tolerance: float) -> bool:
+        """Whether this tool has walked all of a line already, as it is written."""
+        return not self.walked.fresh(Line(thinned(line.points, tolerance), line.closed)).any()
 
     def _unwalked(self, line: Line) -> list[Line]:
         """What of a line was not walked before by this tool; the rest is only measured, it would leave the same.
