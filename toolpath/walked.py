@@ -11,7 +11,8 @@ from geometry.mesh import F64
 from toolpath.levels import Line, dense, place_keys
 from zones.reach import Lattice
 
-ON = 1e-5  # mm off a move, and still on it
+WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is the same
+ON = 2.0 * WRITTEN  # off a move, and still on it
 
 
 class Depths:
@@ -62,7 +63,7 @@ class Walked:
 
     def add(self, points: F64) -> None:
         """Remember a way (n, 3), mm, that the tool has gone from end to end."""
-        keys = place_keys(points)
+        keys = _written(points)
         for a, b, p, q in zip(keys[:-1], keys[1:], points[:-1], points[1:], strict=True):
             self._moves.setdefault(a, []).append(q)
             self._moves.setdefault(b, []).append(p)
@@ -73,14 +74,14 @@ class Walked:
         A move is known where it is part of one that was walked, and shares an end with it.
         """
         count = len(line.points) - 1
-        keys, points = place_keys(line.points), line.points
+        keys, points = _written(line.points), line.points
         return np.array([not (self._along(keys[k], points[k], points[k + 1])
                               or self._along(keys[k + 1], points[k + 1], points[k])) for k in range(count)])
 
     @staticmethod
     def again(line: Line) -> NDArray[np.bool_]:
         """Which moves (n - 1,) of a line go where it has been itself, as turns of a spiral do that a border holds."""
-        keys = place_keys(line.points)
+        keys = _written(line.points)
         out = np.zeros(len(keys) - 1, np.bool_)
         if len(set(keys)) >= len(keys) - 1:  # a ring comes back to its beginning
             return out
@@ -111,3 +112,8 @@ class Walked:
     def become(self, other: Walked) -> None:
         """Take over what a copy of this has come to."""
         self._moves = other._moves
+
+
+def _written(points: F64) -> list[bytes]:
+    """A key for each of points (n, 3), mm, the same for those that a program says with the same words."""
+    return [row.tobytes() for row in np.rint(points / WRITTEN).astype(np.int64)]

@@ -161,6 +161,16 @@ def test_less_is_walked_again_than_the_proof_takes_for_a_stretch_run_twice(known
     assert again.all() == (known <= 7)
 
 
+def test_what_a_program_says_with_the_same_words_is_the_same():
+    """Two lines bent by the same facets met from other sides: their places differ by a few nm."""
+    points = line(*range(12)).points + 3e-5
+    known = Walked()
+    known.add(points)
+    again = Line(points + 1e-5 * np.sin(np.arange(36.0)).reshape(12, 3), False)
+    assert not known.fresh(again).any()
+    assert known.fresh(Line(points + [0.0, 0.0, 1e-3], False)).all()
+
+
 def test_depths_know_the_lowest_cut_by_place_and_by_cell():
     lattice = Lattice(0.0, 0.0, 0.5, 21, 11)
     depths = Depths(lattice)
