@@ -125,7 +125,7 @@ def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Bloc
         away = tip[k] + share * off * normal[k]
         free = ~blocked(away, axis[k])
         tip[k[free]], met[k[free]] = away[free], False
-    jumps = _angles(axis) > asked
+    jumps = angles_between(axis) > asked
     pieces, left = [], []
     kept = np.isin(way, ends)
     stop = [k + 1 for k in np.flatnonzero(jumps).tolist()]
@@ -142,13 +142,19 @@ def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Bloc
 
 def _located(profile: Profile, way: F64, tool: ToolBody, axes: Axes) -> tuple[F64, F64, F64]:
     """Normals, tool axes and tips (k, 3) at ways (k,) mm."""
-    contact, normal, axis = _axes(profile, way, axes)
+    contact, normal, axis = wanted_axes(profile, way, axes)
     side = sides(profile, way, axis) if tool.radius > tool.corner_radius else None
     return normal, axis, tips(contact, normal, tool, axis, side)
 
 
-def _axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
-    """Contacts, normals and tool axes (k, 3) at ways (k,) mm."""
+def wanted_axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
+    """Contacts, normals and tool axes (k, 3) of a field at ways (k,) mm of a pass.
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_axis': the field gives none somewhere.
+    """
     contact, normal = contacts(profile, way)
     step = 1e-3 * profile.width
     ahead = contacts(profile, np.minimum(way + step, profile.length))[0]
@@ -164,7 +170,7 @@ def _axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
     return contact, normal, axis
 
 
-def _angles(axis: F64) -> F64:
+def angles_between(axis: F64) -> F64:
     """(k - 1,) rad between neighbouring axes (k, 3)."""
     cross = np.linalg.norm(np.cross(axis[1:], axis[:-1]), axis=1)
     return np.asarray(np.arctan2(cross, (axis[1:] * axis[:-1]).sum(axis=1)))
@@ -179,7 +185,7 @@ def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first
     """
     out = looks
     if first is not None:
-        turned = np.concatenate([[0.0], np.cumsum(_angles(_axes(profile, looks, axes)[2]))])
+        turned = np.concatenate([[0.0], np.cumsum(angles_between(wanted_axes(profile, looks, axes)[2]))])
         parts = np.clip(np.ceil(np.diff(np.interp(first, looks, turned)) / room), 1, MOST_PARTS).astype(np.int64)
         climb = turned + 1e-12 * looks  # so that it can be turned round where the axis stands
         low, high = (np.interp(e, looks, climb) for e in (first[:-1], first[1:]))
@@ -187,7 +193,7 @@ def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first
                  for a, b, n in zip(low, high, parts, strict=True)]
         out = np.unique(np.concatenate([first, *inner]))
     for _ in range(ROUNDS):  # between looks it may turn more than they say
-        over = _angles(_axes(profile, out, axes)[2]) > room
+        over = angles_between(wanted_axes(profile, out, axes)[2]) > room
         if not over.any():
             break
         out = np.unique(np.concatenate([out, 0.5 * (out[1:] + out[:-1])[over]]))

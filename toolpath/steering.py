@@ -1,0 +1,253 @@
+"""Tool axes along a pass: as near to those wanted as what stands around lets them, and turning evenly.
+
+Notation
+    w_k : axis wanted at station k;  u_k : axis taken;  b_k : axis of the pass before, beside it; all unit
+    h   : mm between stations;  l : mm, over which a turn is spread
+
+Without anything in the way the axes taken have the least
+
+    sum h |u_k - w_k|² + h g |u_k - b_k|² + (l² / h) |u_k+1 - u_k|²
+
+a tridiagonal system, made unit after. A sudden turn by an angle t is spread as t exp(-s / l) / 2 on both sides, so axes
+turn by t / (2 l) a millimetre at most: l grows until they keep to the limit. Where the tool would be in something with
+its smoothed axis, a fan of axes round it is asked, and through all stations the chain is taken that has the fewest
+blocked places and then the least of the same sum (dynamic programming). The fan is coarse, so that chain is drawn
+towards the least of the sum station by station, each time only as far as the tool stays free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64
+from geometry.tilted import axis_frames
+from geometry.toolbody import ToolBody
+from toolpath.forward import Profile
+from toolpath.levels import true_runs
+from toolpath.locations import sides, tips
+from toolpath.posed import Axes, Blocked, angles_between, wanted_axes
+
+SPACING = 0.5  # mm between stations, at most
+FAN = np.radians(4.0)  # between neighbouring axes of a fan
+BESIDE = 0.5  # weight of the axes of the pass before
+BLOCKED = 1e3  # cost of a blocked station: more than any turn
+WIDER = 1.5  # by which l grows, where axes turn too fast
+SWEEPS = 120  # of drawing a chain towards the least of the sum
+SETTLED = 1e-3  # rad, below which a sweep changes nothing
+SHORTER = (1.0, 0.5, 0.25)  # of a step towards the least, where the whole of it is not free
+HOLD = 1e-3  # weight of what is wanted at a blocked station: its axis lies between its neighbours
+
+Met = Callable[[NDArray[np.int64], F64], NDArray[np.bool_]]
+"""(k,) bool: whether the tool is in something at stations (k,) with axes (k, 3)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What axes along a pass keep to.
+
+    cone   : rad, the most an axis may be off the one wanted
+    per_mm : rad/mm, the most it may turn along the contacts of a pass
+    spread : mm, over which a turn is spread at least
+    """
+
+    cone: float
+    per_mm: float
+    spread: float = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Steered:
+    """The field of axes of one pass; it can be asked for axes as any other (``toolpath.posed.Axes``).
+
+    contact : (m, 3) float64, mm, its stations, evenly spaced
+    axis    : (m, 3) float64, unit, tip to spindle
+    free    : (m,) bool; where False no axis of the fan frees the tool, and it lies between its neighbours
+    per_mm  : rad/mm, the fastest it turns where the tool is free
+    """
+
+    contact: F64
+    axis: F64
+    free: NDArray[np.bool_]
+    per_mm: float
+
+    def __call__(self, contact: F64, _normal: F64, _way: F64) -> F64:
+        """Axes (k, 3), unit, at contacts (k, 3) mm of this pass or beside it: straight between the stations."""
+        near = self._tree.query(contact)[1]
+        best, axis = np.full(len(contact), np.inf), np.empty((len(contact), 3))
+        for first in (near - 1, near):
+            a = np.clip(first, 0, len(self.contact) - 2)
+            begin, step = self.contact[a], self.contact[a + 1] - self.contact[a]
+            share = ((contact - begin) * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300)
+            share = np.clip(share, 0.0, 1.0)[:, None]
+            far = np.linalg.norm(contact - begin - share * step, axis=1)
+            closer = far < best
+            best[closer] = far[closer]
+            axis[closer] = ((1.0 - share) * self.axis[a] + share * self.axis[a + 1])[closer]
+        return np.asarray(axis / np.linalg.norm(axis, axis=1)[:, None])
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.contact)
+
+
+def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: Limits,
+            before: Steered | None = None) -> Steered:
+    """The axes of a pass.
+
+    profile : Profile of the pass
+    tool    : ToolBody, a ball, a bull nose or a flat
+    wanted  : the field of axes wanted
+    blocked : whether the tool enters something, or the machine cannot take the axis
+    limits  : Limits
+    before  : axes of the pass beside it, which these stay near to
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_axis': the field wanted gives none somewhere.
+    """
+    count = max(int(np.ceil(profile.length / SPACING)) + 1, 2)
+    way = np.linspace(0.0, profile.length, count)
+    contact, normal, axis = wanted_axes(profile, way, wanted)
+    step = profile.length / (count - 1)
+
+    def met(rows: NDArray[np.int64], axes: F64) -> NDArray[np.bool_]:
+        side = sides(profile, way[rows], axes) if tool.radius > tool.corner_radius else None
+        return blocked(tips(contact[rows], normal[rows], tool, axes, side), axes)
+
+    beside = None if before is None else before(contact, normal, normal)
+    goal, weight = _goal(axis, beside)
+    rows = np.arange(count)
+    spread = limits.spread
+    out = _spread(goal, np.full(count, weight), step, spread)
+    while angles_between(out).max() > limits.per_mm * step and spread < profile.length:
+        spread *= WIDER
+        out = _spread(goal, np.full(count, weight), step, spread)
+    bad = met(rows, out)
+    if bad.any():
+        out, bad = _round(out, axis, goal, weight, bad, met, limits, step, spread)
+    turn = angles_between(out)
+    both = ~(bad[1:] | bad[:-1])
+    return Steered(contact, out, ~bad, float(turn[both].max() / step) if both.any() else 0.0)
+
+
+def fan(axis: F64, half: float) -> F64:
+    """Axes spread evenly round others, each itself first.
+
+    axis : (n, 3) float64, unit; half : rad, how far out
+
+    Returns (n, d, 3) float64, unit.
+    """
+    rows = [np.array([[0.0, 0.0, 1.0]])]
+    for k in range(1, int(half / FAN + 1e-9) + 1):
+        count = int(np.ceil(2.0 * np.pi * np.sin(k * FAN) / FAN))
+        at = 2.0 * np.pi * np.arange(count) / count
+        rows.append(np.column_stack([np.sin(k * FAN) * np.cos(at), np.sin(k * FAN) * np.sin(at),
+                                     np.full(count, np.cos(k * FAN))]))
+    return np.asarray(np.einsum("nji,dj->ndi", axis_frames(axis), np.vstack(rows)))
+
+
+def _goal(axis: F64, beside: F64 | None) -> tuple[F64, float]:
+    """What axes are drawn to, and how strongly."""
+    if beside is None:
+        return axis, 1.0
+    return (axis + BESIDE * beside) / (1.0 + BESIDE), 1.0 + BESIDE
+
+
+def _spread(goal: F64, weight: F64, step: float, spread: float) -> F64:
+    """Axes (m, 3), unit, with the least sum where nothing is in the way."""
+    stiff = (spread / step) ** 2
+    bands = np.zeros((2, len(goal)))
+    bands[0, 1:] = -stiff
+    bands[1] = weight + 2.0 * stiff
+    bands[1, [0, -1]] -= stiff
+    out = solveh_banded(bands, weight[:, None] * goal)
+    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+
+def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.bool_], met: Met, limits: Limits,
+           step: float, spread: float) -> tuple[F64, NDArray[np.bool_]]:
+    """Axes led round what is in the way, and where even so the tool is blocked."""
+    reach = int(np.ceil(limits.cone / limits.per_mm / step)) + 1  # so many stations it takes to get round
+    near = np.convolve(bad, np.ones(2 * reach + 1), "same") > 0.5
+    rows = np.flatnonzero(near)
+    tries = fan(smooth[rows], limits.cone)
+    inside = (tries * wanted[rows, None]).sum(axis=2) >= np.cos(limits.cone)
+    inside[:, 0] = True
+    hit = ~inside
+    hit[inside] = met(np.broadcast_to(rows[:, None], inside.shape)[inside], tries[inside])
+    cost = weight * step * ((tries - goal[rows, None]) ** 2).sum(axis=2) + BLOCKED * hit
+    stiff = spread**2 / step
+    out, blocked = smooth.copy(), bad.copy()
+    for i, j in true_runs(near):
+        at = slice(int(np.searchsorted(rows, i)), int(np.searchsorted(rows, j)))
+        ends = smooth[i - 1] if i else None, smooth[j] if j < len(smooth) else None
+        taken = _chain(tries[at], cost[at], stiff, ends)
+        out[i:j] = tries[at][np.arange(j - i), taken]
+        blocked[i:j] = hit[at][np.arange(j - i), taken]
+    return _drawn(out, blocked, rows, wanted, goal, weight * step, met, float(np.cos(limits.cone)), stiff)
+
+
+def _chain(tries: F64, cost: F64, stiff: float, ends: tuple[F64 | None, F64 | None]) -> NDArray[np.int64]:
+    """(q,) which of the axes (q, d, 3) at each station make the chain of least cost (q, d) and turning.
+
+    ends : (3,) axes before the first and after the last station, or None
+    """
+    def turned(a: F64, b: F64) -> F64:
+        return np.asarray(2.0 * stiff * (1.0 - a @ b.T))
+
+    best = cost[0] + (turned(tries[0], ends[0][None])[:, 0] if ends[0] is not None else 0.0)
+    back = np.zeros(cost.shape, np.int64)
+    for k in range(1, len(cost)):
+        through = best[None, :] + turned(tries[k], tries[k - 1])
+        back[k] = through.argmin(axis=1)
+        best = cost[k] + through.min(axis=1)
+    if ends[1] is not None:
+        best = best + turned(tries[-1], ends[1][None])[:, 0]
+    out = [int(best.argmin())]
+    for k in range(len(cost) - 1, 0, -1):
+        out.append(int(back[k, out[-1]]))
+    return np.array(out[::-1], np.int64)
+
+
+def _drawn(axis: F64, blocked: NDArray[np.bool_], rows: NDArray[np.int64], wanted: F64, goal: F64, weight: float,
+           met: Met, least: float, stiff: float) -> tuple[F64, NDArray[np.bool_]]:
+    """Axes drawn towards the least of the sum, those of ``rows``, as far as each stays free.
+
+    least : cosine of the most an axis may be off the one wanted
+    """
+    out, blocked, last = axis.copy(), blocked.copy(), len(axis) - 1
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for odd in (0, 1):
+            k = rows[rows % 2 == odd]
+            own = np.where(blocked[k], HOLD, 1.0) * weight
+            left, right = (k > 0).astype(float), (k < last).astype(float)
+            pull = left[:, None] * out[np.maximum(k - 1, 0)] + right[:, None] * out[np.minimum(k + 1, last)]
+            target = (own[:, None] * goal[k] + stiff * pull) / (own + stiff * (left + right))[:, None]
+            todo = np.arange(len(k))
+            for share in SHORTER:
+                if not len(todo):
+                    break
+                at = k[todo]
+                trial = out[at] + share * (target[todo] - out[at])
+                trial /= np.linalg.norm(trial, axis=1)[:, None]
+                off = (trial * wanted[at]).sum(axis=1)
+                hit = (off < least) & (off < (out[at] * wanted[at]).sum(axis=1))
+                hit[~hit] = met(at[~hit], trial[~hit])
+                done = ~hit | blocked[at]  # what is blocked anyway may stand wherever that is even
+                if done.any():
+                    moved = max(moved, float(np.linalg.norm(trial[done] - out[at[done]], axis=1).max()))
+                out[at[done]] = trial[done]
+                blocked[at[done]] = hit[done]
+                todo = todo[~done]
+        if moved < SETTLED:
+            break
+    return out, blocked
