@@ -61,7 +61,7 @@ def test_a_sudden_turn_is_spread_by_the_closed_form(spread):
     lean = np.arctan2(made.axis[:, 0], made.axis[:, 2])
     s = made.contact[:, 0]
     want = np.where(s > 0.0, angle - 0.5 * angle * np.exp(-s / spread), 0.5 * angle * np.exp(s / spread))
-    # the sum over stations against the integral: within what h²/(24 l²) and the place of the jump in its step make of it
+    # a sum over stations against the integral: h²/(24 l²), and where in its step the jump lies
     np.testing.assert_allclose(lean, want, atol=angle * SPACING / spread * 0.6)
     assert np.all(np.diff(lean) >= -1e-12) and made.free.all()
     assert made.per_mm == pytest.approx(angle / (2.0 * spread), rel=0.15)
