@@ -216,6 +216,8 @@ class Linker:
         for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
                      highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
+            if ramp is not None:  # a line that begins as another did has the same way down, as far as that came
+                ramp = ramp[min(self.depths.known(ramp), len(ramp) - len(points)):]
             entry = self._beside(ramp[0]) if ramp is not None else None
             if ramp is not None and entry is not None:
                 return entry, ramp, False

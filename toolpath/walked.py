@@ -22,11 +22,14 @@ class Depths:
         self._lattice = lattice
         self._places: dict[bytes, float] = {}  # mm, Z of the lowest cut by place of a tip
         self._cells = np.full((lattice.ny, lattice.nx), math.inf)  # mm, the same by cell, along the moves too
+        self._moves: set[tuple[bytes, bytes]] = set()
 
     def cut(self, points: F64) -> None:
         """Remember a cut with the tip along points (n, 3), mm."""
         for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
             self._places[place] = min(z, self._places.get(place, math.inf))
+        keys = _written(points)
+        self._moves.update(zip(keys[:-1], keys[1:], strict=True))
         way = dense(points, 0.5 * self._lattice.step)
         way = way[self._lattice.inside(way)]
         np.minimum.at(self._cells, self._lattice.cells(way), way[:, 2])
@@ -34,6 +37,12 @@ class Depths:
     def lowest(self, place: F64) -> float:
         """Z of the lowest cut at the very place of a tip (3,), mm; inf where there was none."""
         return self._places.get(place_keys(place[None, :2])[0], math.inf)
+
+    def known(self, points: F64) -> int:
+        """How many moves at the beginning of a way (n, 3), mm, were cut before, each as it stands."""
+        keys = _written(points)
+        return next((k for k, move in enumerate(zip(keys[:-1], keys[1:], strict=True)) if move not in self._moves),
+                    len(points) - 1)
 
     def above(self, points: F64) -> F64:
         """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
@@ -44,12 +53,12 @@ class Depths:
     def copied(self) -> Depths:
         """The same, to be added to on its own."""
         out = Depths(self._lattice)
-        out._places, out._cells = dict(self._places), self._cells.copy()
+        out._places, out._cells, out._moves = dict(self._places), self._cells.copy(), set(self._moves)
         return out
 
     def become(self, other: Depths) -> None:
         """Take over what a copy of this has come to."""
-        self._places, self._cells = other._places, other._cells
+        self._places, self._cells, self._moves = other._places, other._cells, other._moves
 
 
 class Walked:

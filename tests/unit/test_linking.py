@@ -85,6 +85,21 @@ def test_rings_of_layer_after_layer_are_gone_down_to_where_the_tool_has_been():
     assert len({tuple(m) for m in moves}) == len(moves)  # no way is run twice
 
 
+def test_a_way_down_is_not_gone_again_as_far_as_a_line_before_went_the_same():
+    """A line that parts from this one only after the first moves of the way down, and a tool that cut it."""
+    x = np.linspace(8.0, 22.0, 29)
+    line = Line(np.column_stack([x, 13.0 + 0.05 * (x - 15.0) ** 2, np.full(29, 2.0)]), False)
+    first, again = linker(), linker()
+    assert first.add(line)
+    whole = first.trajectories[-1].points
+    again.depths.cut(whole[:7])
+    assert again.add(line)
+    np.testing.assert_array_equal(again.trajectories[-1].points, whole[6:])
+    assert steepest_cut(again) <= RAMP
+    down = [t.points for t in again.trajectories if t.motion is Motion.APPROACH][-1]
+    np.testing.assert_array_equal(down[-1], whole[6])
+
+
 def test_stock_that_stays_beside_a_wall_is_not_gone_over_layer_after_layer():
     """Stock higher than the flutes that nothing takes away: it was walked above once, and that is enough."""
     mesh = box_mesh([0, 0, -2], [30, 30, 0])
