@@ -13,9 +13,9 @@ about R w² / 8, in the middle or at the ends: half as high it leaves a quarter.
 bands; but the flank goes on above its band, so that only walls that bend away from it are the better for that.
 
 s is looked for along the whole wall at once: of a few at every station the chain is taken that misses least, less a
-price on turning (dynamic programming), three times, each time finer. What the flank truly leaves, and where it goes
-into the wall, is not what one pose shows but what all of them sweep: that is measured, and where it is too deep the
-tool stands off by as much.
+price on turning (dynamic programming), three times, each time finer, and the steps of the search are smoothed out. What
+the flank truly leaves, and where it goes into the wall, is not what one pose shows but what all of them sweep: that is
+measured, and where it is too deep the tool stands off by as much.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d
 from scipy.spatial import cKDTree
 
@@ -43,6 +44,7 @@ HEIGHTS = np.linspace(0.0, 1.0, 9)  # of a band, at which a pose is held against
 SIDEWAYS = np.arange(-8, 9)  # trials at each station, a step apart
 FIRST_REACH = 1.0  # of the height of a band: so far to the side its top is looked for
 FINER, TIMES = 4.0, 3  # from one search to the next, and how many
+EVENED = 16.0  # how much of the trials' steps is smoothed out of s: waves of 5 stations to 3 %, of 20 to 87 %
 TURNING, LEANING = 0.02, 0.002  # of what may be left: the price of 1 mm of s, from station to station, and at all
 LOOKED, ROWS = 193, 25  # places at which what is swept is measured, along and up
 CORRECTIONS = 5
@@ -310,7 +312,22 @@ def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, le
         for k in range(len(xi) - 1, 0, -1):
             rows.append(int(back[k, rows[-1]]))
         shift, step = trials[rows[::-1], np.arange(len(xi))], step / FINER
-    return shift
+    return np.clip(_evened(shift), -xi, 1.0 - xi)
+
+
+def _evened(shift: F64) -> F64:
+    """s (n,) without the steps it was looked for in.
+
+    Least sum of squares of what it is moved by and EVENED times those of its second differences. About the best s the
+    miss grows with the square of what s is off, so a step of the last search, moved by less than itself, costs
+    nothing that counts; what it costs is measured anyway.
+    """
+    bend = np.diff(np.eye(len(shift)), 2, axis=0)
+    whole = np.eye(len(shift)) + EVENED * bend.T @ bend
+    bands_of = np.zeros((3, len(shift)))
+    for k in range(3):
+        bands_of[2 - k, k:] = np.diag(whole, k)
+    return np.asarray(solveh_banded(bands_of, shift))
 
 
 def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> F64:

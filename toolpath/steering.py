@@ -12,7 +12,8 @@ a tridiagonal system, made unit after. A sudden turn by an angle t is spread as 
 turn by t / (2 l) a millimetre at most: l grows until they keep to the limit. Where the tool would be in something with
 its smoothed axis, a fan of axes round it is asked, and through all stations the chain is taken that has the fewest
 blocked places and then the least of the same sum (dynamic programming). The fan is coarse, so that chain is drawn
-towards the least of the sum station by station, each time only as far as the tool stays free.
+towards the least of the sum station by station, each time only as far as the tool stays free. Where axes still turn
+too fast that is done again with a longer l; what blocks fewest stations is taken, then what turns slowest.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ SPACING = 0.5  # mm between stations, at most
 FAN = np.radians(4.0)  # between neighbouring axes of a fan
 BESIDE = 0.5  # weight of the axes of the pass before
 BLOCKED = 1e3  # cost of a blocked station: more than any turn
+STIFFER = 4  # trials, l twice as long each time, where axes turn too fast round what is in the way
 WIDER = 1.5  # by which l grows, where axes turn too fast
 SWEEPS = 120  # of drawing a chain towards the least of the sum
 SETTLED = 1e-3  # rad, below which a sweep changes nothing
@@ -98,7 +100,7 @@ class Steered:
 
 
 def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: Limits,
-            before: Steered | None = None) -> Steered:
+            before: Steered | None = None, off: float = 0.0) -> Steered:
     """The axes of a pass.
 
     profile : Profile of the pass
@@ -107,6 +109,7 @@ def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, li
     blocked : whether the tool enters something, or the machine cannot take the axis
     limits  : Limits
     before  : axes of the pass beside it, which these stay near to
+    off     : mm, that the tool may stand off along the normal (``toolpath.posed.posed``)
 
     Raises
     ------
@@ -120,7 +123,7 @@ def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, li
 
     def met(rows: NDArray[np.int64], axes: F64) -> NDArray[np.bool_]:
         side = sides(profile, way[rows], axes) if tool.radius > tool.corner_radius else None
-        return blocked(tips(contact[rows], normal[rows], tool, axes, side), axes)
+        return blocked(tips(contact[rows], normal[rows], tool, axes, side) + off * normal[rows], axes)
 
     beside = None if before is None else before(contact, normal, normal)
     goal, weight = _goal(axis, beside)
@@ -133,9 +136,13 @@ def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, li
     bad = met(rows, out)
     if bad.any():
         out, bad = _round(out, axis, goal, weight, bad, met, limits, step, spread)
-    turn = angles_between(out)
-    both = ~(bad[1:] | bad[:-1])
-    return Steered(contact, out, ~bad, float(turn[both].max() / step) if both.any() else 0.0)
+    return Steered(contact, out, ~bad, _fastest(out, bad) / step)
+
+
+def _fastest(axis: F64, bad: NDArray[np.bool_]) -> float:
+    """The most, rad, that axes turn between neighbouring stations neither of which is blocked."""
+    turn = angles_between(axis)[~(bad[1:] | bad[:-1])]
+    return float(turn.max()) if len(turn) else 0.0
 
 
 def fan(axis: F64, half: float) -> F64:
@@ -184,15 +191,25 @@ def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.b
     hit = ~inside
     hit[inside] = met(np.broadcast_to(rows[:, None], inside.shape)[inside], tries[inside])
     cost = weight * step * ((tries - goal[rows, None]) ** 2).sum(axis=2) + BLOCKED * hit
-    stiff = spread**2 / step
-    out, blocked = smooth.copy(), bad.copy()
-    for i, j in true_runs(near):
-        at = slice(int(np.searchsorted(rows, i)), int(np.searchsorted(rows, j)))
-        ends = smooth[i - 1] if i else None, smooth[j] if j < len(smooth) else None
-        taken = _chain(tries[at], cost[at], stiff, ends)
-        out[i:j] = tries[at][np.arange(j - i), taken]
-        blocked[i:j] = hit[at][np.arange(j - i), taken]
-    return _drawn(out, blocked, rows, wanted, goal, weight * step, met, float(np.cos(limits.cone)), stiff)
+    best: tuple[tuple[int, float], F64, NDArray[np.bool_]] | None = None
+    for _ in range(STIFFER):
+        stiff = spread**2 / step
+        out, blocked = smooth.copy(), bad.copy()
+        for i, j in true_runs(near):
+            at = slice(int(np.searchsorted(rows, i)), int(np.searchsorted(rows, j)))
+            ends = smooth[i - 1] if i else None, smooth[j] if j < len(smooth) else None
+            taken = _chain(tries[at], cost[at], stiff, ends)
+            out[i:j] = tries[at][np.arange(j - i), taken]
+            blocked[i:j] = hit[at][np.arange(j - i), taken]
+        out, blocked = _drawn(out, blocked, rows, wanted, goal, weight * step, met, float(np.cos(limits.cone)), stiff)
+        told = int(blocked.sum()), max(_fastest(out, blocked), limits.per_mm * step)
+        if best is None or told < best[0]:
+            best = told, out, blocked
+        if told[1] <= limits.per_mm * step:
+            break
+        spread *= 2.0
+    assert best is not None
+    return best[1], best[2]
 
 
 def _chain(tries: F64, cost: F64, stiff: float, ends: tuple[F64 | None, F64 | None]) -> NDArray[np.int64]:

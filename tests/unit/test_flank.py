@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import toolpath.flank as flank
 from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
 from toolpath.flank import Wall, Wanted, bands, thinned_poses
@@ -203,3 +204,13 @@ def test_poses_left_out_are_on_the_way_between_those_kept(seed):
     for ends in (tips, tips + 20.0 * axes):
         there = np.column_stack([np.interp(np.arange(400), rows, ends[rows, c]) for c in range(3)])
         assert np.linalg.norm(there - ends, axis=1).max() <= 0.01 + 1e-12
+
+
+def test_the_steps_of_the_search_are_smoothed_out_and_straight_changes_are_left_alone():
+    x = np.linspace(0.0, 1.0, 65)
+    np.testing.assert_allclose(flank._evened(0.1 - 0.3 * x), 0.1 - 0.3 * x, atol=1e-12)
+    true = 0.02 * np.sin(2.0 * np.pi * x)
+    stairs = 0.004 * np.round(true / 0.004)
+    even = flank._evened(stairs)
+    assert np.abs(even - true).max() < 0.5 * np.abs(stairs - true).max()
+    assert np.abs(np.diff(even, 2)).max() < 0.1 * np.abs(np.diff(stairs, 2)).max()
