@@ -20,8 +20,8 @@ class Machine(WireModel):
         "kind": "3-axis", "dialects": ["linuxcnc"], "max_rpm": 18000, "rapid_mm_min": 10000}]}}
 
     kind: Annotated[Literal["3-axis", "5-axis"], Field(
-        description="A 5-axis machine is planned for with fixed tool axes (3+2), all in one program; passes whose "
-                    "axis moves can be verified, not planned yet.")] = "3-axis"
+        description="A 5-axis machine is planned for with fixed tool axes (3+2), all in one program, and walls may be "
+                    "finished by the flank of a tool whose axis moves.")] = "3-axis"
     kinematics: Annotated[Literal["table-table-AC", "table-table-BC", "head-table-BC", "head-head-BC",
                                   "head-head-AC"] | None, Field(
         description="Rotary axes of a 5-axis machine, the tilting one first, by what carries them; needed there, null "
@@ -46,6 +46,9 @@ class Machine(WireModel):
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine turns to further tool axes for what the accesses of the setup leave. "
                     "given: to those accesses alone. No effect on a 3-axis machine.")] = "find"
+    simultaneous: Annotated[bool, Field(
+        description="The rotary axes move while the tool cuts. false: plans turn them between cuts only (3+2). No "
+                    "effect on a 3-axis machine, nor on a program that is verified.")] = True
     rotary_rate_deg_min: Annotated[Number | None, Field(
         ge=1, le=1e7, description="Fastest a rotary axis turns in a feed move, deg/min; null: not limited, and on a "
                                   "3-axis machine.")] = None

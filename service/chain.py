@@ -100,7 +100,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     sides: list[Side] = []
     for k, view in enumerate(ready.views):
         share = _Share(progress, k, len(ready.views))
-        sides.append(_side(ready, view, checks, trimmed, sum(len(s.made.steps) for s in sides), share))
+        sides.append(_side(ready, view, checks, trimmed, sides, share))
     made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
     zone, given_up = scored.without(made, ready.zones)
     first, look = ready.views[0], proof_frame(ready)
@@ -146,18 +146,25 @@ class _Share:
         self.progress(stage, self.low + self.width * share)
 
 
-def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]], steps: int,
-          share: _Share) -> Side:
-    """Plan and write the zones of one access, from the whole blank; the proof has what the accesses before leave."""
+def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
+          before: Sequence[Side], share: _Share) -> Side:
+    """Plan the zones of one access.
+
+    On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
+    the whole blank, for who knows in which order programs are run. Heights are those of the whole blank in any case.
+    """
+    turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
     stock = planning_stock(ready, view)
     settings = plan_settings(ready, view, stock)
+    if turned:
+        stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before])
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
                     lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1, trimmed=trimmed)
-    if ready.setup.machine.kind == "5-axis":
+    if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
-    return Side(view, made, settings.clearance)
+    return Side(view, made, settings.clearance, stock)
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, Any]:

@@ -103,17 +103,17 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
                         table_height(setup, ready.part) + setup.clearance_mm.rapid)
     clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
-    words = ("fixed tool axes, one after the other, each from the whole blank",)
+    words = ("fixed tool axes, one after the other, each from what those before leave",)
     steps = tuple(t for s in sides for t in s.made.steps)
     work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
     return replace(work, clamping=clamping)
 
 
 def turning_of(ready: Prepared, view: View) -> Turning | None:
-    """What the rotary axes can do in the frame of a view; None on a machine without."""
+    """What the rotary axes can do in the frame of a view; None on a machine without, or where they only index."""
     setup, turn = ready.setup, view.rotation
     machine = rotary_machine(setup.machine)
-    if machine is None:
+    if machine is None or not setup.machine.simultaneous:
         return None
     longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
 

@@ -12,17 +12,19 @@ from geometry.sampling import SurfaceSamples
 from output.model import Workplan
 from toolpath.motion import Workingstep
 from toolpath.plan import Plan
+from toolpath.stock import StockMap
 from verify.model import NcProgram, Proof
 from zones.view import View, turned_samples
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """What was planned along one access, in its frame; ``clearance`` is its clearance plane there, mm."""
+    """What was planned along one access, in its frame: its clearance plane there, mm, and the stock as it leaves it."""
 
     view: View
     made: Plan
     clearance: float
+    stock: StockMap
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, stamp, standing
+from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, standing
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
@@ -99,6 +99,29 @@ class StockMap:
         """Take over what a copy of this has come to."""
         self.top, self.cover, self._pooled = other.top, other.cover, other._pooled
 
+    def left_by(self, others: Sequence[tuple[StockMap, F64]]) -> None:
+        """Lower the stock to what other maps of it, seen along other axes, have left.
+
+        others : StockMaps, each with the rotation (3, 3) from the frame of this one into its own
+
+        A place is gone where it lies above one of the others. ``cover`` stays a bound: another's cover counts as far
+        round a place as a cell reaches, and the way to the next place asked. ``top`` is lowered by theirs, node by
+        node, so a wall they have finished shows no more than half a cell of stock. What stands in a hollow under
+        what is left counts as stock as before.
+        """
+        if not others:
+            return
+        lat, turns = self.lattice, np.array([turn for _, turn in others], dtype=np.float64)
+        frames = np.array([[m.lattice.x0, m.lattice.y0, m.lattice.step] for m, _ in others])
+        floor = float(self.part[np.isfinite(self.part)].min(initial=self.highest)) - lat.step
+        reach = HALF_DIAGONAL * lat.step
+        # a place as far as that from another falls on a node of theirs no farther than so many and one
+        wide = [ndimage.maximum_filter(m.cover, 2 * int((reach + lat.step) / m.lattice.step) + 3) for m, _ in others]
+        for heights, theirs, rise in ((self.cover, wide, reach), (self.top, [m.top for m, _ in others], 0.0)):
+            sink(heights.copy(), lat.x0, lat.y0, lat.step, floor, turns, _stacked(theirs), frames, rise, heights)
+        np.minimum(self.top, self.cover, out=self.top)
+        self._pooled = _pooled(self.top)
+
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
         lat = self.lattice
@@ -177,6 +200,15 @@ class StockMap:
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:
     """(ny, nx) float64, mm: highest of the part in the disc round each cell."""
     return drop_grid(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)
+
+
+def _stacked(heights: Sequence[F64]) -> F64:
+    """Maps one over the other, (k, ny, nx), with nothing where one has no node."""
+    ny, nx = np.max([h.shape for h in heights], axis=0)
+    out = np.full((len(heights), ny, nx), -np.inf)
+    for k, h in enumerate(heights):
+        out[k, :h.shape[0], :h.shape[1]] = h
+    return out
 
 
 def _pooled(top: F64) -> F64:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import pytest
 from geometry.mesh import F64
 from service import chain
 from service.convert import parse_setup
+from service.prepare import prepare
+from service.programs import turning_of
 from verify.kinematics import Kinematics
 from verify.reader import read_program
 
@@ -81,3 +84,11 @@ def cutting_axes(out: Path) -> tuple[F64, F64]:
     p = read_program((out / "program.linuxcnc.ngc").read_text(), kinematics=Kinematics("table-table-AC", None))
     cuts = ~np.isnan(p.feed)
     return p.poses.end_axis[cuts], p.end[cuts]
+
+
+def test_a_machine_that_only_indexes_is_given_no_pass_whose_axis_moves(part: Path) -> None:
+    setup = parse_setup(json.dumps(SETUP | {"machine": {**MACHINE, "simultaneous": False}}))
+    ready = prepare(part, setup, quiet)
+    assert turning_of(ready, ready.views[0]) is None
+    moving = replace(ready, setup=parse_setup(json.dumps(SETUP)))
+    assert turning_of(moving, ready.views[0]) is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -158,3 +159,62 @@ def test_a_block_that_stands_askew_is_as_high_as_its_corners_and_edges(direction
                 at = np.array([lat.x0 + lat.step * ix, lat.y0 + lat.step * iy, stock.top[iy, ix]]) @ rotation
                 assert ((at >= box[0] - 1e-6) & (at <= box[1] + 1e-6)).all()
     assert checked > 20
+
+
+def leaning_maps(slot):
+    """Stock of a block round PART: seen from above after a slot with a flat, and its frame leaned, not yet told."""
+    lower, upper = np.array([-1.0, -1.0, -2.0]), np.array([13.0, 13.0, 6.0])
+    first = StockMap.box(TriangleTree(PART), lower, upper, STEP)
+    first.cut(slot, tool(3.0, 0.0))
+    turn = access_rotation(np.array([0.35, -0.2, 0.9]) / np.linalg.norm([0.35, -0.2, 0.9]))
+    turned = replace(PART, vertices=PART.vertices @ turn.T)
+    other = StockMap.block(TriangleTree(turned), np.array([lower, upper]), turn, STEP)
+    return first, other, turn
+
+
+SLOT = np.array([[6.5, -3.0, 1.0], [6.5, 15.0, 1.0], [9.0, 15.0, 1.0], [9.0, -3.0, 1.0]])
+
+
+def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_the_truth():
+    first, other, turn = leaning_maps(SLOT)
+    whole = other.copied()
+    other.left_by([(first, turn.T)])
+    assert (other.cover <= whole.cover).all() and (other.top <= other.cover + 1e-12).all()
+
+    def stands(points):  # in the frame of the part: the block without the slot
+        inside = (np.abs(points - [6.0, 6.0, 2.0]) <= [7.0, 7.0, 4.0]).all(axis=1)
+        return inside & ~((points[:, 0] > 5.0) & (points[:, 0] < 10.5) & (points[:, 2] > 1.0))
+
+    rng = np.random.default_rng(5)
+    lat = other.lattice
+    plan = np.array([lat.x0, lat.y0]) + rng.random((200_000, 2)) * STEP * np.array([lat.nx - 1, lat.ny - 1])
+    high = rng.uniform(-6.0, 12.0, len(plan))
+    points = np.column_stack([plan, high])
+    true = stands(points @ turn)
+    cover = other.cover[lat.cells(plan)]
+    assert (cover[true] >= high[true]).all()  # never too low
+    # and where the slot is open to this axis it is not far above: cells of both, a step of the way, over their slopes
+    column = np.arange(-6.0, 12.0, 0.02)
+    iy, ix = (v.ravel() for v in np.mgrid[5:lat.ny - 5:3, 5:lat.nx - 5:3])
+    nodes = np.column_stack([lat.x0 + STEP * ix, lat.y0 + STEP * iy])
+    every = np.concatenate([np.repeat(nodes, len(column), axis=0), np.tile(column, len(nodes))[:, None]], axis=1)
+    there = stands(every @ turn).reshape(len(nodes), -1)
+    height = np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
+    seen = np.isfinite(height) & np.isfinite(other.top[iy, ix])
+    over = (other.top[iy, ix] - height)[seen]
+    assert seen.sum() > 500 and np.quantile(over, 0.9) < 2.0 * STEP
+    assert (whole.top[iy, ix][seen] - height[seen]).max() > 3.0  # the slot was there to be seen
+
+
+def test_nothing_is_lowered_by_a_whole_block_and_everything_by_one_that_is_gone():
+    first, other, turn = leaning_maps(np.array([[50.0, 50.0, 9.0], [51.0, 50.0, 9.0]]))
+    before = other.cover.copy()
+    other.left_by([])
+    np.testing.assert_array_equal(other.cover, before)
+    other.left_by([(first, turn.T)])
+    inner = np.s_[5:-5, 5:-5]
+    stood = np.isfinite(before[inner])
+    np.testing.assert_allclose(other.cover[inner][stood], before[inner][stood], atol=1.0)
+    first.top[:], first.cover[:] = -np.inf, -np.inf
+    other.left_by([(first, turn.T)])
+    assert not np.isfinite(other.cover).any() and other.highest == -np.inf

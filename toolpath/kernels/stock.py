@@ -133,3 +133,52 @@ def meets(top, pooled, side, x0, y0, step, tips, height, radius, out):
                         if top[i, j] > under and (x0 + j * step - x) ** 2 + dy * dy <= radius * radius:
                             out[k] = True
                 pooled[row, col] = highest
+
+
+@njit(cache=True, nogil=True)
+def _gone(x, y, z, turns, tops, frames, rise):
+    """Whether a place lies above one of the maps of ``sink``, or beside it."""
+    for k in range(len(turns)):
+        t = turns[k]
+        px = t[0, 0] * x + t[0, 1] * y + t[0, 2] * z
+        py = t[1, 0] * x + t[1, 1] * y + t[1, 2] * z
+        pz = t[2, 0] * x + t[2, 1] * y + t[2, 2] * z
+        j = int(np.rint((px - frames[k, 0]) / frames[k, 2]))
+        i = int(np.rint((py - frames[k, 1]) / frames[k, 2]))
+        if i < 0 or j < 0 or i >= tops.shape[1] or j >= tops.shape[2] or pz > tops[k, i, j] + rise:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def sink(heights, x0, y0, step, low, turns, tops, frames, rise, out):
+    """Lower heights to where, on the way straight down, stock begins that other maps show too.
+
+    heights : (ny, nx) mm, of the nodes, in this frame
+    low     : mm, where a way that meets nothing ends: nothing stands there then
+    turns   : (k, 3, 3) rotations from this frame into those of the others
+    tops    : (k, ny, nx) mm, heights of the others, -inf where one has no node; frames : (k, 3) x0, y0, step of each
+    rise    : mm, over a height of another map up to which a place counts as stock
+    out     : (ny, nx) mm, a place that is gone, no more than a 16th of a step above one that is not; places are asked a
+              step apart, and stock that lies between two of them is overlooked unless ``tops`` are spread by a step
+    """
+    ny, nx = heights.shape
+    for i in range(ny):
+        for j in range(nx):
+            out[i, j] = heights[i, j]
+            if not np.isfinite(heights[i, j]):
+                continue
+            x, y, z = x0 + j * step, y0 + i * step, heights[i, j]
+            while z > low and _gone(x, y, z, turns, tops, frames, rise):
+                z -= step
+            if z <= low:
+                out[i, j] = -np.inf
+            elif z < heights[i, j]:
+                above, under = z + step, z
+                for _ in range(4):
+                    half = 0.5 * (above + under)
+                    if _gone(x, y, half, turns, tops, frames, rise):
+                        above = half
+                    else:
+                        under = half
+                out[i, j] = above

@@ -92,7 +92,11 @@ def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
         try:
             for iso in face.over_square:
                 wall = Wall(leveller(iso))
-                for piece in _pieces(wall, near, target.spacing, tool, wanted, around, allowance):
+                pieces = _pieces(wall, near, target.spacing, tool, wanted, around, allowance)
+                if isinstance(pieces, str):
+                    refused.append(f"{face.name}: {pieces}")
+                    continue
+                for piece in pieces:
                     made = _run(piece, tool, cut, settings, around)
                     if isinstance(made, str):
                         refused.append(f"{face.name}: {made}")
@@ -150,25 +154,25 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
 
 
 def _pieces(wall: Wall, near: cKDTree, spacing: float, tool: ToolBody, wanted: Wanted, around: Surroundings,
-            allowance: float) -> list[Piece]:
-    """The pieces of a wall's passes, from the highest band down; none where little of it is wanted or it is upright."""
+            allowance: float) -> list[Piece] | str:
+    """The pieces of a wall's passes, from the highest band down, or why there are none, in words."""
     place, _, eta = wall.lattice(ALONG, UP)
     size = max(wall.length / ALONG, wall.height / UP)
     asked = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG) <= spacing + size
     if asked.mean() < LEAST_SERVED * np.ptp(eta):
-        return []
+        return f"{100.0 * asked.mean():.0f} % of it is wanted, too little for a pass along the whole"
     rows = np.repeat(eta, asked.sum(axis=1))
     low, high = (float(np.quantile(rows, q)) for q in (BORDER, 1.0 - BORDER))
     low, high = 0.0 if low < 2.0 / UP else low, 1.0 if high > 1.0 - 2.0 / UP else high
     out: list[Piece] = []
     made = bands(wall, tool, wanted, low, high, allowance)
     if min(float((b.poses(UP)[1] @ UP_Z).min()) for b in made) > math.cos(LEAST_LEAN):
-        return []
+        return "it is upright, and so would the tool be"
     for band in made:
         mine = asked[(eta >= band.low - 1e-9) & (eta <= band.high + 1e-9)].mean(axis=0) > 0.5
         pieces = band.pieces(lambda tip, axis: around.blocked(tip, axis, tool), wanted.chord, mine)
         out += [p.reversed() if _against(p) else p for p in pieces]
-    return out
+    return out or "the tool is nowhere free along it"
 
 
 def _against(piece: Piece) -> bool:
