@@ -14,8 +14,8 @@ half turn: ``_AZIMUTH``. Where the axis stands along Z, C is free: it is put bet
 A head of length L from swivel to tip has its joints at place - L (e_z - h), h the tool in the machine.
 
 Two places of the rotary axes do for every axis, and each again after whole turns. Along a path those are taken that
-turn least in all, without ever jumping from one to the other: a jump in the middle of a pass would sweep the tool
-round while its tip stands in the material.
+turn least in all, without ever jumping from one to the other but at the pole, where both are one: a jump in the middle
+of a pass would sweep the tool round while its tip stands in the material.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 
 POLE = 1e-9  # rad, an axis nearer to Z than this has no azimuth
+THROUGH = 1e-5  # rad, a path that passes Z as near as that goes through it: the tilt may change its sign there
 ROUND = 2.0 * math.pi
 MOST_ROUNDS = 24  # halvings of a block
 STANDS = 1e-6  # rad, from where it is said to stand
-LEAST_AXIS = 1e-7  # rad, an axis that swings less in a block is not cut again
 SHARES = (0.25, 0.5, 0.75)  # of a block, where it is held against the straight way
 _LETTER = {"A": 0, "B": 1}
 _AZIMUTH = {  # azimuth of the axis, rad, where the tilt is positive: first + second * C
@@ -170,7 +170,7 @@ class RotaryMachine:
         out[:, 0] = np.where(axes[:, 2] < 0.0, over, 0.0)
         if len(known):
             first = start if held and known[0] == 0 else None
-            out[known] = self._least_turning(self.turns(axes[known]), start, first)
+            out[known] = self._least_turning(self.turns(axes[known]), _through_pole(axes, known), start, first)
             at, turned = known, out[known, 1]
             if held and known[0] > 0 and start is not None:  # at the pole, where any C will do, it is what it is
                 at, turned = np.concatenate([[0], known]), np.concatenate([start[1:], turned])
@@ -229,23 +229,26 @@ class RotaryMachine:
              gauge: float) -> NDArray[np.bool_]:
         """(n - 1,) bool: blocks on which axis or tip leave their way by more than is allowed."""
         out = np.zeros(len(tips) - 1, np.bool_)
-        swung = np.linalg.norm(np.diff(axes, axis=0), axis=1)
         joints = None if self.tcp else self.joints(tips, turns, gauge)
         for share in SHARES:
             there = (1.0 - share) * turns[:-1] + share * turns[1:]
             got, wanted = self.axes(there), _great(axes[:-1], axes[1:], share)
-            out |= (np.linalg.norm(got - wanted, axis=1) > swing) & (swung > LEAST_AXIS)
+            out |= np.linalg.norm(got - wanted, axis=1) > swing
             if joints is not None:
                 at = self.tips((1.0 - share) * joints[:-1] + share * joints[1:], there, gauge)
                 out |= np.linalg.norm(at - (1.0 - share) * tips[:-1] - share * tips[1:], axis=1) > tolerance
         return out
 
-    def _least_turning(self, both: F64, start: F64 | None, first: F64 | None) -> F64:
+    def _least_turning(self, both: F64, poled: NDArray[np.bool_], start: F64 | None, first: F64 | None) -> F64:
         """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all.
 
+        poled : (n - 1,) bool, where the way to the next goes through the pole; only there the tilt may change its sign,
+                for elsewhere that would take the axis through Z and back
         first : (2,) rad, the place it begins with, or None
         """
         rows = self._choices(both)
+        other = np.repeat([False, True], rows.shape[1] // 2)
+        changed = other[:, None] != other
         least = np.full(rows.shape[:2], math.inf)
         came = np.zeros(rows.shape[:2], np.int64)
         came_from = np.zeros(2) if start is None else start
@@ -264,7 +267,7 @@ class RotaryMachine:
                 there[..., 1] += ROUND * np.rint((rows[k - 1][:, None, 1] - there[..., 1]) / ROUND)
             step = np.abs(there - rows[k - 1][:, None])
             cost = np.where(step[..., 1] <= math.pi + POLE, step.max(axis=2), math.inf) + least[k - 1][:, None]
-            cost[np.isnan(cost)] = math.inf
+            cost[np.isnan(cost) | (changed & ~poled[k - 1])] = math.inf
             came[k], least[k] = np.argmin(cost, axis=0), cost.min(axis=0)
             if wraps:
                 rows[k] = there[came[k], np.arange(rows.shape[1])]
@@ -340,6 +343,19 @@ class RotaryMachine:
         pivots = self._points()
         out = pivots[1] + _applied(_turn_matrix(2, turns[:, 1]), tips - pivots[1])
         return out if self.tilts_head else pivots[0] + _applied(self._tilt(turns), out - pivots[0])
+
+
+def _through_pole(axes: F64, known: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(k - 1,) bool: whether the ways from one of the axes (n, 3) at rows ``known`` (k,) to the next go through Z."""
+    a, b = axes[known[:-1]], axes[known[1:]]
+    cross = np.cross(a, b)
+    size = np.linalg.norm(cross, axis=1)
+    n = cross / np.maximum(size, 1e-300)[:, None]
+    foot = np.array([0.0, 0.0, 1.0]) - n[:, 2:] * n  # of Z on the great circle
+    within = ((np.cross(a, foot) * n).sum(axis=1) >= 0.0) & ((np.cross(foot, b) * n).sum(axis=1) >= 0.0)
+    near = np.hypot(axes[known, 0], axes[known, 1]) <= THROUGH
+    out = (np.diff(known) > 1) | near[:-1] | near[1:] | ((size > POLE) & within & (np.abs(n[:, 2]) <= THROUGH))
+    return np.asarray(out)
 
 
 def _turn_matrix(axis: int, angle: F64) -> F64:

@@ -132,3 +132,24 @@ def test_a_path_begins_where_the_axes_stand_even_where_the_other_place_would_tur
     pole = unit(np.stack([np.linspace(0.0, 0.4, 41), np.zeros(41), np.ones(41)], axis=1))
     turns = here.follow(pole, np.radians([0.0, 33.0]), held=True)
     assert np.allclose(turns[0], np.radians([0.0, 33.0])) and np.allclose(here.axes(turns), pole)
+
+
+@pytest.mark.parametrize("aside", [0.0, 1e-6, 0.03])
+@pytest.mark.parametrize("count", [9, 40])
+@pytest.mark.parametrize(("kind", "tilts"), [("table-table-AC", [-30.0, 110.0]), ("table-table-AC", [-110.0, 30.0]),
+                                             ("head-head-BC", [-30.0, 110.0]), ("head-table-BC", [-20.0, 100.0])])
+def test_the_place_of_the_axes_changes_only_at_the_pole(kind, tilts, count, aside):
+    """A fan through Z, farther to one side than the tilt may go to it: C has to swing round at the pole, not before."""
+    lean = np.radians(np.linspace(37.0, -37.0, count))
+    fan = np.column_stack([np.full(count, aside), np.sin(lean), np.cos(lean)])
+    axes = unit(fan[:, [1, 0, 2]] if "BC" in kind else fan)
+    tips = np.column_stack([np.zeros(count), np.linspace(0.0, 20.0, count), np.zeros(count)])
+    here = machine(kind, [tilts, [-360.0, 360.0]])
+    path, turns = here.course(tips, axes, 0.002, 1e-4, 100.0)
+    assert np.degrees(turns[:, 0]).min() >= tilts[0] - 1e-9 and np.degrees(turns[:, 0]).max() <= tilts[1] + 1e-9
+    ends = np.array([np.interp(path[:, 1], tips[:, 1], column) for column in axes.T]).T
+    for share in np.linspace(0.0, 1.0, 11):
+        got = here.axes((1 - share) * turns[:-1] + share * turns[1:])
+        at = (1 - share) * path[:-1, 1] + share * path[1:, 1]
+        wanted = unit(np.array([np.interp(at, path[:, 1], column) for column in unit(ends).T]).T)
+        assert np.linalg.norm(got - wanted, axis=1).max() < 5e-3  # 25 degrees where they changed in between
