@@ -19,11 +19,12 @@ from service.convert import rotary_machine, tool_bodies
 from service.prepare import TABLE_SPARE, Prepared, stock_box, table_height, turned_box
 from service.sides import Look, Program, Side
 from service.version import VERSION
-from toolpath.motion import Workingstep
+from toolpath.motion import RAPID_MM_MIN, Workingstep
 from toolpath.settings import Turning
 from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
+RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
 
 
@@ -117,15 +118,24 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
         return None
     longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
 
-    def follows(tips: F64, axes: F64) -> bool:
+    rate, fastest = setup.machine.rotary_rate_deg_min, setup.machine.rapid_mm_min or RAPID_MM_MIN
+
+    def along(tips: F64, axes: F64) -> tuple[F64, F64, F64] | None:
         try:
-            machine.course(tips @ turn, axes @ turn, tolerance, SWING, longest)
+            way, turns = machine.course(tips @ turn, axes @ turn, tolerance, SWING, longest)
         except OutputError:
-            return False
-        return True
+            return None
+        least = np.zeros(len(way) - 1)
+        if rate is not None:
+            least = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
+        if machine.pivots is not None:
+            for gauge in {*gauge_lengths(setup).values()}:
+                gone = np.abs(np.diff(machine.joints(way, turns, gauge), axis=0)).max(axis=1)
+                least = np.maximum(least, gone / fastest)
+        return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
 
     table = table_height(setup, ready.part) + setup.clearance_mm.rapid + TABLE_SPARE
-    return Turning(lambda axes: machine.stands(axes @ turn), follows, turn[:, 2], table)
+    return Turning(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:

@@ -143,7 +143,7 @@ class Finish:
         if turning is None or self.zone.form is not Form.STEEP or not (self.faces and len(self.checks.points)):
             return (), ()
         met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
-        around = flank.Surroundings(met, turning, self.stock, field.discs)
+        around = flank.Surroundings(met, turning, self.stock.copied(), field.discs, field.clear)
         walls = [wall for face in self.faces for wall in face.alone or (face,)]
         found = flank.flanked(walls, self.checks, field.tool, self.cut, settings, around, field.allowance)
         return found.runs, tuple({"strategy": flank.NAME, "reason": reason} for reason in found.refused)
@@ -160,6 +160,7 @@ class Finish:
             for t in run:
                 if t.motion is Motion.CUT and t.axes is not None:
                     self.residual.cut_leaning(t.points, t.axes, self.field.tool)
+                    self.stock.cut_leaning(t.points, t.axes, self.field.tool)
         rest = self._rounds(f"S{number + len(runs):02d}", wanted)
         self.step, self.passes, self.begun_with = step_id, self.passes + len(runs), name
         return [*steps, *rest]

@@ -45,14 +45,18 @@ SIDEWAYS = np.arange(-8, 9)  # trials at each station, a step apart
 FIRST_REACH = 1.0  # of the height of a band: so far to the side its top is looked for
 FINER, TIMES = 4.0, 3  # from one search to the next, and how many
 EVENED = 16.0  # how much of the trials' steps is smoothed out of s: waves of 5 stations to 3 %, of 20 to 87 %
-TURNING, LEANING = 0.02, 0.002  # of what may be left: the price of 1 mm of s, from station to station, and at all
+# of what may be left: the price of 1 mm that the top of a band is moved by turning from station to station, and by
+# leaning off the steepest way
+TURNING, LEANING = 0.02, 0.002
 LOOKED, ROWS = 193, 25  # places at which what is swept is measured, along and up
 CORRECTIONS = 5
 AIMED = 0.5  # of the depth allowed: what a correction leaves
 FAR_OFF = 8.0  # times what may be left: deeper than that no standing off will mend
 MOST_BANDS = 4
 LEFT_SHARE = 0.95  # of a band must keep to what may be left
-DENSE = 0.25  # of the radius, at most, between poses before they are thinned out
+ENDS = 1e-3  # of the length: what the way on beyond an end is taken from
+DENSE, MOST_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
+FINER_POSES = 4  # trials, each with more poses
 RAISES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the radius, along the axis, where the end of the tool is in the way
 RISE = 0.3  # mm a mm: how fast a pass is raised and lowered again
 LEAST_PIECE = 1.0  # of the radius: what is shorter is left to others
@@ -73,15 +77,22 @@ class Piece:
 
     tips : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
     away : (k, 3) float64, unit, out of the wall
+    reach : mm from the tip, how far up the flank is at work
     """
 
     tips: F64
     axes: F64
     away: F64
+    reach: float
 
     def reversed(self) -> Piece:
         """The same, walked the other way."""
-        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1])
+        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1], self.reach)
+
+    @property
+    def top(self) -> float:
+        """mm, the highest place of the flank at work."""
+        return float((self.tips[:, 2] + self.reach * self.axes[:, 2]).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +111,20 @@ class Wall:
         return bool(ends[1, 2] >= ends[0, 2])
 
     def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Places (n, 3) mm and unit normals (n, 3) at xi and eta, both (n,)."""
-        return self.iso.contact(xi, eta if self._upwards else 1.0 - eta)
+        """Places (n, 3) mm and unit normals (n, 3) at xi and eta, both (n,).
+
+        Beyond its ends (xi < 0 or > 1) a wall goes on straight, with the normal of its end.
+        """
+        eta = eta if self._upwards else 1.0 - eta
+        inside = np.clip(xi, 0.0, 1.0)
+        place, normal = self.iso.contact(inside, eta)
+        out = np.flatnonzero(xi != inside)
+        if len(out):
+            back = np.where(xi[out] < 0.0, ENDS, -ENDS)
+            along = (self.iso.contact(inside[out] + back, eta[out])[0] - place[out]) / back[:, None]
+            place = place.copy()
+            place[out] += (xi - inside)[out, None] * along
+        return place, normal
 
     @cached_property
     def length(self) -> float:
@@ -190,8 +213,14 @@ class Band:
         chord   : mm, what leaving out poses may move tip and upper end of the flank by
         served  : (m,) where along the wall the pass is wanted, evenly from end to end; None: everywhere
         """
-        spacing = min(DENSE * self.tool.radius, 0.5)
-        tip, axis = self.poses(int(np.ceil(max(self.wall.length / spacing, 2.0))) + 1)
+        spacing, high = min(DENSE * self.tool.radius, MOST_DENSE), self.tool.flute_length
+        count = int(np.ceil(max(self.wall.length / spacing, 2.0))) + 1
+        for _ in range(FINER_POSES):
+            tip, axis = self.poses(count)
+            gone_by = max(float(np.linalg.norm(np.diff(tip + h * axis, axis=0), axis=1).max()) for h in (0.0, high))
+            if gone_by <= spacing:
+                break
+            count = int(np.ceil(count * min(gone_by / spacing * 1.05, 4.0)))
         xi = np.linspace(0.0, 1.0, len(tip))
         away = self.wall.contact(xi, np.full(len(xi), 0.5 * (self.low + self.high)))[1]
         height = (self.high - self.low) * self.wall.height
@@ -204,7 +233,7 @@ class Band:
         for i, j in true_runs(~met):
             if gone[j - 1] - gone[i] >= LEAST_PIECE * self.tool.radius:
                 rows = i + thinned_poses(tip[i:j], axis[i:j], height + self.tool.corner_radius, chord)
-                out.append(Piece(tip[rows], axis[rows], away[rows]))
+                out.append(Piece(tip[rows], axis[rows], away[rows], height + self.tool.corner_radius))
         return out
 
 
@@ -221,6 +250,10 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
         Code 'bad_pass': not even ``MOST_BANDS`` do, or the flutes are too short for the bands.
     """
     room = tool.flute_length - tool.corner_radius
+    if room <= 0.0 or wall.length <= 0.0:
+        raise GeometryError(f"{tool.id}: it has no flank, its flutes end where its corner does" if room <= 0.0 else
+                            "a wall without length", code="bad_pass", subjects=(tool.id,), measured=room, limit=0.0,
+                            remedy="machine it in levels")
     least = int(np.ceil((high - low) * wall.height / room))
     told, xi = np.inf, np.linspace(0.0, 1.0, STATIONS)
     for count in range(max(least, 1), MOST_BANDS + 1):
@@ -244,7 +277,7 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
 def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], stands: F64 | float) -> tuple[F64, F64]:
     """Where the tool's axis passes a band's lower and upper border, (n, 3) mm each; stands : mm off the wall."""
     ends = []
-    for at, eta in zip((xi, np.clip(xi + shift, 0.0, 1.0)), borders, strict=True):
+    for at, eta in zip((xi, xi + shift), borders, strict=True):
         place, normal = wall.contact(at, np.full(len(at), eta))
         ends.append(place + np.reshape(stands, (-1, 1)) * normal)
     return ends[0], ends[1]
@@ -295,24 +328,38 @@ def _fitted(band: Band, wanted: Wanted) -> Band:
 
 
 def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
-    """(n,) what is added to xi at the upper border, so that the axis misses the wall least."""
+    """(n,) what is added to xi at the upper border, so that the axis misses the wall least.
+
+    Where many miss as little, as on a plane, the steepest is taken.
+    """
     height = (borders[1] - borders[0]) * wall.height
     step = FIRST_REACH * height / wall.length / len(SIDEWAYS[SIDEWAYS > 0])
     shift = np.zeros(len(xi))
+    beyond = FIRST_REACH * height / wall.length
+    steepest = _steepest(wall, xi, borders)
     for _ in range(TIMES):
-        trials = np.clip(shift + step * SIDEWAYS[:, None], -xi, 1.0 - xi)
-        miss = np.array([_missed(wall, xi, s, borders, radius) for s in trials])
-        cost = miss / left + LEANING * wall.length * np.abs(trials)
+        trials = np.clip(shift + step * SIDEWAYS[:, None], -xi - beyond, 1.0 - xi + beyond)
+        found = [_missed(wall, xi, s, borders, radius) for s in trials]
+        miss, axis = np.array([m for m, _ in found]), np.array([a for _, a in found])
+        cost = miss / left + LEANING * height * np.linalg.norm(axis - steepest, axis=2)
         best, back = cost[:, 0], np.zeros((len(xi), len(SIDEWAYS)), np.int64)
         for k in range(1, len(xi)):
-            through = best[None, :] + TURNING * wall.length * np.abs(trials[:, k, None] - trials[None, :, k - 1])
+            turned = np.linalg.norm(axis[:, k, None] - axis[None, :, k - 1], axis=2)
+            through = best[None, :] + TURNING * height * turned
             back[k] = through.argmin(axis=1)
             best = cost[:, k] + through.min(axis=1)
         rows = [int(best.argmin())]
         for k in range(len(xi) - 1, 0, -1):
             rows.append(int(back[k, rows[-1]]))
         shift, step = trials[rows[::-1], np.arange(len(xi))], step / FINER
-    return np.clip(_evened(shift), -xi, 1.0 - xi)
+    return np.clip(_evened(shift), -xi - beyond, 1.0 - xi + beyond)
+
+
+def _steepest(wall: Wall, xi: F64, borders: tuple[float, float]) -> F64:
+    """(n, 3) unit: the steepest way up the wall, half way between the borders."""
+    normal = wall.contact(xi, np.full(len(xi), 0.5 * (borders[0] + borders[1])))[1]
+    up = np.array([0.0, 0.0, 1.0]) - normal[:, 2:] * normal
+    return np.asarray(up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12))
 
 
 def _evened(shift: F64) -> F64:
@@ -330,11 +377,14 @@ def _evened(shift: F64) -> F64:
     return np.asarray(solveh_banded(bands_of, shift))
 
 
-def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> F64:
-    """(n,) mm: between how far the axis stands off the wall at the nearest and at the farthest of its places."""
+def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> tuple[F64, F64]:
+    """(n,) mm: between how far the axis stands off the wall at the nearest and at the farthest of its places; and the
+    axis, (n, 3), unit."""
     begin, end = axis_ends(wall, xi, shift, borders, radius)
-    places = begin[:, None] + HEIGHTS[:, None] * (end - begin)[:, None]
-    return np.asarray(np.ptp(wall.off(places.reshape(-1, 3)).reshape(len(xi), -1), axis=1))
+    axis = end - begin
+    places = begin[:, None] + HEIGHTS[:, None] * axis[:, None]
+    miss = np.ptp(wall.off(places.reshape(-1, 3)).reshape(len(xi), -1), axis=1)
+    return np.asarray(miss), np.asarray(axis / np.linalg.norm(axis, axis=1, keepdims=True))
 
 
 def _raised(tip: F64, axis: F64, blocked: Blocked, radius: float, most: float) -> tuple[F64, NDArray[np.bool_]]:

@@ -28,13 +28,14 @@ class Turning:
     """What rotary axes can do, in the frame of an access.
 
     stands  : for which tool axes (n, 3), unit, they have a place, (n,) bool
-    follows : whether they get along a path of tips (n, 3), mm, and axes (n, 3)
+    along   : a path of tips (n, 3), mm, and axes (n, 3), unit, as they follow it, and the least minutes each of its
+              blocks takes them, (m, 3), (m, 3) and (m - 1,); None where they do not get along it
     up      : (3,) float64, unit, away from the table
     table   : mm along ``up``, below which nothing of a leaning tool may come
     """
 
     stands: Callable[[F64], NDArray[np.bool_]]
-    follows: Callable[[F64, F64], bool]
+    along: Callable[[F64, F64], tuple[F64, F64, F64] | None]
     up: F64
     table: float
 

@@ -17,7 +17,7 @@ from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, standing
+from toolpath.kernels.stock import HALF_DIAGONAL, loaded, meets, overlaps, sink, stamp, stamp_leaning, standing
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
@@ -127,6 +127,32 @@ class StockMap:
         lat = self.lattice
         stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
               tool.corner_radius)
+
+    def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
+        """Take away what the flank of a leaning tool has cut at poses, tips (n, 3) mm and axes (n, 3) unit.
+
+        Only at the poses: between them, and with its nose, it takes more. So neither map falls too low.
+        """
+        low, high = tool.corner_radius, tool.flute_length
+        sides = 0.5 * (high - low) * np.abs(axes[:, :2]) + tool.radius * np.sqrt(1.0 - np.minimum(axes[:, :2]**2, 1.0))
+        lat = self.lattice
+        for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
+            stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), np.ascontiguousarray(axes),
+                          sides, tool.radius, low, high, shrink)
+
+    def stands_in(self, tips: F64, axes: F64, flank: F64, bodies: F64) -> NDArray[np.bool_]:
+        """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.
+
+        flank  : (m, 3) float64, mm, places in its cutting part, z along the axis: in stock where that is higher at the
+                 nearest node, the part counted
+        bodies : (l, 3) float64, mm, places on neck, shank and holder: in stock where it is also higher than the part
+        """
+        out, lat = np.zeros(len(tips), np.bool_), self.lattice
+        first = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        loaded(self.top, self.part, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
+               np.ascontiguousarray(axes), first, np.cross(axes, first), flank, bodies, out)
+        return out
 
     def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
         """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.

@@ -59,19 +59,18 @@ def test_leaning_walls_are_cut_by_the_flank_and_proved(job: tuple[Path, dict[str
     for zone in flanked:  # walked with all that follows, and held against levels alone
         (levels,) = [r for r in zone["rejected"] if r["strategy"] == "zlevel"]
         assert "takes longer" in levels["reason"] and levels["value"] > levels["limit"]
-    axes, _ = cutting_axes(out)
-    assert len(np.unique(axes.round(5), axis=0)) > 4
 
 
 def test_the_flank_lies_on_the_walls(job: tuple[Path, dict[str, Any]]) -> None:
-    """Axes of cutting moves lie in the walls: 9 and 15 degrees off Z for the long sides, and to both sides."""
-    axes, _ = cutting_axes(job[0])
+    """Beside each long side the axis lies in it, 9 to 11 and 15 degrees off Z; the first twists, so there it turns."""
+    axes, tips = cutting_axes(job[0])
     leans = np.degrees(np.arctan2(axes[:, 1], axes[:, 2]))
-    foot, head = np.array([-2.5, 2.5]), np.array([[-1.4, -1.1], [0.6, 0.6]])
-    for y, tops in zip(foot, head, strict=True):
+    for y, tops in ((-2.5, np.array([-1.4, -1.1])), (2.5, np.array([0.6, 0.6]))):
         wanted = np.degrees(np.arctan2(tops - y, 7.0))
+        beside = (tips[:, 1] * np.sign(y) > 2.5) & (np.abs(tips[:, 0]) < 7.0) & (np.abs(leans) > 1.0)
         near = (leans > wanted.min() - 0.1) & (leans < wanted.max() + 0.1)
-        assert near.any(), (y, wanted, np.unique(leans.round(2)))
+        assert (beside & near).sum() >= 2, (y, wanted, np.unique(leans[beside].round(2)))
+        assert not np.ptp(wanted) or np.ptp(leans[beside & near]) > 0.8 * np.ptp(wanted)
 
 
 def test_both_forms_of_stepnc_say_how_the_tool_leans(job: tuple[Path, dict[str, Any]]) -> None:

@@ -1,5 +1,7 @@
 """Flank passes along walls: what they lie on, what they leave, how deep they are, and where they are not taken."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,7 +98,7 @@ def test_on_a_cone_axes_go_through_its_apex(hollow):
 @pytest.mark.parametrize("radius", [3.0, 5.0])
 def test_what_a_twisted_wall_leaves_falls_with_the_square_of_the_height(radius):
     """Half as high turns half as much along a ruling: a quarter of the miss."""
-    wanted = Wanted(10.0, 10.0, 0.002)
+    wanted = Wanted(0.1, 10.0, 0.002)  # where anything may be left, the steepest way is as good as a ruling
     wall, body = Wall(twisted(0.5)), ball(2.0 * radius)
     whole, half = (bands(wall, body, wanted, 0.5 - 0.5 * h, 0.5 + 0.5 * h)[0] for h in (1.0, 0.5))
     misses = [sum(left_and_deep(wall, band)) for band in (whole, half)]
@@ -157,8 +159,8 @@ def test_it_does_not_matter_how_the_wall_stands():
     plain, turned = cone(), cone()
     turned.turn = q if q[2, 2] > 0 else q @ np.diag([1.0, -1.0, -1.0])
     a, b = (bands(Wall(w), ball(6.0), ASKED)[0] for w in (plain, turned))
-    if Wall(turned)._upwards:
-        assert np.abs(b.poses(20)[0] - a.poses(20)[0] @ turned.turn.T).max() < 1e-3
+    assert Wall(turned)._upwards
+    assert np.abs(b.poses(20)[0] - a.poses(20)[0] @ turned.turn.T).max() < 1e-3
 
 
 def test_a_pass_is_raised_over_what_its_end_would_meet_and_ends_where_that_is_too_much():
@@ -214,3 +216,25 @@ def test_the_steps_of_the_search_are_smoothed_out_and_straight_changes_are_left_
     even = flank._evened(stairs)
     assert np.abs(even - true).max() < 0.5 * np.abs(stairs - true).max()
     assert np.abs(np.diff(even, 2)).max() < 0.1 * np.abs(np.diff(stairs, 2)).max()
+
+
+def test_on_a_plane_with_oblique_ends_the_axis_stays_the_steepest():
+    """Its own parameters fan to both sides; every ruling of a plane is as good."""
+    wall = Wall(Ruled(straight(0.0, 0.0, 0.0), shorter(0.8, 0.1 * HEIGHT)))
+    (band,) = bands(wall, ball(6.0), ASKED)
+    axis = band.poses(200)[1]
+    assert np.degrees(np.arccos(np.clip(axis @ axis[100], -1.0, 1.0))).max() < 1.0  # 27 where it goes along the ends
+    assert np.degrees(np.abs(axis[:, 0])).max() < 1.0
+    assert max(left_and_deep(wall, band)) < 1e-3
+
+
+def shorter(share, y):
+    """A line above the middle ``share`` of those of ``straight``, ``y`` aside."""
+    ends = straight(y, y, HEIGHT)(np.array([0.5 - 0.5 * share, 0.5 + 0.5 * share]))
+    return lambda xi: ends[0] + np.asarray(xi)[:, None] * (ends[1] - ends[0])
+
+
+def test_a_tool_whose_flutes_end_where_its_corner_does_has_no_flank():
+    with pytest.raises(GeometryError) as refused:
+        bands(Wall(leaned(0.1)), replace(ball(6.0), flute_length=3.0), ASKED)
+    assert refused.value.code == "bad_pass" and "no flank" in refused.value.message

@@ -201,7 +201,7 @@ def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_th
     there = stands(every @ turn).reshape(len(nodes), -1)
     height = np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
     seen = np.isfinite(height) & np.isfinite(other.top[iy, ix])
-    over = (other.top[iy, ix] - height)[seen]
+    over = other.top[iy, ix][seen] - height[seen]
     assert seen.sum() > 500 and np.quantile(over, 0.9) < 2.0 * STEP
     assert (whole.top[iy, ix][seen] - height[seen]).max() > 3.0  # the slot was there to be seen
 

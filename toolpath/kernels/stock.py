@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 HALF_DIAGONAL = 0.7072  # of a cell, rounded up
+LEAST_RISE = 0.02  # of a tool axis: one that lies lower takes nothing off a height over the plan
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -182,3 +183,74 @@ def sink(heights, x0, y0, step, low, turns, tops, frames, rise, out):
                     else:
                         under = half
                 out[i, j] = above
+
+
+@njit(cache=True, nogil=True)
+def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, shrink):
+    """Lower heights by the flank of a leaning tool standing at poses, pose after pose.
+
+    tips, axes : (n, 3) mm and unit, up; sides : (n, 2) mm, half the extent in plan of each pose's flank, x and y, about
+                 the middle of its axis
+    radius     : mm; low, high : mm above the tip, between which the flank cuts
+    shrink     : mm, by which the flank is made smaller all round, for heights of cells
+
+    A column is lowered where the flank takes its top: from there down to where the flank leaves it.
+    """
+    ny, nx = heights.shape
+    r = radius - shrink
+    if r <= 0.0 or high - low <= 2.0 * shrink:
+        return
+    for k in range(len(tips)):
+        tx, ty, tz = tips[k]
+        ax, ay, az = axes[k]
+        if az < LEAST_RISE:
+            continue
+        mx, my = tx + 0.5 * (low + high) * ax, ty + 0.5 * (low + high) * ay
+        i0 = max(int(np.floor((my - sides[k, 1] - y0) / step)), 0)
+        i1 = min(int(np.ceil((my + sides[k, 1] - y0) / step)), ny - 1)
+        j0 = max(int(np.floor((mx - sides[k, 0] - x0) / step)), 0)
+        j1 = min(int(np.ceil((mx + sides[k, 0] - x0) / step)), nx - 1)
+        flat = 1.0 - az * az
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                z = heights[i, j] - tz
+                dx, dy = x0 + j * step - tx, y0 + i * step - ty
+                along = dx * ax + dy * ay
+                under = (low + shrink - along) / az
+                over = (high - shrink - along) / az
+                c = dx * dx + dy * dy - along * along - r * r
+                if flat > 1e-12:
+                    room = az * az * along * along - flat * c
+                    if room < 0.0:
+                        continue
+                    root = np.sqrt(room)
+                    under = max(under, (az * along - root) / flat)
+                    over = min(over, (az * along + root) / flat)
+                elif c > 0.0:
+                    continue
+                if under < z <= over:
+                    heights[i, j] = tz + under
+
+
+@njit(cache=True, nogil=True)
+def loaded(top, part, x0, y0, step, tips, axes, first, second, flank, bodies, out):
+    """Set out[k] where stock stands at one of the places of a tool at pose k.
+
+    first, second : (n, 3) unit, square to the axes
+    flank  : (m, 3) mm, places in the tool: along first, second and axis; in stock where under the nearest node
+    bodies : (l, 3) mm, places of neck, shank and holder; in stock where under a node above the part of its cell
+    """
+    ny, nx = top.shape
+    for k in range(len(tips)):
+        for q in range(len(flank) + len(bodies)):
+            body = q >= len(flank)
+            u, v, h = bodies[q - len(flank)] if body else flank[q]
+            x = tips[k, 0] + u * first[k, 0] + v * second[k, 0] + h * axes[k, 0]
+            y = tips[k, 1] + u * first[k, 1] + v * second[k, 1] + h * axes[k, 1]
+            j, i = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+            if i < 0 or j < 0 or i >= ny or j >= nx:
+                continue
+            z = tips[k, 2] + u * first[k, 2] + v * second[k, 2] + h * axes[k, 2]
+            if top[i, j] > z and (not body or top[i, j] > part[i, j]):
+                out[k] = True
+                break

@@ -25,7 +25,7 @@ from toolpath.posed import Blocked
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
 from toolpath.strategies.isoparametric import Faces, leveller
-from zones.reach import Disc
+from zones.reach import Clearances, Disc
 
 NAME = "flank"
 LEAST_SERVED = 0.5  # of a wall's lattice: a wall of which less is wanted is left to others
@@ -33,11 +33,14 @@ BORDER = 0.02  # of what is wanted, at either border of a band: a few places bey
 LEAST_LEAN = math.radians(0.5)  # a wall that leans less is cut as well by the flank of an upright tool
 LEAD = 0.5  # of the radius, off the wall, where the tool comes down and goes up; at most
 MOST_LEAD = 1.5  # mm
-THICK = 0.1  # of the diameter: what the flank may take off at once
+THICK = 0.12  # of the diameter: what the flank may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
-AROUND = np.array([[math.cos(a), math.sin(a)] for a in np.arange(12) * math.pi / 6])
+CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
+STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
+LEAST_FEED = 0.1  # mm/min
+LEAST_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +61,16 @@ class Surroundings:
 
     enters  : whether it enters part or fixtures
     turning : what the machine can do
-    stock   : StockMap as it stands
+    stock   : StockMap as it stands; passes are taken off it, one after the other
     discs   : shank and holder with their clearance
+    clear   : Clearances
     """
 
     enters: Blocked
     turning: Turning
     stock: StockMap
     discs: tuple[Disc, ...]
+    clear: Clearances
 
     def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
         """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
@@ -73,8 +78,8 @@ class Surroundings:
         return self.enters(tips, axes) | ~self.turning.stands(axes) | (low < self.turning.table)
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float) -> NDArray[np.bool_]:
-        """(n,) bool: poses at which stock is in shank or holder, or thicker than ``thick`` mm at the flank."""
-        return loaded(self.stock, tips, axes, tool, self.discs, thick)
+        """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank."""
+        return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick)
 
 
 def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData, settings: PlanSettings,
@@ -87,7 +92,7 @@ def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
     allowance : mm, to leave on the part
     """
     wanted = Wanted(settings.scallop_height, 0.25 * settings.chordal_tolerance, 0.25 * settings.chordal_tolerance)
-    near, runs, refused = cKDTree(target.points), [], []
+    near, found, runs, refused = cKDTree(target.points), [], [], []
     for face in faces:
         try:
             for iso in face.over_square:
@@ -96,14 +101,18 @@ def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
                 if isinstance(pieces, str):
                     refused.append(f"{face.name}: {pieces}")
                     continue
-                for piece in pieces:
-                    made = _run(piece, tool, cut, settings, around)
-                    if isinstance(made, str):
-                        refused.append(f"{face.name}: {made}")
-                    else:
-                        runs.append(made)
+                found += [(face.name, piece) for piece in pieces]
         except GeometryError as refusal:
             refused.append(f"{face.name}: {refusal.message}")
+    for name, piece in sorted(found, key=lambda one: -one[1].top):  # the neck goes where a flank has been before
+        made = _run(piece, tool, cut, settings, around)
+        if isinstance(made, str):
+            refused.append(f"{name}: {made}")
+            continue
+        runs.append(made)
+        for t in made:
+            if t.motion is Motion.CUT and t.axes is not None:
+                around.stock.cut_leaning(t.points, t.axes, tool)
     return Flanked(tuple(runs), tuple(dict.fromkeys(refused)))
 
 
@@ -120,47 +129,61 @@ def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64)
     return np.asarray(tips @ up + out)
 
 
-def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc],
+def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], clear: Clearances,
            thick: float) -> NDArray[np.bool_]:
-    """(n,) bool: poses at which stock stands in shank or holder, or deeper in the cutting part than ``thick`` mm.
+    """(n,) bool: poses at which stock stands in neck, shank or holder, or deeper in the cutting part than ``thick`` mm.
 
     tips, axes : (n, 3) float64, mm and unit
 
-    Each body is a bundle of places along its axis, in the middle and round it, two lattice steps apart; stock is in it
-    where one of them lies under the cover of its cell. So what stands in a cell the wall runs through counts as
-    stock: the cutting part is asked one and a half steps inside as well.
+    Bodies are places on rings, two lattice steps apart; stock is what the nearest node shows, half a cell aside.
+    Less than 1.5 steps deep the cutting part is not asked: nodes in the wall are there. Where that is more than twice
+    ``thick`` the lattice is too coarse to tell, and every pose counts as loaded.
     """
     step = stock.lattice.step
-    spacing, high = 2.0 * step, stock.highest
-    inner = tool.radius - thick - 1.5 * step
-    bodies = [(inner, tool.corner_radius + 0.0, tool.stickout), *((d.radius, d.height, math.inf) for d in discs)]
-    out = np.zeros(len(tips), np.bool_)
-    side = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    other = np.cross(axes, side)
-    for radius, begin, end in bodies:
-        room = (high - float(tips[:, 2].min())) / max(float(axes[:, 2].min()), 1e-3) + max(radius, 0.0)
-        top = min(end, max(room, begin))
-        rings = np.linspace(0.0, max(radius, 0.0), int(np.ceil(max(radius, 0.0) / spacing)) + 1)
-        for h in np.linspace(begin, top, int(np.ceil((top - begin) / spacing)) + 1):
-            middle = tips + h * axes
-            for ring in rings:
-                for c, s in AROUND if ring > 0.0 else AROUND[:1]:
-                    place = middle + ring * (c * side + s * other)
-                    here = stock.lattice.inside(place)
-                    under = stock.cover[stock.lattice.cells(place)] > place[:, 2]
-                    out |= here & under
-    return out
+    deep, spacing = max(thick, CELLS * step), 2.0 * step
+    if thick > 0.0 and deep > 2.0 * thick:
+        return np.ones(len(tips), np.bool_)
+    room = max((stock.highest - float(tips[:, 2].min())) / max(float(axes[:, 2].min()), 1e-3), 0.0)
+    corner, flat = tool.corner_radius, tool.radius - tool.corner_radius
+
+    def heights(begin: float, end: float) -> F64:
+        end = max(min(end, room + max(d.radius for d in discs) if discs else room + tool.radius), begin)
+        return np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)
+
+    flank = [np.zeros((0, 3))]
+    for h in heights(min(deep, tool.flute_length), tool.flute_length).tolist():
+        low = max(corner - h, 0.0)
+        at = flat + math.sqrt(max((corner - deep) ** 2 - low * low, 0.0)) if corner > deep else tool.radius - deep
+        if corner <= deep or low <= corner - deep:
+            at = max(at, 0.0)
+            flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
+    bodies = [np.zeros((0, 3))]
+    outer = [(0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
+             (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
+             *((d.radius, d.height, math.inf) for d in discs)]
+    for radius, begin, end in outer:
+        for h in heights(begin, end).tolist():
+            bodies += [_ring(r, h, spacing) for r in np.linspace(0.0, radius, int(np.ceil(radius / (4.0 * step))) + 1)]
+    return stock.stands_in(tips, axes, np.vstack(flank), np.vstack(bodies))
+
+
+def _ring(radius: float, height: float, spacing: float) -> F64:
+    """(k, 3) mm: places on a ring round the axis."""
+    count = max(int(np.ceil(2.0 * np.pi * radius / spacing)), 1)
+    at = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([radius * np.cos(at), radius * np.sin(at), np.full(count, height)])
 
 
 def _pieces(wall: Wall, near: cKDTree, spacing: float, tool: ToolBody, wanted: Wanted, around: Surroundings,
             allowance: float) -> list[Piece] | str:
     """The pieces of a wall's passes, from the highest band down, or why there are none, in words."""
-    place, _, eta = wall.lattice(ALONG, UP)
+    place, normal, eta = wall.lattice(ALONG, UP)
     size = max(wall.length / ALONG, wall.height / UP)
     asked = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG) <= spacing + size
     if asked.mean() < LEAST_SERVED * np.ptp(eta):
         return f"{100.0 * asked.mean():.0f} % of it is wanted, too little for a pass along the whole"
+    if np.abs(normal[asked][:, 2]).max() < math.sin(LEAST_LEAN):
+        return "it is upright, and so would the tool be"
     rows = np.repeat(eta, asked.sum(axis=1))
     low, high = (float(np.quantile(rows, q)) for q in (BORDER, 1.0 - BORDER))
     low, high = 0.0 if low < 2.0 / UP else low, 1.0 if high > 1.0 - 2.0 / UP else high
@@ -187,46 +210,79 @@ def _run(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
     """A pass with its ways in and out, or why there is none, in words."""
     thick = THICK * tool.diameter
     piece = piece if settings.climb or settings.either_way else piece.reversed()
-    if not around.turning.follows(piece.tips, piece.axes):
+    walked = around.turning.along(piece.tips, piece.axes)
+    if walked is None:
         return "the rotary axes do not get along it"
-    met = around.met(*_filled(piece, LOOK * tool.radius), tool, thick)
-    if met.any():
+    tips, axes, least = walked
+    feeds = paced(tips, axes, piece.reach, cut.feed, least)
+    if feeds is None:
+        return "the tip would all but stand while the flank goes round it"
+    if around.met(*_filled(tips, axes, piece.reach, LOOK * tool.radius), tool, thick).any():
         return "there is more stock beside it than a flank may take off"
     ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
     if ways[0] is None or ways[1] is None:
         return "the tool does not get there along its own axis"
-    first, last = ways[0], ways[1][::-1]
+    (first, clear), (last, free) = ways[0], ways[1]
+    last = last[::-1]
     out: list[Trajectory] = []
 
     def go(motion: Motion, points: F64, feed: float, axis: F64) -> None:
         if float(np.linalg.norm(points[-1] - points[0])) > 1e-6:
             out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
 
-    a, b = piece.axes[0], piece.axes[-1]
+    a, b = axes[0], axes[-1]
     high = float((first[0] - first[1]) @ a)
     slow = first[1] + min(IN_FRONT, high) * a
-    go(Motion.APPROACH, np.array([first[0], slow]), cut.link_feed, a)
+    go(Motion.APPROACH, np.array([first[0], slow]), cut.link_feed if clear else cut.plunge_feed, a)
     go(Motion.APPROACH, np.array([slow, first[1]]), cut.plunge_feed, a)
     go(Motion.CONNECT, first[1:], cut.feed, a)
-    out.append(Trajectory(Motion.CUT, piece.tips, cut.feed, piece.axes))
+    for i, j in _steady(feeds):
+        out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
     go(Motion.CONNECT, last[:2], cut.feed, b)
-    go(Motion.LIFT, last[1:], cut.link_feed, b)
+    go(Motion.LIFT, last[1:], cut.link_feed if free else cut.feed, b)
     return tuple(out)
 
 
-def _filled(piece: Piece, spacing: float) -> tuple[F64, F64]:
-    """Poses of a piece with others between them, ``spacing`` mm apart at most at the tip."""
-    tips, axes = [piece.tips[:1]], [piece.axes[:1]]
-    for k in range(len(piece.tips) - 1):
-        count = max(math.ceil(float(np.linalg.norm(piece.tips[k + 1] - piece.tips[k])) / spacing), 1)
+def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | None:
+    """(n - 1,) mm/min of the tip, so that no place of the flank goes faster than ``feed`` and the machine keeps up.
+
+    tips, axes : (n, 3) float64, mm and unit
+    reach      : mm from the tip, how far up the flank is at work
+    least      : (n - 1,) minutes each block takes the machine
+
+    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake. On a straight move of the
+    tip with an evenly turning axis no place between tip and ``reach`` goes farther than the farther of both ends.
+    """
+    gone = [np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)]
+    minutes = np.maximum(gone[0], gone[1]) / feed
+    own = gone[0] / np.maximum(minutes, 1e-12)
+    if gone[0].sum() < LEAST_PACE * feed * minutes.sum():
+        return None
+    out = np.minimum(own, gone[0] / np.maximum(least, 1e-12))
+    return np.maximum(np.minimum(out, feed), LEAST_FEED)
+
+
+def _steady(feeds: F64) -> list[tuple[int, int]]:
+    """Runs of blocks (first, one past the last) whose feeds are within a step of ``STEADY``."""
+    level = np.floor(np.log(feeds / feeds.max()) / math.log(STEADY) + 1e-9)
+    at = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(feeds)]
+    return list(zip(at[:-1], at[1:], strict=True))
+
+
+def _filled(tips: F64, axes: F64, reach: float, spacing: float) -> tuple[F64, F64]:
+    """Poses with others between them, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
+    out, turned = [tips[:1]], [axes[:1]]
+    gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
+    for k, count in enumerate(np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()):
         share = np.arange(1, count + 1)[:, None] / count
-        tips.append((1.0 - share) * piece.tips[k] + share * piece.tips[k + 1])
-        between = (1.0 - share) * piece.axes[k] + share * piece.axes[k + 1]
-        axes.append(between / np.linalg.norm(between, axis=1, keepdims=True))
-    return np.vstack(tips), np.vstack(axes)
+        out.append((1.0 - share) * tips[k] + share * tips[k + 1])
+        between = (1.0 - share) * axes[k] + share * axes[k + 1]
+        turned.append(between / np.linalg.norm(between, axis=1, keepdims=True))
+    return np.vstack(out), np.vstack(turned)
 
 
-def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings, thick: float) -> F64 | None:
+def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
+            thick: float) -> tuple[F64, bool] | None:
     """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
 
     Off the wall where there is room for that, else straight down along the flank.
@@ -247,5 +303,5 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
             continue
         if not around.met(down, axes, tool, stock).any():
-            return np.array([beside + high * axis, beside, tip])
+            return np.array([beside + high * axis, beside, tip]), stock == 0.0
     return None

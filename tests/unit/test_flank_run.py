@@ -1,0 +1,114 @@
+"""Flank passes as motions: what the stock lets through, and how fast tip and flank go."""
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from tests.hand_parts import ball, box_mesh, tool
+from toolpath.stock import StockMap
+from toolpath.strategies.flank import LEAST_PACE, _steady, loaded, paced
+from zones.reach import Clearances, Disc
+
+STEP, TOP = 0.1, 12.0
+PART = box_mesh([0, 0, -2], [30, 30, 0])
+LEAN = np.array([[0.2, 0.0, np.sqrt(0.96)]])
+
+
+def block(low, high):
+    """Stock between two corners on a part that lies under it."""
+    stock = StockMap.box(TriangleTree(PART), np.array([0.0, 0.0, -2.0]), np.array([30.0, 30.0, 0.0]), STEP)
+    x = stock.lattice.x0 + STEP * np.arange(stock.lattice.nx)
+    y = stock.lattice.y0 + STEP * np.arange(stock.lattice.ny)
+    stands = ((y[:, None] >= low[1]) & (y[:, None] <= high[1])) & ((x >= low[0]) & (x <= high[0]))
+    stock.top[stands] = high[2]
+    stock.cover[stands] = high[2]
+    return stock
+
+
+def asked(stock, tip, axis, body, thick, discs=()):
+    return bool(loaded(stock, np.array([tip]), axis, body, discs, Clearances(), thick)[0])
+
+
+@pytest.mark.parametrize("body", [tool(6.0, 1.0, neck=20.0, stickout=30.0), ball(6.0, neck=20.0, stickout=30.0)],
+                         ids=["bull", "ball"])
+def test_the_flank_is_let_through_up_to_what_it_may_take_and_no_farther(body):
+    stock = block((14.0, 5.0), (15.0, 25.0, 8.0))
+    upright = np.array([[0.0, 0.0, 1.0]])
+    for deep, want in ((0.2, False), (0.45, False), (0.8, True), (1.5, True)):
+        assert asked(stock, [15.0 + 3.0 - deep, 15.0, 0.5], upright, body, 0.6) is want
+    assert not asked(stock, [18.2, 15.0, 0.5], upright, body, 0.0)
+    assert asked(stock, [17.7, 15.0, 0.5], upright, body, 0.0)
+
+
+@pytest.mark.parametrize("corner", [0.0, 1.0, 3.0])
+def test_stock_under_the_nose_counts(corner):
+    """A slab under the tool, whose end is in it: more than it may take is told, whatever the end."""
+    body = tool(6.0, corner, neck=20.0, stickout=30.0)
+    stock = block((0.0, 0.0), (30.0, 30.0, 3.0))
+    assert asked(stock, [15.0, 15.0, 2.0], LEAN, body, 0.6)
+    assert not asked(stock, [15.0, 15.0, 3.8], LEAN, body, 0.6)
+
+
+def test_neck_shank_and_holder_meet_no_stock_at_all():
+    upright = np.array([[0.0, 0.0, 1.0]])
+    body = tool(6.0, 1.0, neck=20.0, stickout=24.0)  # 5.7 neck from 12 up
+    high = block((14.0, 5.0), (15.0, 25.0, 16.0))
+    for gap, want in ((0.02, False), (-0.3, True)):
+        assert asked(high, [15.0 + 3.0 + gap, 15.0, 0.5], upright, body, 0.9) is want, gap
+    low = block((14.0, 5.0), (15.0, 25.0, 10.0))  # below the end of the flutes
+    assert not asked(low, [15.0 + 3.0 - 0.3, 15.0, 0.5], upright, body, 0.9)
+    holder = (Disc("holder", 10.0, 24.0),)
+    assert asked(block((6.0, 5.0), (8.0, 25.0, 26.0)), [17.0, 15.0, 0.5], upright, body, 0.9, holder)
+    assert not asked(block((6.0, 5.0), (8.0, 25.0, 24.0)), [17.0, 15.0, 0.5], upright, body, 0.9, holder)
+
+
+def test_a_lattice_too_coarse_to_tell_lets_nothing_through():
+    assert asked(block((0.0, 0.0), (1.0, 1.0, 1.0)), [15.0, 15.0, 5.0], LEAN, tool(0.6, 0.1), 0.06)
+
+
+def test_what_a_leaning_flank_takes_off_the_stock_is_gone_and_no_more():
+    """Against the cylinder itself: columns under random places of it, poses a tenth of a millimetre apart."""
+    body = tool(6.0, 1.0, neck=20.0, stickout=30.0)
+    stock = block((5.0, 5.0), (25.0, 25.0, 8.0))
+    before = stock.cover.copy()
+    tips = np.column_stack([np.full(151, 12.0), np.linspace(7.5, 22.5, 151), np.full(151, -0.5)])
+    stock.cut_leaning(tips, np.repeat(LEAN, 151, axis=0), body)
+    assert (stock.cover <= before).all() and (stock.cover < before).sum() > 5000
+    rng = np.random.default_rng(2)
+    points = np.column_stack([rng.uniform(5.0, 25.0, (40_000, 2)), rng.uniform(0.0, 8.0, 40_000)])
+    rel = points - [12.0, 0.0, -0.5]
+    rel[:, 1] = np.where(points[:, 1] < 7.5, points[:, 1] - 7.5, np.maximum(points[:, 1] - 22.5, 0.0))
+    high = rel @ LEAN[0]
+    off = np.linalg.norm(rel - high[:, None] * LEAN[0], axis=1)
+    inside = (off < 3.0) & (high > 1.0) & (high < body.flute_length)
+    stands = stock.cover[stock.lattice.cells(points)] >= points[:, 2]
+    assert stands[~inside].all()  # nothing is said to be gone that the flank has not been in
+    deep = (off < 2.6) & (high > 1.5) & (high < body.flute_length - 0.5)
+    column = np.array([8.0 - p[2] for p in points])
+    top = (points + column[:, None] * [0.0, 0.0, 1.0]) - [12.0, 0.0, -0.5]
+    top[:, 1] = rel[:, 1]
+    up = top @ LEAN[0]
+    open_above = (np.linalg.norm(top - up[:, None] * LEAN[0], axis=1) < 2.6) & (up < body.flute_length - 0.5)
+    assert (deep & open_above).sum() > 500 and not stands[deep & open_above].any()
+
+
+def test_no_place_of_the_flank_goes_faster_than_the_feed():
+    """Round a cone inside, the upper end of the flank goes five times as far as the tip."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    out = np.stack([np.cos(turn), np.sin(turn), np.zeros(181)], -1)
+    low, high = 1.2 * out, 6.0 * out + [0.0, 0.0, 10.0]
+    axes = (high - low) / np.linalg.norm(high - low, axis=1)[:, None]
+    reach = float(np.linalg.norm(high[0] - low[0]))
+    feeds = paced(low, axes, reach, 1000.0, np.zeros(180))
+    np.testing.assert_allclose(feeds, 200.0, rtol=1e-6)
+    slow = paced(low, axes, reach, 1000.0, np.full(180, 1e-3))
+    np.testing.assert_allclose(slow, np.linalg.norm(np.diff(low, axis=0), axis=1) / 1e-3, rtol=1e-6)
+    assert paced(low * [0.01, 0.01, 1.0], axes, reach, 1000.0, np.zeros(180)) is None
+    straight = np.column_stack([np.linspace(0.0, 10.0, 5), np.zeros((5, 2))])
+    np.testing.assert_allclose(paced(straight, np.repeat(LEAN, 5, axis=0), 9.0, 800.0, np.zeros(4)), 800.0)
+    assert LEAST_PACE < 0.2
+
+
+def test_blocks_of_about_one_feed_are_one_motion():
+    assert _steady(np.array([100.0, 95.0, 99.0])) == [(0, 3)]
+    assert _steady(np.array([100.0, 95.0, 30.0, 29.0, 100.0])) == [(0, 2), (2, 4), (4, 5)]
