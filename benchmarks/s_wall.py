@@ -1,8 +1,8 @@
 """An S-shaped thin wall, as five-axis machines are tried on: how evenly the tool axis goes, and what the passes leave.
 
-Run from the root of the checkout: ``python benchmarks/s_wall.py``. The wall is 160 mm long, 30 high and 3 thick, each
-side ruled between two waves, the upper shifted along: it leans out here and in there, by up to 11 degrees, and twice
-stands upright, where A and C of a table have their pole. Both sides are finished by
+Run from the root of the checkout: ``python benchmarks/s_wall.py [--cost]``. The wall is 160 mm long, 30 high and 3
+thick, each side ruled between two waves of different height, the upper shifted along: it leans out here and in there,
+by up to 11 degrees, and twice stands upright, where A and C of a table have their pole. Both sides are finished by
 
 - the flank of a bull nose (``toolpath.flank``): the ruling of every station looked for alone, or as it is planned;
 - a ball, its axis 65 degrees off the normal, as the wall has it, or led by ``toolpath.steering``: evenly, under a limit
@@ -11,10 +11,14 @@ stands upright, where A and C of a table have their pole. Both sides are finishe
 Rates are of the rotary axes of a table A/C by millimetre of tip; ``rough`` is the root mean square of how the tool axis
 bends, deg/mm², with stations evenly on the tip's way; a reversal is a turn back of a rotary axis by more than 0.05 deg.
 What is left and how deep is measured by ``verify.removal`` on the exact surface, 0.5 mm apart.
+
+With ``--cost`` the led passes of the outer side are walked over finer and finer triangles of it instead: seconds by
+1,000 locations with the search for axes and all questions of what is in the way, and the exponent of that in triangles.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import replace
@@ -155,9 +159,9 @@ def post(at: float) -> NurbsSurface:
     return NurbsSurface(np.insert(net, 1, at, axis=2), flat, flat, (2, 2))
 
 
-def tree_of(surfaces: list[NurbsSurface]) -> TriangleTree:
+def tree_of(surfaces: list[NurbsSurface], chord: float = 0.003, angle: float = 0.05) -> TriangleTree:
     """Surfaces as triangles."""
-    meshes = [s.discretised(0.003, 0.05) for s in surfaces]
+    meshes = [s.discretised(chord, angle) for s in surfaces]
     first = np.cumsum([0, *(len(m.vertices) for m in meshes)])
     return TriangleTree(TriangleMesh(np.vstack([m.vertices for m in meshes]),
                                      np.vstack([m.faces + n for m, n in zip(meshes, first, strict=False)])))
@@ -173,8 +177,30 @@ def row(name: str, surface: NurbsSurface, tool: ToolBody, passes: list[tuple[F64
     return "| " + " | ".join(cells) + " |"
 
 
+def cost() -> None:
+    """Print seconds by 1,000 locations for finer and finer triangles, the lesser of two runs each."""
+    surface, logs = side(1.0), []
+    print("| triangles | locations | s | s by 1,000 |\n|" + "---|" * 4)
+    for chord, angle in ((0.004, 0.1), (0.001, 0.03), (0.00025, 0.01)):
+        tree, seconds = tree_of([surface, post(AWAY)], chord, angle), []
+        for _ in range(2):
+            begun = time.perf_counter()
+            passes, _ = by_ball(surface, tree, True, LEANS)
+            seconds.append(time.perf_counter() - begun)
+        count, facets = sum(len(t) for t, _ in passes), len(tree)
+        logs.append((facets, min(seconds) / count))
+        print(f"| {facets} | {count} | {min(seconds):.1f} | {1e3 * min(seconds) / count:.3f} |", flush=True)
+    x, y = np.log(np.array(logs)).T
+    print(f"exponent {np.polyfit(x, y, 1)[0]:.2f}")
+
+
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cost", action="store_true")
+    if parser.parse_args().cost:
+        cost()
+        return
     print("| by | passes | m | min | most left | deepest | A deg/mm | C deg/mm | A back | C back | rough | s |\n|"
           + "---|" * 12)
     for outwards, which in ((1.0, "outer"), (-1.0, "inner")):
