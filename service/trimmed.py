@@ -13,7 +13,7 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.trim import trim_faces
 from service.prepare import Prepared, placement_of
-from toolpath.strategies.isoparametric import Faces, SmoothFaces, TrimmedFace
+from toolpath.strategies.isoparametric import Faces, SmoothFaces, TrimmedFace, suits
 from zones.machinable import Form
 
 TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one
@@ -24,13 +24,13 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     """The faces that every steep or shallow zone is part of, by its id, in the frame of its access.
 
     Those of a zone that join smoothly are one. Planes are left out, but on steep zones where tools may lean; there each
-    is alone.
+    is alone. Tools without a corner have passes on faces only there, by their flank.
 
     path : the STEP file ``ready`` was read from
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
-    leans = ready.setup.machine.kind == "5-axis"
-    wanted = [z for z in ready.zones if z.form is not Form.LEVEL and z.tool.corner_radius > 0.0]
+    leans = ready.setup.machine.kind == "5-axis" and ready.setup.machine.simultaneous
+    wanted = [z for z in ready.zones if z.form is not Form.LEVEL and suits(z.tool) or leans and z.form is Form.STEEP]
     flat = {f for z in wanted if leans and z.form is Form.STEEP for f in z.faces} - curved
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:

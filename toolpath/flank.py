@@ -89,6 +89,28 @@ class Piece:
         """The same, walked the other way."""
         return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1], self.reach)
 
+    def at(self, places: F64) -> Piece:
+        """The piece through other poses; places : (m,) numbers of its own poses, those between them by fractions."""
+        k = np.clip(places.astype(np.int64), 0, len(self.tips) - 2)
+        share = (places - k)[:, None]
+        tips, axes, away = ((1.0 - share) * a[k] + share * a[k + 1] for a in (self.tips, self.axes, self.away))
+        axes, away = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (axes, away))
+        return Piece(tips, axes, away, self.reach)
+
+    def parts(self, good: NDArray[np.bool_], places: F64, least: float) -> list[Piece]:
+        """What of it goes through good places only, each ``least`` mm or more at the tip.
+
+        good   : (m,) bool, whether it may go through a place
+        places : (m,) ascending, from 0 to the last pose, as for ``at``
+        """
+        out = []
+        for i, j in true_runs(good):
+            own = np.arange(np.floor(places[i]) + 1.0, np.ceil(places[j - 1]))
+            part = self.at(np.concatenate([[places[i]], own, [places[j - 1]]]))
+            if j - i > 1 and float(np.linalg.norm(np.diff(part.tips, axis=0), axis=1).sum()) >= least:
+                out.append(part)
+        return out
+
     @property
     def top(self) -> float:
         """mm, the highest place of the flank at work."""

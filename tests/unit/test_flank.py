@@ -238,3 +238,22 @@ def test_a_tool_whose_flutes_end_where_its_corner_does_has_no_flank():
     with pytest.raises(GeometryError) as refused:
         bands(Wall(leaned(0.1)), replace(ball(6.0), flute_length=3.0), ASKED)
     assert refused.value.code == "bad_pass" and "no flank" in refused.value.message
+
+
+def test_a_pass_in_parts_goes_where_it_went_and_through_good_places_only():
+    """A quarter of a circle of 10 mm, its axis turning with it; between 0.8 and 1.5 of its poses it may not go."""
+    turn = np.linspace(0.0, 0.5 * np.pi, 5)
+    around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(5)])
+    axes = 0.1 * around + np.array([0.0, 0.0, 1.0])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    whole = flank.Piece(10.0 * around, axes, around, 8.0)
+    at = np.linspace(0.0, 4.0, 41)
+    dense = whole.at(at)
+    assert dense.tips[::10] == pytest.approx(whole.tips) and dense.axes[::10] == pytest.approx(whole.axes)
+    assert np.linalg.norm(dense.axes, axis=1) == pytest.approx(1.0)
+    good = (at < 0.75) | (at > 1.55)
+    first, last = whole.parts(good, at, 0.5)
+    assert first.tips == pytest.approx(dense.tips[[0, 7]]) and last.tips == pytest.approx(dense.tips[[16, 20, 30, 40]])
+    assert last.reach == 8.0
+    assert len(whole.parts(good, at, 4.0)) == 1  # the first part is 2.7 mm
+    assert whole.parts(at == 2.0, at, 0.0) == []

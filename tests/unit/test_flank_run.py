@@ -5,8 +5,9 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
+from toolpath.flank import Piece
 from toolpath.stock import StockMap
-from toolpath.strategies.flank import LEAST_PACE, _steady, loaded, paced
+from toolpath.strategies.flank import LEAST_PACE, _descends, _steady, loaded, paced
 from zones.reach import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0
@@ -112,3 +113,16 @@ def test_no_place_of_the_flank_goes_faster_than_the_feed():
 def test_blocks_of_about_one_feed_are_one_motion():
     assert _steady(np.array([100.0, 95.0, 99.0])) == [(0, 3)]
     assert _steady(np.array([100.0, 95.0, 30.0, 29.0, 100.0])) == [(0, 2), (2, 4), (4, 5)]
+
+
+def test_ways_down_that_are_steep_and_deep_are_told():
+    """Up 2 mm and down again over 20 mm of way; then a dip of 0.05 mm, as steep; the axis leans across the way."""
+    x = np.arange(0.0, 60.0, 0.5)
+    axis = np.array([0.0, 0.3, np.sqrt(0.91)])
+    rise = np.interp(x, [5, 15, 20, 30, 40, 40.5, 41, 60], [0, 2, 2, 0, 0, -0.05, 0, 0])
+    tips = np.column_stack([x, 0.0 * x, 0.0 * x]) + rise[:, None] * axis
+    piece = Piece(tips, np.tile(axis, (len(x), 1)), tips, 8.0)
+    told = _descends(piece, np.tan(np.radians(5.0)), 0.1)
+    assert x[told].tolist() == x[(x >= 20.0) & (x <= 30.0)].tolist()
+    assert not _descends(piece, np.tan(np.radians(12.0)), 0.1).any()  # 2 in 10 is 11.3 degrees
+    assert x[_descends(piece, np.tan(np.radians(5.0)), 0.04)].tolist() == [*x[(x >= 20) & (x <= 30)], 40.0, 40.5]

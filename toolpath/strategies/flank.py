@@ -13,17 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
-from toolpath.flank import ALONG, UP, Piece, Wall, Wanted, bands
+from toolpath.flank import ALONG, LEAST_PIECE, UP, Piece, Wall, Wanted, bands
+from toolpath.levels import true_runs
 from toolpath.motion import Motion, Trajectory
 from toolpath.posed import Blocked
 from toolpath.settings import CutData, PlanSettings, Turning
-from toolpath.stock import StockMap
+from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.isoparametric import Faces, leveller
 from zones.reach import Clearances, Disc
 
@@ -37,6 +39,7 @@ THICK = 0.12  # of the diameter: what the flank may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
+DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
 LEAST_FEED = 0.1  # mm/min
@@ -105,14 +108,18 @@ def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
         except GeometryError as refusal:
             refused.append(f"{face.name}: {refusal.message}")
     for name, piece in sorted(found, key=lambda one: -one[1].top):  # the neck goes where a flank has been before
-        made = _run(piece, tool, cut, settings, around)
-        if isinstance(made, str):
-            refused.append(f"{name}: {made}")
-            continue
-        runs.append(made)
-        for t in made:
-            if t.motion is Motion.CUT and t.axes is not None:
-                around.stock.cut_leaning(t.points, t.axes, tool)
+        parts = _free(piece if settings.climb or settings.either_way else piece.reversed(), tool, settings, around)
+        if not parts:
+            refused.append(f"{name}: there is more stock beside it than a flank may take off")
+        for part in parts:
+            made = _run(part, tool, cut, settings, around)
+            if isinstance(made, str):
+                refused.append(f"{name}: {made}")
+                continue
+            runs.append(made)
+            for t in made:
+                if t.motion is Motion.CUT and t.axes is not None:
+                    around.stock.cut_leaning(t.points, t.axes, tool)
     return Flanked(tuple(runs), tuple(dict.fromkeys(refused)))
 
 
@@ -205,11 +212,37 @@ def _against(piece: Piece) -> bool:
     return float((left * 0.5 * (piece.away[1:] + piece.away[:-1])).sum()) < 0.0
 
 
+def _free(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
+    """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
+
+    Where it goes down steeper than the ramp, as behind what it was raised over, it would dig with the end of the tool:
+    that part is walked the other way, uphill.
+    """
+    at, least = _places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius), LEAST_PIECE * tool.radius
+    dense = piece.at(at)
+    met = binary_dilation(around.met(dense.tips, dense.axes, tool, THICK * tool.diameter))
+    down = _descends(dense, math.tan(settings.ramp_angle), DIP * SKIN * tool.diameter)
+    if not (met | down).any():
+        return [piece]
+    uphill = [part.reversed() for part in piece.parts(binary_dilation(down) & ~met, at, least)]
+    return [*piece.parts(~(met | down), at, least), *uphill]
+
+
+def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
+    """(n,) bool: poses on a way down along the axis that is steeper than ``slope`` and takes more than ``most`` mm."""
+    way, axis = np.diff(piece.tips, axis=0), 0.5 * (piece.axes[1:] + piece.axes[:-1])
+    down = -(way * axis).sum(axis=1)
+    steep = down > slope * np.linalg.norm(way + down[:, None] * axis, axis=1)
+    out = np.zeros(len(piece.tips), np.bool_)
+    for i, j in true_runs(steep):
+        out[i:j + 1] |= down[i:j].sum() > most
+    return out
+
+
 def _run(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
          around: Surroundings) -> tuple[Trajectory, ...] | str:
     """A pass with its ways in and out, or why there is none, in words."""
     thick = THICK * tool.diameter
-    piece = piece if settings.climb or settings.either_way else piece.reversed()
     walked = around.turning.along(piece.tips, piece.axes)
     if walked is None:
         return "the rotary axes do not get along it"
@@ -217,7 +250,8 @@ def _run(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
     feeds = paced(tips, axes, piece.reach, cut.feed, least)
     if feeds is None:
         return "the tip would all but stand while the flank goes round it"
-    if around.met(*_filled(tips, axes, piece.reach, LOOK * tool.radius), tool, thick).any():
+    dense = Piece(tips, axes, axes, piece.reach).at(_places(tips, axes, piece.reach, LOOK * tool.radius))
+    if around.met(dense.tips, dense.axes, tool, thick).any():
         return "there is more stock beside it than a flank may take off"
     ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
     if ways[0] is None or ways[1] is None:
@@ -269,16 +303,11 @@ def _steady(feeds: F64) -> list[tuple[int, int]]:
     return list(zip(at[:-1], at[1:], strict=True))
 
 
-def _filled(tips: F64, axes: F64, reach: float, spacing: float) -> tuple[F64, F64]:
-    """Poses with others between them, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
-    out, turned = [tips[:1]], [axes[:1]]
+def _places(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
+    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
     gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
-    for k, count in enumerate(np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()):
-        share = np.arange(1, count + 1)[:, None] / count
-        out.append((1.0 - share) * tips[k] + share * tips[k + 1])
-        between = (1.0 - share) * axes[k] + share * axes[k + 1]
-        turned.append(between / np.linalg.norm(between, axis=1, keepdims=True))
-    return np.vstack(out), np.vstack(turned)
+    counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
+    return np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
 
 
 def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
