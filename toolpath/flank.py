@@ -246,7 +246,7 @@ class Band:
         xi = np.linspace(0.0, 1.0, len(tip))
         away = self.wall.contact(xi, np.full(len(xi), 0.5 * (self.low + self.high)))[1]
         height = (self.high - self.low) * self.wall.height
-        raised, met = _raised(tip, axis, blocked, self.tool.radius, height)
+        raised, met = raised_poses(tip, axis, blocked, self.tool.radius, height)
         tip = tip + raised[:, None] * axis
         if served is not None:
             met |= ~served[np.rint(xi * (len(served) - 1)).astype(np.int64)]
@@ -409,8 +409,14 @@ def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radiu
     return np.asarray(miss), np.asarray(axis / np.linalg.norm(axis, axis=1, keepdims=True))
 
 
-def _raised(tip: F64, axis: F64, blocked: Blocked, radius: float, most: float) -> tuple[F64, NDArray[np.bool_]]:
-    """By how much (n,) mm poses are raised along their axes, ``most`` at most, and where they are not free even so."""
+def raised_poses(tip: F64, axis: F64, blocked: Blocked, radius: float,
+                 most: float) -> tuple[F64, NDArray[np.bool_]]:
+    """By how much (n,) mm poses are raised along their axes, and (n,) bool where they are not free even so.
+
+    tip, axis    : (n, 3) float64, mm and unit, in the order of the pass, close together
+    blocked      : whether poses are not free
+    radius, most : mm; it is raised in shares of the radius, by ``most`` at most, and evenly before and behind
+    """
     need = np.full(len(tip), np.nan)
     todo = np.arange(len(tip))
     for share in RAISES:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
-from toolpath.flank import ALONG, LEAST_PIECE, UP, Piece, Wall, Wanted, bands
+from toolpath.flank import ALONG, LEAST_PIECE, UP, Piece, Wall, Wanted, bands, raised_poses, thinned_poses
 from toolpath.levels import true_runs
 from toolpath.motion import Motion, Trajectory
 from toolpath.posed import Blocked
@@ -215,17 +215,32 @@ def _against(piece: Piece) -> bool:
 def _free(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
     """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
 
-    Where it goes down steeper than the ramp, as behind what it was raised over, it would dig with the end of the tool:
-    that part is walked the other way, uphill.
+    Over what stands on the floor it is raised along its axis. Where it goes down steeper than the ramp, as behind what
+    it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill.
     """
-    at, least = _places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius), LEAST_PIECE * tool.radius
+    thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
+
+    def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
+        return around.met(tips, axes, tool, thick)
+
+    at = _places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius)
     dense = piece.at(at)
-    met = binary_dilation(around.met(dense.tips, dense.axes, tool, THICK * tool.diameter))
+    met = loaded_at(dense.tips, dense.axes)
+    if met.any():
+        up, met = raised_poses(dense.tips, dense.axes,
+                               lambda tips, axes: loaded_at(tips, axes) | around.blocked(tips, axes, tool),
+                               tool.radius, piece.reach)
+        dense = replace(dense, tips=dense.tips + up[:, None] * dense.axes)
+        piece, at = dense, np.arange(len(at), dtype=np.float64)
+        met = binary_dilation(met)
     down = _descends(dense, math.tan(settings.ramp_angle), DIP * SKIN * tool.diameter)
     if not (met | down).any():
-        return [piece]
-    uphill = [part.reversed() for part in piece.parts(binary_dilation(down) & ~met, at, least)]
-    return [*piece.parts(~(met | down), at, least), *uphill]
+        parts = [piece]
+    else:
+        uphill = [part.reversed() for part in piece.parts(binary_dilation(down) & ~met, at, least)]
+        parts = [*piece.parts(~(met | down), at, least), *uphill]
+    return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
+            for p in parts]
 
 
 def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
