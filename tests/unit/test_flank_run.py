@@ -50,6 +50,14 @@ def test_stock_under_the_nose_counts(corner):
     assert not asked(stock, [15.0, 15.0, 3.8], LEAN, body, 0.6)
 
 
+@pytest.mark.parametrize("corner", [0.0, 1.0, 3.0])
+def test_under_the_end_no_more_than_the_skin_of_a_way_down_is_let_through(corner):
+    body, upright = tool(6.0, corner, neck=20.0, stickout=30.0), np.array([[0.0, 0.0, 1.0]])
+    stock = block((0.0, 0.0), (30.0, 30.0, 3.0))
+    for deep, want in ((0.40, False), (0.55, True)):  # the skin is 0.48, the flank may take 0.6
+        assert asked(stock, [15.0, 15.0, 3.0 - deep], upright, body, 0.6) is want
+
+
 def test_neck_shank_and_holder_meet_no_stock_at_all():
     upright = np.array([[0.0, 0.0, 1.0]])
     body = tool(6.0, 1.0, neck=20.0, stickout=24.0)  # 5.7 neck from 12 up

@@ -140,6 +140,8 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
            thick: float) -> NDArray[np.bool_]:
     """(n,) bool: poses at which stock stands in neck, shank or holder, or deeper in the cutting part than ``thick`` mm.
 
+    Under the end of the tool that is no more than the skin a way down may take.
+
     tips, axes : (n, 3) float64, mm and unit
 
     Bodies are places on rings, two lattice steps apart; stock is what the nearest node shows, half a cell aside.
@@ -157,13 +159,14 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
         end = max(min(end, room + max(d.radius for d in discs) if discs else room + tool.radius), begin)
         return np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)
 
-    flank = [np.zeros((0, 3))]
-    for h in heights(min(deep, tool.flute_length), tool.flute_length).tolist():
+    flank, bottom = [np.zeros((0, 3))], max(min(thick, SKIN * tool.diameter), CELLS * step)
+    for h in heights(min(bottom, tool.flute_length), tool.flute_length).tolist():
         low = max(corner - h, 0.0)
-        at = flat + math.sqrt(max((corner - deep) ** 2 - low * low, 0.0)) if corner > deep else tool.radius - deep
-        if corner <= deep or low <= corner - deep:
-            at = max(at, 0.0)
-            flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
+        if corner > bottom and low > corner - bottom:
+            continue
+        at = flat + math.sqrt((corner - bottom) ** 2 - low * low) if corner > bottom else tool.radius
+        at = max(min(at, tool.radius - deep), 0.0)
+        flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
     bodies = [np.zeros((0, 3))]
     outer = [(0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
              (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
