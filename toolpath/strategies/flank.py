@@ -39,6 +39,7 @@ THICK = 0.12  # of the diameter: what the flank may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
+ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
@@ -332,13 +333,15 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
             thick: float) -> tuple[F64, bool] | None:
     """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
 
-    Off the wall where there is room for that, else straight down along the flank.
+    Off the wall where there is room for that; else straight down along the flank, where the end of the tool is round
+    enough not to dig up what stands at the wall.
     """
     axis, tip = piece.axes[0], piece.tips[0]
     aside = piece.away[0] - (piece.away[0] @ axis) * axis
     aside /= np.linalg.norm(aside)
-    for lead, stock in ((min(LEAD * tool.radius, MOST_LEAD), 0.0), (0.25 * min(LEAD * tool.radius, MOST_LEAD), 0.0),
-                        (0.0, thick)):
+    room = min(LEAD * tool.radius, MOST_LEAD)
+    down_the_wall = [(0.0, thick)] if ROUND_END * tool.corner_radius >= thick else []
+    for lead, stock in ((room, 0.0), (0.25 * room, 0.0), *down_the_wall):
         beside = tip + lead * aside
         dip = tip[2] - float(lowest(tip[None], axis[None], tool, around.discs, UP_Z)[0])
         high = (settings.clearance + max(dip, 0.0) - beside[2]) / axis[2]
