@@ -12,7 +12,6 @@ in an error or over the limit counts as not proved.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import subprocess
 import sys
@@ -25,19 +24,12 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-SOURCES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service", "examples")
+from benchmarks.family_score import digest_of  # noqa: E402
+from benchmarks.five_axis_gain import MACHINE, silent  # noqa: E402
+
+SOURCES = ["geometry", "zones", "toolpath", "output", "verify", "schemas", "service", "examples"]
 GAPS = (0.8, 6.0)  # mm
 AIM, REACHED = 0.95, 0.98
-MACHINE = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-30, 110], [-360, 360]]}
-
-
-def digest() -> str:
-    """Twelve hex digits of all sources that have a say."""
-    h = hashlib.sha256()
-    for folder in SOURCES:
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            h.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
-    return h.hexdigest()[:12]
 
 
 def planned(seed: int, folder: Path) -> dict[str, Any]:
@@ -53,7 +45,7 @@ def planned(seed: int, folder: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {"seed": seed, "gaps": gaps, "connections": len(made.truth["connections"])}
     try:
         report = chain.plan(step, Setup.model_validate({**made.setup, "machine": MACHINE}), folder / "job",
-                            lambda _stage, _share: None)
+                            silent)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
     zones = report["zones"]
@@ -115,16 +107,16 @@ def main() -> None:
         return
     first, last = (int(x) for x in args.seeds.split(":"))
     args.out.mkdir(parents=True, exist_ok=True)
-    kept, sources = args.out / "rows.jsonl", digest()
+    kept = args.out / "rows.jsonl"
     rows = {r["seed"]: r for r in map(json.loads, kept.read_text().splitlines())} if kept.exists() else {}
     for seed in range(first, last) if not args.score_only else ():
         if seed not in rows:
-            rows[seed] = run(seed, args.limit) | {"sources": sources}
+            rows[seed] = {"sources": digest_of(SOURCES)} | run(seed, args.limit)
             with kept.open("a") as out:
                 out.write(json.dumps(rows[seed]) + "\n")
             print(f"{seed}: {rows[seed]['state']} {rows[seed]['seconds']} s", flush=True)
     if rows:
-        score([rows[k] for k in sorted(rows)], sources)
+        score([rows[k] for k in sorted(rows)], digest_of(SOURCES))
 
 
 if __name__ == "__main__":

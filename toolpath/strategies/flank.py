@@ -42,6 +42,7 @@ UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
+LOADED = "there is more stock beside it than a flank may take off"
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
 LEAST_FEED = 0.1  # mm/min
 LEAST_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
@@ -111,7 +112,7 @@ def flanked(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
     for name, piece in sorted(found, key=lambda one: -one[1].top):  # the neck goes where a flank has been before
         parts = _free(piece if settings.climb or settings.either_way else piece.reversed(), tool, settings, around)
         if not parts:
-            refused.append(f"{name}: there is more stock beside it than a flank may take off")
+            refused.append(f"{name}: {LOADED}")
         for part in parts:
             made = _run(part, tool, cut, settings, around)
             if isinstance(made, str):
@@ -271,7 +272,7 @@ def _run(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
         return "the tip would all but stand while the flank goes round it"
     dense = Piece(tips, axes, axes, piece.reach).at(_places(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
-        return "there is more stock beside it than a flank may take off"
+        return LOADED
     ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
     if ways[0] is None or ways[1] is None:
         return "the tool does not get there along its own axis"
