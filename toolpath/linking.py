@@ -23,7 +23,7 @@ from geometry.mesh import F64
 from toolpath.kernels.ramp import ease
 from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock import SKIN, SURE_RIM, StockMap
 from toolpath.walked import Depths
 from zones.reach import LEVEL_TOLERANCE, TipField
 
@@ -239,14 +239,23 @@ class Linker:
         return None
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
-        """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning."""
-        slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
-        need = over / slope
+        """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning.
+
+        What a pass itself goes up or down the ramp has less to go down by. One that leans more than half of the ramp is
+        dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
+        between, and no more than the way that goes up works off: half of what there is.
+        """
+        tool, slope = self.field.tool, math.tan(self.motions.ramp_angle) * RAMP_SHARE
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
         total = float(s[-1])
-        if total < LEAST_RUN * self.field.tool.radius * (2.0 if closed else 1.0):
+        if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
             return None  # to and fro on the spot is drilling
+        lean = _steepest(points if closed else _head(points, 0.5 * over / slope))
+        digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
+        need = over / rest
         if closed:
+            if digs:
+                need = max(need, total * over / (SKIN * tool.diameter))
             laps = math.ceil(need / total)
             if laps > MOST_LEGS:
                 return None
@@ -254,14 +263,13 @@ class Linker:
             t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
             down = _with_knot(walked, t, need)
             lift = np.maximum(over * (1.0 - down[1] / need), 0.0)
-            path = self._eased(down[0], lift)
+            path = self._eased(down[0], lift, 0.0 if digs else lean)
             last = int(np.searchsorted(down[1], need + total - 1e-9))
             return np.ascontiguousarray(path[: last + 1])
-        leg = min(total, max(need / 2.0, 1e-9))
+        leg = min(total, max(0.5 * over / slope, 1e-9), SKIN * tool.diameter / slope if digs else math.inf)
         legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
         if legs > MOST_LEGS:
             return None
-        leg = min(leg, total)
         head, hs = _with_knot(points, s, leg)
         head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
         ways, lifts = [points[:1]], [np.array([over])]
@@ -269,11 +277,15 @@ class Linker:
             xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
             ways.append(xy[1:])
             lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
-        return self._eased(np.vstack([*ways, points[1:]]), np.concatenate([*lifts, np.zeros(len(points) - 1)]))
+        lifts.append(np.zeros(len(points) - 1))
+        return self._eased(np.vstack([*ways, points[1:]]), np.concatenate(lifts), 0.0 if digs else lean)
 
-    def _eased(self, points: F64, lift: F64) -> F64:
-        """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep."""
-        ease(points, lift, math.tan(self.motions.ramp_angle) * EASE_SHARE, ROUNDING)
+    def _eased(self, points: F64, lift: F64, lean: float) -> F64:
+        """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep.
+
+        lean : mm per mm in plan, what the points may go down themselves
+        """
+        ease(points, lift, math.tan(self.motions.ramp_angle) * EASE_SHARE - lean, ROUNDING)
         return np.ascontiguousarray(points + np.column_stack([np.zeros((len(points), 2)), lift]))
 
     # -- moves ------------------------------------------------------------------------------------------------
@@ -332,6 +344,13 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
+
+
+def _steepest(points: F64) -> float:
+    """The most a polyline (n, 3), mm, goes up or down, mm per mm in plan."""
+    move = np.diff(points, axis=0)
+    rise = np.maximum(np.abs(move[:, 2]) - ROUNDING, 0.0)
+    return float((rise / np.maximum(np.hypot(move[:, 0], move[:, 1]), 1e-12)).max(initial=0.0))
 
 
 def _head(points: F64, length: float) -> F64:

@@ -13,7 +13,7 @@ from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.levels import Line
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion
-from toolpath.stock import StockMap
+from toolpath.stock import SKIN, StockMap
 from toolpath.walked import Depths
 
 TOP = 4.0
@@ -136,6 +136,55 @@ def test_an_open_line_in_stock_is_ramped_to_and_fro(length):
     assert cut[0, 2] >= TOP  # begins above the stock
     assert (cut[-2:] == line.points).all()  # and ends with the whole pass at depth
     assert (cut[:, 1] == 15).all() and cut[:, 0].min() >= line.points[0, 0] - 1e-9
+
+
+def digging(cut, along):
+    """What each steep descent of a polyline takes below all that was walked before, mm, and the way of the other moves.
+
+    Looked at every 0.05 mm of ``along`` (n,), mm, on which a point of the polyline lies in plan.
+    """
+    places = np.linspace(along.min(), along.max(), int(np.ptp(along) / 0.05) + 2)
+    lowest, dug, aside = np.full(len(places), np.inf), [], 0.0
+    for k in range(1, len(cut)):
+        low, high = sorted(along[k - 1:k + 1])
+        here = np.flatnonzero((places >= low) & (places <= high))
+        order = k - 1 + np.argsort(along[k - 1:k + 1])
+        z = np.interp(places[here], along[order], cut[order, 2])
+        run = float(np.hypot(*(cut[k] - cut[k - 1])[:2]))
+        if cut[k - 1, 2] - cut[k, 2] > np.tan(RAMP) * run:
+            dug.append(float(np.maximum(lowest[here] - z, 0.0).max(initial=0.0)))
+        else:
+            aside += run
+        lowest[here] = np.minimum(lowest[here], z)
+    return np.array(dug), aside
+
+
+@pytest.mark.parametrize("rise", [0.3, 0.8, 2.0])
+@pytest.mark.parametrize("length", [3.0, 12.0])
+def test_to_and_fro_along_a_leaning_line_the_way_back_takes_no_more_than_a_skin(length, rise):
+    """The way back goes downhill: it takes all that the ramp lost since the tool went up there."""
+    link = linker(step_down=0.5)
+    x = 15.0 + 0.5 * length * np.array([-1.0, 1.0])
+    line = Line(np.column_stack([x, [15.0, 15.0], [1.5, 1.5 + rise]]), False)
+    assert link.add(line)
+    cut = link.trajectories[-1].points
+    assert (cut[-2:] == line.points).all() and cut[0, 2] >= TOP
+    dug, aside = digging(cut, cut[:, 0])
+    assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
+    assert dug.sum() <= np.tan(RAMP) * aside  # and the ways between work it off
+
+
+def test_a_loop_that_leans_is_ramped_a_skin_a_turn():
+    link = linker(step_down=0.5)
+    flat = loop(4.0, 2.0)
+    line = Line(flat.points + np.column_stack([np.zeros((91, 2)), 0.2 * (flat.points[:, 0] - 15.0)]), True)
+    assert link.add(line)
+    cut = link.trajectories[-1].points
+    turn = np.unwrap(np.arctan2(cut[:, 1] - 15.0, cut[:, 0] - 15.0))
+    assert (np.diff(turn) >= 0.0).all() or (np.diff(turn) <= 0.0).all()
+    turns = np.abs(turn - turn[0]) / (2.0 * np.pi)
+    later = np.interp(turns + 1.0, turns, cut[:, 2], right=np.nan)
+    assert np.nanmax(cut[:, 2] - later) <= SKIN * ball(4.0).diameter + 1e-9
 
 
 @pytest.mark.parametrize("radius", [1.0, 4.0, 9.0])
