@@ -243,7 +243,7 @@ class Linker:
 
         What a pass itself goes up or down the ramp has less to go down by. One that leans more than half of the ramp is
         dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
-        between, and no more than the way that goes up works off: half of what there is.
+        between, and no more than the way that goes level or up works off: to and fro half of what there is.
         """
         tool, slope = self.field.tool, math.tan(self.motions.ramp_angle) * RAMP_SHARE
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
@@ -252,10 +252,12 @@ class Linker:
             return None  # to and fro on the spot is drilling
         lean = _steepest(points if closed else _head(points, 0.5 * over / slope))
         digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
+        if closed and digs:
+            rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), SKIN * tool.diameter / total)
+        if rest <= 0.0:
+            return None
         need = over / rest
         if closed:
-            if digs:
-                need = max(need, total * over / (SKIN * tool.diameter))
             laps = math.ceil(need / total)
             if laps > MOST_LEGS:
                 return None
@@ -351,6 +353,13 @@ def _steepest(points: F64) -> float:
     move = np.diff(points, axis=0)
     rise = np.maximum(np.abs(move[:, 2]) - ROUNDING, 0.0)
     return float((rise / np.maximum(np.hypot(move[:, 0], move[:, 1]), 1e-12)).max(initial=0.0))
+
+
+def _not_down(points: F64, slope: float) -> float:
+    """Share in plan of a polyline (n, 3), mm, that does not go down steeper than ``slope``, mm per mm."""
+    move = np.diff(points, axis=0)
+    run = np.hypot(move[:, 0], move[:, 1])
+    return float(run[-move[:, 2] <= slope * run].sum() / run.sum())
 
 
 def _head(points: F64, length: float) -> F64:
