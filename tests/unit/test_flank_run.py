@@ -7,7 +7,7 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.flank import Piece
 from toolpath.stock import StockMap
-from toolpath.strategies.flank import LEAST_PACE, _descends, _steady, loaded, paced
+from toolpath.strategies.flank import LEAST_PACE, _begun_level, _descends, _steady, loaded, paced
 from zones.reach import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0
@@ -134,3 +134,17 @@ def test_ways_down_that_are_steep_and_deep_are_told():
     assert x[told].tolist() == x[(x >= 20.0) & (x <= 30.0)].tolist()
     assert not _descends(piece, np.tan(np.radians(12.0)), 0.1).any()  # 2 in 10 is 11.3 degrees
     assert x[_descends(piece, np.tan(np.radians(5.0)), 0.04)].tolist() == [*x[(x >= 20) & (x <= 30)], 40.0, 40.5]
+
+
+def test_a_part_does_not_begin_or_end_going_down():
+    """Over the brink of a valley, 11 degrees down into fresh stock: seed 103 of the sweep lost its job on 1.558 mm."""
+    x = np.arange(0.0, 12.1, 0.5)
+    z = np.interp(x, [0.0, 1.0, 7.0, 10.0, 12.0], [0.2, 0.0, 1.8, 1.8, 1.4])
+    axes = np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    piece = Piece(np.column_stack([x, 0.0 * x, z]), axes, np.roll(axes, 1, axis=1), 5.0)
+    kept = _begun_level(piece, np.tan(np.radians(5.0)), 0.5)
+    assert kept is not None
+    assert kept.tips[:, 0].tolist() == x[(x >= 1.0) & (x <= 10.0)].tolist()
+    assert _begun_level(piece, np.tan(np.radians(12.0)), 0.5).tips.tolist() == piece.tips.tolist()
+    assert _begun_level(piece, np.tan(np.radians(5.0)), 9.5) is None  # 6.3 and 3 mm are left of it
+    assert _begun_level(piece.at(np.array([0.0, 1.0, 2.0])), np.tan(np.radians(5.0)), 0.5) is None

@@ -40,6 +40,7 @@ LOOK = 0.25  # of the radius, between poses that are held against stock and part
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
+STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 LOADED = "there is more stock beside it than a flank may take off"
@@ -228,31 +229,46 @@ def _free(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surround
     def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
         return around.met(tips, axes, tool, thick)
 
-    at = _places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius)
-    dense = piece.at(at)
+    dense = piece.at(_places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     met = loaded_at(dense.tips, dense.axes)
     if met.any():
         up, met = raised_poses(dense.tips, dense.axes,
                                lambda tips, axes: loaded_at(tips, axes) | around.blocked(tips, axes, tool),
                                tool.radius, piece.reach)
         dense = replace(dense, tips=dense.tips + up[:, None] * dense.axes)
-        piece, at = dense, np.arange(len(at), dtype=np.float64)
         met = binary_dilation(met)
-    down = _descends(dense, math.tan(settings.ramp_angle), DIP * SKIN * tool.diameter)
-    if not (met | down).any():
-        parts = [piece]
-    else:
-        uphill = [part.reversed() for part in piece.parts(binary_dilation(down) & ~met, at, least)]
-        parts = [*piece.parts(~(met | down), at, least), *uphill]
+    slope = math.tan(settings.ramp_angle)
+    down = _descends(dense, slope, DIP * SKIN * tool.diameter)
+    at = np.arange(len(met), dtype=np.float64)
+    uphill = [part.reversed() for part in dense.parts(binary_dilation(down) & ~met, at, least)]
+    parts = [_begun_level(part, slope, least) for part in (*dense.parts(~(met | down), at, least), *uphill)]
     return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
-            for p in parts]
+            for p in parts if p is not None]
+
+
+def _begun_level(piece: Piece, slope: float, least: float) -> Piece | None:
+    """A part without what of either end goes down along the axis steeper than ``slope``; None if under ``least`` mm.
+
+    There is fresh stock at an end: over the brink of a valley the tool would dig into it however short the way is.
+    """
+    steep = _steps_down(piece, slope)[1]
+    level = np.flatnonzero(~steep)
+    if not len(level):
+        return None
+    kept = piece.at(np.arange(level[0], level[-1] + 2, dtype=np.float64))
+    return kept if float(np.linalg.norm(np.diff(kept.tips, axis=0), axis=1).sum()) >= least else None
+
+
+def _steps_down(piece: Piece, slope: float) -> tuple[F64, NDArray[np.bool_]]:
+    """(n - 1,) mm that each step goes down along the axis, and (n - 1,) bool whether steeper than ``slope``."""
+    way, axis = np.diff(piece.tips, axis=0), 0.5 * (piece.axes[1:] + piece.axes[:-1])
+    down = np.asarray(-(way * axis).sum(axis=1))
+    return down, down > slope * np.linalg.norm(way + down[:, None] * axis, axis=1) + STEEPER
 
 
 def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
     """(n,) bool: poses on a way down along the axis that is steeper than ``slope`` and takes more than ``most`` mm."""
-    way, axis = np.diff(piece.tips, axis=0), 0.5 * (piece.axes[1:] + piece.axes[:-1])
-    down = -(way * axis).sum(axis=1)
-    steep = down > slope * np.linalg.norm(way + down[:, None] * axis, axis=1)
+    down, steep = _steps_down(piece, slope)
     out = np.zeros(len(piece.tips), np.bool_)
     for i, j in true_runs(steep):
         out[i:j + 1] |= down[i:j].sum() > most
