@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from toolpath.levels import Line, dense, place_keys
@@ -13,6 +15,8 @@ from zones.reach import Lattice
 
 WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is the same
 ON = 2.0 * WRITTEN  # off a move, and still on it
+CELL = 10.0 * WRITTEN  # in which places that may be one are looked for
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 class Depths:
@@ -64,35 +68,33 @@ class Depths:
 class Walked:
     """Ways that one tool has walked, by the moves they are made of.
 
-    Lines are cut to the samples they serve, so one may be part of another.
+    Lines are cut to the samples they serve, so one may be part of another. Places nearer than ``ON`` are one: a program
+    rounds them in the frame of the part, which may lean to this one.
     """
 
     def __init__(self) -> None:
-        self._moves: dict[bytes, list[F64]] = {}
+        self._moves: dict[bytes, list[tuple[F64, F64]]] = {}
 
     def add(self, points: F64) -> None:
         """Remember a way (n, 3), mm, that the tool has gone from end to end."""
-        keys = _written(points)
+        keys = _cells(points)
         for a, b, p, q in zip(keys[:-1], keys[1:], points[:-1], points[1:], strict=True):
-            self._moves.setdefault(a, []).append(q)
-            self._moves.setdefault(b, []).append(p)
+            self._moves.setdefault(a, []).append((p, q))
+            self._moves.setdefault(b, []).append((q, p))
 
     def fresh(self, line: Line) -> NDArray[np.bool_]:
         """Which moves (n - 1,) of a line were not walked whole before.
 
         A move is known where it is part of one that was walked, and shares an end with it.
         """
-        count = len(line.points) - 1
-        keys, points = _written(line.points), line.points
-        return np.array([not (self._along(keys[k], points[k], points[k + 1])
-                              or self._along(keys[k + 1], points[k + 1], points[k])) for k in range(count)])
+        return np.array([not (self._along(p, q) or self._along(q, p))
+                         for p, q in zip(line.points[:-1], line.points[1:], strict=True)])
 
     @staticmethod
     def again(line: Line) -> NDArray[np.bool_]:
         """Which moves (n - 1,) of a line go where it has been itself, as turns of a spiral do that a border holds."""
-        keys = _written(line.points)
-        out = np.zeros(len(keys) - 1, np.bool_)
-        if len(set(keys)) >= len(keys) - 1:  # a ring comes back to its beginning
+        out = np.zeros(len(line.points) - 1, np.bool_)
+        if len(cKDTree(line.points).query_pairs(ON)) <= 1:  # a ring comes back to its beginning
             return out
         so_far = Walked()
         for k in range(len(out)):
@@ -101,9 +103,12 @@ class Walked:
             so_far.add(move)
         return out
 
-    def _along(self, key: bytes, start: F64, end: F64) -> bool:
+    def _along(self, start: F64, end: F64) -> bool:
         """Whether a walked move from ``start`` goes over ``end``."""
-        for q in self._moves.get(key, ()):
+        near = dict.fromkeys(_cells(start + ON * CORNERS))
+        for p, q in (move for key in near for move in self._moves.get(key, ())):
+            if float((p - start) @ (p - start)) >= ON * ON:
+                continue
             way, asked = q - start, end - start
             size = float(way @ way)
             share = float(asked @ way) / size if size > 0.0 else 0.0
@@ -126,3 +131,8 @@ class Walked:
 def _written(points: F64) -> list[bytes]:
     """A key for each of points (n, 3), mm, the same for those that a program says with the same words."""
     return [row.tobytes() for row in np.rint(points / WRITTEN).astype(np.int64)]
+
+
+def _cells(points: F64) -> list[bytes]:
+    """The cell of each of points (n, 3), mm."""
+    return [row.tobytes() for row in np.floor(points / CELL).astype(np.int64)]

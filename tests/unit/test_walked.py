@@ -133,6 +133,13 @@ def test_turns_of_a_line_that_fall_on_one_another_are_found():
     assert not Walked.again(Line(turns[:41], True)).any()
     back = Line(np.vstack([turns[:20], turns[18::-1]]), False)  # out and back
     assert Walked.again(back).tolist() == [False] * 19 + [True] * 19
+    noise = np.random.default_rng(5).uniform(-4e-5, 4e-5, turns.shape) * (np.arange(81) > 40)[:, None]
+    nearly = turns + noise  # the frame of the part, in which it is written, rounds other digits
+    assert Walked.again(Line(nearly, False)).tolist() == [False] * 40 + [True] * 40
+    known = Walked()
+    known.add(turns)
+    assert not known.fresh(Line(nearly, False)).any()
+    assert known.fresh(Line(nearly + [0.0, 0.0, 1e-3], False)).all()
     spiral = turns * (1.0 + 0.01 * np.arange(81)[:, None])
     assert not Walked.again(Line(spiral, False)).any()
 
