@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from schemas.setup import Setup
 from service import reporting
+from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
 from service.blank import stock_cylinder
 from service.convert import (
@@ -65,7 +66,8 @@ STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
-PREPARED, PLANNED, PROVED = 0.28, 0.75, 0.96  # shares of the work done
+PREPARED, PROVED = 0.28, 0.96  # shares of the work done
+FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None) -> dict[str, Any]:
@@ -97,19 +99,27 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             ready = replace(ready, warnings=(*ready.warnings, warning))
     scored = score(ready)
     checks = scored.checks(ready)
-    sides: list[Side] = []
-    for k, view in enumerate(ready.views):
-        share = _Share(progress, k, len(ready.views))
-        sides.append(_side(ready, view, checks, trimmed, sides, share))
-    made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
-    zone, given_up = scored.without(made, ready.zones)
     first, look = ready.views[0], proof_frame(ready)
-    written = programs_of(ready, sides)
     dense = look.into(scored.samples, first)
-    programs = [p.given() for p in written]
-    proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
-                  ScoredSamples(dense, zone), [z.id for z in ready.zones],
-                  lambda f: progress("prove", PLANNED + (PROVED - PLANNED) * f))
+    told, begun = Learned(), PREPARED
+    for attempt in range(PLANS):
+        # how many there will be is not known: each takes most of what is left
+        ended = begun + FIRST_SHARE * (PROVED - begun)
+        span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
+        sides: list[Side] = []
+        for k, view in enumerate(ready.views):
+            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told))
+        made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
+        zone, given_up = scored.without(made, ready.zones)
+        written = programs_of(ready, sides)
+        programs = [p.given() for p in written]
+        proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
+                      ScoredSamples(dense, zone), [z.id for z in ready.zones], span.proving)
+        more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
+        if more is None or attempt + 1 == PLANS:
+            break
+        told, begun = more, ended
+    ready = replace(ready, warnings=(*ready.warnings, *told.notes))
     report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
                                         given_up)
     progress("report", PROVED)
@@ -134,20 +144,27 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     return report
 
 
-class _Share:
-    """Progress of planning one access of several: what there is to plan shared out evenly."""
+@dataclass(frozen=True)
+class _Span:
+    """Progress of one plan and its proof: from where, to where the plan goes, and to where the proof."""
 
-    def __init__(self, progress: Progress, k: int, count: int) -> None:
-        width = (PLANNED - PREPARED) / count
-        self.progress, self.low, self.width = progress, PREPARED + width * k, width
+    progress: Progress
+    begun: float
+    planned: float
+    proved: float
 
-    def tell(self, stage: str, share: float) -> None:
-        """Report a share, 0 to 1, of this access."""
-        self.progress(stage, self.low + self.width * share)
+    def of(self, k: int, count: int) -> Callable[[float], None]:
+        """What one access of several tells its share, 0 to 1, to."""
+        width = (self.planned - self.begun) / count
+        return lambda share: self.progress("plan", self.begun + width * (k + share))
+
+    def proving(self, share: float) -> None:
+        """Report a share, 0 to 1, of the proof."""
+        self.progress("prove", self.planned + (self.proved - self.planned) * share)
 
 
 def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
-          before: Sequence[Side], share: _Share) -> Side:
+          before: Sequence[Side], tell: Callable[[float], None], told: Learned) -> Side:
     """Plan the zones of one access.
 
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
@@ -155,13 +172,13 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     """
     turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
     stock = planning_stock(ready, view)
-    settings = plan_settings(ready, view, stock)
+    settings = replace(plan_settings(ready, view, stock), found=told.along(view.id))
     if turned:
         stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before])
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                    lambda f: share.tell("plan", 0.98 * f), first_step=steps + 1, trimmed=trimmed)
+                    lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
     if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
     return Side(view, made, settings.clearance, stock)

@@ -86,8 +86,17 @@ def in_setup_frame(look: Look, proof: Proof) -> Proof:
     if np.array_equal(look.rotation, np.eye(3)):
         return proof
     return replace(proof, findings=tuple(
-        f if f.point is None else replace(f, point=tuple((np.array(f.point) @ look.rotation).tolist()))
-        for f in proof.findings))
+        replace(f, point=_turned(f.point, look.rotation), tip=_turned(f.tip, look.rotation)) for f in proof.findings))
+
+
+Place = tuple[float, float, float]
+
+
+def _turned(place: Place | None, rotation: F64) -> Place | None:
+    if place is None:
+        return None
+    x, y, z = (np.array(place) @ rotation).tolist()
+    return x, y, z
 
 
 def in_first_frame(side: Side) -> list[Workingstep]:

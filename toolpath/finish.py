@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
@@ -117,7 +118,8 @@ class Finish:
         if runs:
             made.append(tries[-1]._flanked(step_id, runs, every))
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
-        left = [int((t.residual.residual[:self.given] > self.settings.scallop_height).sum()) for t in tries]
+        most = self._aims(self.settings.scallop_height)[:self.given]
+        left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
         best = min(range(len(tries)), key=lambda k: (not made[k], left[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]
         for k, lost in enumerate(tries):
@@ -218,15 +220,15 @@ class Finish:
 
     def walk_again(self, step_id: str, least: float) -> list[Workingstep]:
         """A workingstep for samples with more than ``least`` mm left at which stock was in the way that is gone now."""
-        k = np.flatnonzero(self.met & (self.residual.residual > least))
+        k = np.flatnonzero(self.met & (self.residual.residual > self._aims(least)))
         freed = np.zeros(len(self.met), np.bool_)
         freed[k] = ~self.stock.meets_bodies(self.checks.tips[k], self.field.discs)
         return self._rounds(step_id, freed)
 
     def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
         """All rounds for the samples ``wanted``, as one workingstep."""
-        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths)
-        budget = PASS_SHARE * self.settings.scallop_height
+        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found)
+        budget = self._aims(PASS_SHARE * self.settings.scallop_height)
         failing = np.flatnonzero(wanted & (self.residual.residual > budget))
         for k in range(REFINEMENTS + 2):
             if not len(failing):
@@ -245,9 +247,12 @@ class Finish:
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
-        left = np.flatnonzero(self.residual.residual[:self.given] > self.settings.scallop_height)
+        left = np.flatnonzero((self.residual.residual > self._aims(self.settings.scallop_height))[:self.given])
         name = self.begun_with or self.strategy.name
         return ZonePlan(self.zone, self.step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
+
+    def _aims(self, aim: float) -> F64:
+        return self.settings.found.aims(self.zone.id, aim, len(self.checks.points))
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
@@ -279,7 +284,8 @@ class Finish:
         """Walk a line with the layers above it and measure them."""
         tool, steep = self.field.tool, self.zone.form is Form.STEEP
         before, refused, whole = len(linker.trajectories), linker.refused, False
-        for layer in zigzag.skimmed(line, self.stock, tool, skin, slope, steep):
+        care = self.settings.found.care(tool, line.points)
+        for layer in zigzag.skimmed(line, self.stock, tool, care * skin, care * slope, steep):
             if layer is not line and self._is_known(layer, linker.motions.tolerance):
                 continue  # what the stock still shows there is out of the reach of the tool
             whole = linker.add(layer, thin)

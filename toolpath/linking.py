@@ -20,6 +20,7 @@ from dataclasses import field as fresh
 import numpy as np
 
 from geometry.mesh import F64
+from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.ramp import ease
 from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
@@ -64,12 +65,14 @@ class Linker:
     skipped : lines left out: no safe way in, or stock in the way of shank or holder
     refused : how many of them found no safe way in
     depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
+    found   : what a proof found wrong with an earlier plan
     """
 
     field: TipField
     stock: StockMap
     motions: Motions
     depths: Depths
+    found: Counterexamples = NONE
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
@@ -80,17 +83,30 @@ class Linker:
         """Append one line as a cutting pass; False where no safe way in was found.
 
         Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
-        stands in the way of shank or holder, the line is left out.
+        stands in the way of shank or holder, and where the tool is barred, the line is left out.
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
             return True
         before = len(self.skipped)
-        for piece in self._clear_of_bodies(Line(points, line.closed)):
+        for piece in self._unbarred(Line(points, line.closed)):
             if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
                 self.skipped.append(piece)
                 self.refused += 1
         return len(self.skipped) == before
+
+    def _unbarred(self, line: Line) -> list[Line]:
+        """The pieces of a line along which nothing is in the way; the rest is skipped."""
+        room = LOOK_EVERY * self.field.tool.radius
+        points = dense(line.points, room)
+        barred = self.found.bars(self.field.tool, points)
+        if not barred.any():
+            return self._clear_of_bodies(line)
+        line = Line(points, line.closed)
+        self.skipped.extend(pieces_where(line, barred, 0.0, 0.0))
+        free = [p for p in pieces_where(line, ~barred, 0.0, 0.0) if p.length > 2.0 * room]
+        free = [Line(thinned(p.points, self.motions.tolerance), p.closed) for p in free]
+        return [q for p in free for q in self._clear_of_bodies(p)]
 
     def _clear_of_bodies(self, line: Line) -> list[Line]:
         """The pieces of a line along which shank and holder pass over the stock; the rest is skipped."""
@@ -245,7 +261,9 @@ class Linker:
         dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
         between, and no more than the way that goes level or up works off: to and fro half of what there is.
         """
-        tool, slope = self.field.tool, math.tan(self.motions.ramp_angle) * RAMP_SHARE
+        tool = self.field.tool
+        care = self.found.care(tool, points)
+        slope, skin = care * math.tan(self.motions.ramp_angle) * RAMP_SHARE, care * SKIN * tool.diameter
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
         total = float(s[-1])
         if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
@@ -253,7 +271,7 @@ class Linker:
         lean = _steepest(points if closed else _head(points, 0.5 * over / slope))
         digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
         if closed and digs:
-            rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), SKIN * tool.diameter / total)
+            rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), skin / total)
         if rest <= 0.0:
             return None
         need = over / rest
@@ -268,7 +286,7 @@ class Linker:
             path = self._eased(down[0], lift, 0.0 if digs else lean)
             last = int(np.searchsorted(down[1], need + total - 1e-9))
             return np.ascontiguousarray(path[: last + 1])
-        leg = min(total, max(0.5 * over / slope, 1e-9), SKIN * tool.diameter / slope if digs else math.inf)
+        leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
         legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
         if legs > MOST_LEGS:
             return None

@@ -103,7 +103,7 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    linker = Linker(field, stock, motions_of(cut, settings), depths)
+    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance

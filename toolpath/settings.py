@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.strategies.zigzag import Pattern
 
 
@@ -50,6 +51,7 @@ class PlanSettings:
     either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
     pattern         : of passes over shallow area
     turning         : what the rotary axes can do; None on a machine without
+    found           : what a proof found wrong with the plans before, in the frame of this one
     """
 
     scallop_height: float
@@ -65,3 +67,4 @@ class PlanSettings:
     either_way: bool = False
     pattern: Pattern = Pattern.AUTO
     turning: Turning | None = None
+    found: Counterexamples = NONE

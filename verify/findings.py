@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
+from verify.removal import Moves
 
 MOST = 200
 OF_A_KIND = MOST // len(FindingKind)
@@ -49,12 +50,12 @@ def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
     return [rows for rows in np.split(order, cuts) if len(rows)]
 
 
-def contact_findings(events: F64, feed: NDArray[np.bool_], source: Source, rapid_clearance: float,
+def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance: float,
                      skins: F64) -> list[Finding]:
     """Findings of the events of ``verify.stock``; skins (m,) float64 is the plunge limit of each move, mm."""
     if len(events) == 0:
         return []
-    move, code = events[:, 0].astype(np.int64), events[:, 1].astype(np.int32)
+    move, code, feed = events[:, 0].astype(np.int64), events[:, 1].astype(np.int32), moves.feed
     touching = events[:, 2] > events[:, 3] + 1e-9
     key = code + 16 * touching.astype(np.int32) * feed[move] + 32 * (~feed[move]).astype(np.int32)
     groups = chains(source.program[move], source.line[move], events[:, 4:7], key)
@@ -68,8 +69,16 @@ def contact_findings(events: F64, feed: NDArray[np.bool_], source: Source, rapid
         out.append(Finding(kind, source.names[source.program[m]], int(source.line[m]), None, None,
                            _point(events[r, 4:7]), depth if kind == FindingKind.PLUNGE else max(depth - clearance, 0.0)
                            if depth > clearance else clearance - depth, limit,
-                           f"T{source.tool[m]}: {text}{_span(lines)}", len(rows), near=depth <= clearance))
+                           f"T{source.tool[m]}: {text}{_span(lines)}", len(rows), near=depth <= clearance,
+                           tip=_point(_nearest(moves.start[m], moves.end[m], events[r, 4:7]))))
     return out
+
+
+def _nearest(start: F64, end: F64, place: F64) -> F64:
+    """The place (3,) of a straight move that is nearest to another."""
+    way = end - start
+    size = float(way @ way)
+    return np.asarray(start + (min(max(float((place - start) @ way) / size, 0.0), 1.0) if size > 0.0 else 1.0) * way)
 
 
 def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_clearance: float,

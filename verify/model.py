@@ -130,6 +130,7 @@ class Finding:
     depth : mm, how bad; limit : what would have been allowed
     near  : nothing touches, and the depth is how near it comes
     count : places folded in; area : mm² of samples folded in, 0 where none
+    tip   : mm, where the tip of the tool was, or None where no move is to blame or it is at the point itself
     """
 
     kind: FindingKind
@@ -144,9 +145,11 @@ class Finding:
     count: int = 1
     area: float = 0.0
     near: bool = False
+    tip: tuple[float, float, float] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None}
+        return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None,
+                "tip": list(self.tip) if self.tip else None}
 
 
 @dataclass(frozen=True)

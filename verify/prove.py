@@ -95,7 +95,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     angle = engaged_angles(run.engaged, moves, tools)
-    findings = [*contact_findings(run.events, moves.feed, source, setup.clearance_rapid, skins),
+    findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
                 *table_findings([p.program for p in read], tools, setup),
                 *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),

@@ -10,6 +10,7 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
+from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.levels import Line
 from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion
@@ -301,3 +302,23 @@ def test_a_loop_begins_at_its_nearest_point_and_keeps_its_sense():
     def area(p):
         return 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]))
     assert math.copysign(1, area(got.points)) == math.copysign(1, area(line.points))
+
+
+def test_where_the_tool_is_barred_a_line_is_left_out():
+    link = linker(top=-1.0)
+    link.found = Counterexamples(barred={link.field.tool.id: np.array([[12.0, 10.0, 1.0]])})
+    assert not link.add(straight(5, 20, 10, 1.0))
+    cuts = [t.points for t in link.trajectories if t.motion is Motion.CUT]
+    ends = sorted((float(p[:, 0].min()), float(p[:, 0].max())) for p in cuts)
+    gap = BARRED * link.field.tool.radius
+    assert len(ends) == 2 and ends[0][0] == 5.0 and ends[1][1] == 20.0
+    assert ends[0][1] < 12.0 - gap < 12.0 + gap < ends[1][0] < 12.0 + gap + 1.5
+    assert [float(np.ptp(p.points[:, 0])) > gap for p in link.skipped] == [True]
+    assert link.add(straight(5, 20, 12, 1.0)) and link.passes == 3
+
+
+def test_where_the_tool_dug_ramps_are_at_most_half_as_steep():
+    usual, careful = linker(top=3.0), linker(top=3.0)
+    careful.found = Counterexamples({careful.field.tool.id: np.array([[15.0, 10.0, 1.0]])})
+    assert usual.add(straight(6, 24, 10, 1.0)) and careful.add(straight(6, 24, 10, 1.0))
+    assert np.tan(steepest_cut(careful)) <= CARE * np.tan(RAMP) < np.tan(steepest_cut(usual))

@@ -227,7 +227,7 @@ def _free(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surround
     thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
 
     def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
-        return around.met(tips, axes, tool, thick)
+        return around.met(tips, axes, tool, thick) | settings.found.bars(tool, tips)
 
     dense = piece.at(_places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     met = loaded_at(dense.tips, dense.axes)
@@ -369,6 +369,6 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         axes = np.tile(axis, (len(down), 1))
         if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
             continue
-        if not around.met(down, axes, tool, stock).any():
+        if not (around.met(down, axes, tool, stock) | settings.found.bars(tool, down)).any():
             return np.array([beside + high * axis, beside, tip]), stock == 0.0
     return None

@@ -1,0 +1,127 @@
+"""When a proof finds something, what of it the next plan of the same job can do without.
+
+A plan rests on estimates (``toolpath.counterexamples``), so a proof may find a place or two where one was wrong. These
+are told to the planner and the job is planned again. What points to a fault of the planner and not to an estimate, as a
+gouge or a rapid does, or many findings at once, is not planned again: the job stays unproved and says why.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from service.sides import Look, Program, Side
+from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.motion import Workingstep
+from verify.model import Finding, FindingKind, Proof
+from zones.zoning import ZoneArea
+
+PLANS = 3  # of a job at most
+MOST = 24  # findings: more are no wrong estimates
+MET = (FindingKind.COLLISION, FindingKind.RUBBING)
+STEP = re.compile(r"^\((S\d+)\b")
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What proofs found so far.
+
+    found : Counterexamples by access id, in the frame of the access
+    notes : in words, for the report
+    """
+
+    found: Mapping[str, Counterexamples] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def along(self, access: str) -> Counterexamples:
+        """What was found along an access."""
+        return self.found.get(access, NONE)
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A plan and its proof.
+
+    sides    : as planned; programs : written from them
+    zones    : of the job; owner : (n,) int32, sample -> its zone from 1, before any was given up
+    answered : (n,) int32, the same without what the plan gave up
+    look     : frame of the proof; proof : in it
+    """
+
+    sides: Sequence[Side]
+    programs: Sequence[Program]
+    zones: Sequence[ZoneArea]
+    owner: NDArray[np.int32]
+    answered: NDArray[np.int32]
+    look: Look
+    proof: Proof
+
+
+def learned(before: Learned, tried: Attempt) -> Learned | None:
+    """What to plan with next; None where the proof found nothing, or something that planning again is no answer to.
+
+    A place at which the tool dug is gone to with care next time; one at which it does so again, or beside a wall, or
+    at which it met something, is barred to it.
+    """
+    findings = tried.proof.findings
+    if not 0 < len(findings) <= MOST or len(findings) < sum(tried.proof.counts.values()):
+        return None
+    out, notes = dict(before.found), list(before.notes)
+    for f in findings:
+        if f.kind is FindingKind.RESIDUAL and f.depth > 0.0:
+            continue  # all of them are told below, sample by sample
+        step = _step_of(f, tried.programs)
+        if step is None or f.tip is None or f.kind not in (FindingKind.PLUNGE, *MET):
+            return None
+        side, made = next((s, t) for s in tried.sides for t in s.made.steps if t is step)
+        tip = np.array(f.tip) @ tried.look.rotation @ side.view.rotation.T
+        old = out.get(side.view.id, NONE)
+        careful = f.kind is FindingKind.PLUNGE and made.strategy != "flank" and old.care(made.tool, tip[None]) == 1.0
+        if careful:
+            old = replace(old, dug=_with(old.dug, made.tool.id, tip))
+        else:
+            old = replace(old, barred=_with(old.barred, made.tool.id, tip))
+        out[side.view.id] = old
+        x, y, z = f.point or f.tip
+        notes.append(f"planned again, {'with care' if careful else 'and kept away'} near X{x:.2f} Y{y:.2f} Z{z:.2f} "
+                     f"({made.id}): {f.message}")
+    left = np.flatnonzero((tried.answered > 0) & ~tried.proof.proved)
+    for k in np.unique(tried.answered[left]).tolist():
+        zone = tried.zones[k - 1]
+        rows = np.flatnonzero(np.isin(np.flatnonzero(tried.owner == k), left))
+        old = out.get(zone.access, NONE)
+        none = np.zeros(0, np.int64)
+        known, lost = old.left.get(zone.id, none), old.lost.get(zone.id, none)
+        again = np.intersect1d(known, rows)
+        out[zone.access] = replace(old, left={**old.left, zone.id: np.union1d(known, rows)},
+                                   lost={**old.lost, zone.id: np.union1d(lost, again)})
+        if len(again) < len(rows):
+            notes.append(f"planned again, {zone.id} finer at {len(rows) - len(again)} places: more stayed than was "
+                         "planned")
+        if len(again):
+            notes.append(f"planned again, {len(again)} places of {zone.id} given up: more stayed there again")
+    return Learned(out, tuple(notes))
+
+
+def _with(places: Mapping[str, F64], tool: str, tip: F64) -> Mapping[str, F64]:
+    return {**places, tool: np.vstack([places.get(tool, np.zeros((0, 3))), tip])}
+
+
+def _step_of(f: Finding, programs: Sequence[Program]) -> Workingstep | None:
+    """The workingstep a finding's line belongs to."""
+    program = next((p for p in programs if p.name == f.program), None)
+    if program is None or f.line <= 0:
+        return None
+    for text in reversed(program.text.splitlines()[:f.line]):
+        named = STEP.match(text)
+        if named is not None:
+            return next((s for s in program.work.steps if s.id == named[1]), None)
+    return None
+
+
+__all__ = ["PLANS", "Attempt", "Learned", "learned"]

@@ -1,0 +1,92 @@
+"""What the next plan of a job is told of what a proof found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from service.again import MOST, Attempt, Learned, learned
+from service.sides import Look
+from tests.hand_parts import SHORT_TOOLS
+from toolpath.counterexamples import BARRED, CARE, STRICTER, Counterexamples
+from toolpath.levels import Line
+from verify.model import Finding, FindingKind
+
+TOOL = SHORT_TOOLS["flat"]
+TILT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # setup frame -> access
+TEXT = "%\n(S01 several zones roughing layers T1: F1)\nG1 X1\n(S02 Z1 finishing flank T1: F1)\nG1 X2\nX3\n"
+
+
+def found(kind, line=3, tip=(1.0, 2.0, 3.0), depth=0.3, near=False):
+    return Finding(kind, "p.ngc" if line else "", line, None, None, (9.0, 9.0, 9.0), depth, 0.1, "too much", near=near,
+                   tip=tip)
+
+
+def attempt(*findings, counts=None, proved=(True,) * 6, answered=(1, 1, 0, 2, 2, 2)):
+    steps = [SimpleNamespace(id="S01", tool=TOOL, strategy="layers"),
+             SimpleNamespace(id="S02", tool=TOOL, strategy="flank")]
+    side = SimpleNamespace(view=SimpleNamespace(id="A1", rotation=TILT), made=SimpleNamespace(steps=steps))
+    program = SimpleNamespace(name="p.ngc", text=TEXT, work=SimpleNamespace(steps=steps))
+    zones = [SimpleNamespace(id="Z1", access="A1"), SimpleNamespace(id="Z2", access="A1")]
+    proof = SimpleNamespace(findings=findings, counts={"any": len(findings)} if counts is None else counts,
+                            proved=np.array(proved))
+    owner = np.array([1, 1, 1, 2, 2, 2])
+    return Attempt([side], [program], zones, owner, np.array(answered), Look("A1", np.eye(3), None), proof)
+
+
+def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all():
+    once = learned(Learned(), attempt(found(FindingKind.PLUNGE)))
+    there = np.array([[1.0, 3.0, -2.0]])  # in the frame of the access
+    assert np.allclose(once.along("A1").dug[TOOL.id], there) and not once.along("A1").barred
+    assert "S01" in once.notes[0] and "with care" in once.notes[0] and "X9.00 Y9.00 Z9.00" in once.notes[0]
+    twice = learned(once, attempt(found(FindingKind.PLUNGE, tip=(1.1, 2.0, 3.0))))
+    assert np.allclose(twice.along("A1").barred[TOOL.id], [[1.1, 3.0, -2.0]])
+    assert len(twice.notes) == 2 and "kept away" in twice.notes[1]
+    assert not once.along("A2").dug
+
+
+@pytest.mark.parametrize(("kind", "line"), [(FindingKind.COLLISION, 3), (FindingKind.RUBBING, 3),
+                                            (FindingKind.PLUNGE, 5)])
+def test_what_was_met_or_dug_beside_a_wall_bars_the_tool(kind, line):
+    told = learned(Learned(), attempt(found(kind, line)))
+    assert len(told.along("A1").barred[TOOL.id]) == 1 and not told.along("A1").dug
+
+
+@pytest.mark.parametrize("tried", [
+    attempt(), attempt(found(FindingKind.GOUGE)), attempt(found(FindingKind.RAPID)),
+    attempt(found(FindingKind.PLUNGE), found(FindingKind.GOUGE)), attempt(found(FindingKind.PLUNGE, tip=None)),
+    attempt(found(FindingKind.PLUNGE, line=1)), attempt(*[found(FindingKind.PLUNGE)] * (MOST + 1)),
+    attempt(found(FindingKind.PLUNGE), counts={"plunge": 300}), attempt(found(FindingKind.RESIDUAL, 0, None, -0.1)),
+    attempt(found(FindingKind.PROGRAM))])
+def test_a_fault_of_the_planner_is_not_planned_away(tried):
+    assert learned(Learned(), tried) is None
+
+
+def test_samples_with_more_than_was_planned_are_told_zone_by_zone():
+    residual = found(FindingKind.RESIDUAL, 0, None)
+    told = learned(Learned(), attempt(residual, proved=(True, False, False, True, True, False)))
+    left = told.along("A1").left  # the third is one that the plan gave up itself
+    assert {k: v.tolist() for k, v in left.items()} == {"Z1": [1], "Z2": [2]}
+    assert told.along("A1").aims("Z2", 0.02, 4).tolist() == [0.02, 0.02, 0.02 * STRICTER, 0.02]
+    again = learned(told, attempt(residual, proved=(True, True, True, False, True, True)))
+    assert again.along("A1").left["Z2"].tolist() == [0, 2] and again.along("A1").left["Z1"].tolist() == [1]
+    assert not len(again.along("A1").lost["Z2"])
+    lost = learned(again, attempt(residual, proved=(True, True, True, False, True, True)))
+    assert lost.along("A1").lost["Z2"].tolist() == [0] and "given up" in lost.notes[-1]
+    assert lost.along("A1").aims("Z2", 0.02, 3).tolist() == [-np.inf, 0.02, 0.02 * STRICTER]
+
+
+def test_care_and_bars_are_round_the_place_and_of_the_tool():
+    r = TOOL.radius
+    told = Counterexamples({TOOL.id: np.array([[0.0, 0.0, 5.0]])}, {TOOL.id: np.array([[0.0, 0.0, 5.0]])})
+    assert told.care(TOOL, np.array([[3.0 * r, 0.0, 0.0], [0.9 * r, 0.0, 0.0]])) == CARE
+    assert told.care(TOOL, np.array([[1.1 * r, 0.0, 0.0]])) == 1.0
+    assert told.care(TOOL, np.array([[-9.0 * r, 0.5 * r, 0.0], [9.0 * r, 0.5 * r, 0.0]])) == CARE
+    line = Line(np.linspace([-r, 0.0, 5.0], [r, 0.0, 5.0], 201), False)
+    away = np.abs(line.points[:, 0])
+    assert (told.bars(TOOL, line.points) == (away <= BARRED * r)).all()
+    other = replace(TOOL, id="T77")
+    assert told.care(other, np.zeros((1, 3))) == 1.0 and not told.bars(other, line.points).any()
