@@ -286,9 +286,12 @@ class Finish:
         before, refused, whole = len(linker.trajectories), linker.refused, False
         care = self.settings.found.care(tool, line.points)
         for layer in zigzag.skimmed(line, self.stock, tool, care * skin, care * slope, steep):
-            if layer is not line and self._is_known(layer, linker.motions.tolerance):
-                continue  # what the stock still shows there is out of the reach of the tool
-            whole = linker.add(layer, thin)
+            if layer is line:
+                whole = linker.add(line, thin)
+            else:  # where the tool has been before, what the stock still shows is out of its reach
+                way = Line(thinned(layer.points, linker.motions.tolerance), layer.closed)
+                for rest in self._unwalked(way):
+                    linker.add(rest, AS_IT_IS)
             if linker.refused > refused:  # what it would have taken is too much for the layer below
                 break
         cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
@@ -296,10 +299,6 @@ class Finish:
             self.residual.cut(points, tool)
         for points in [line.points, *cuts] if whole else cuts:
             self.walked.add(points)
-
-    def _is_known(self, line: Line, tolerance: float) -> bool:
-        """Whether this tool has walked all of a line already, as it is written."""
-        return not self.walked.fresh(Line(thinned(line.points, tolerance), line.closed)).any()
 
     def _unwalked(self, line: Line) -> list[Line]:
         """What of a line was not walked before by this tool; the rest is only measured, it would leave the same.

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
-from toolpath.finish import Finish, _Strategy
+from toolpath import finish
+from toolpath.counterexamples import NONE
+from toolpath.finish import OVERLAP, Finish, _Strategy
 from toolpath.levels import Line, true_runs
 from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
@@ -123,6 +125,29 @@ def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
     other = Line(corners + [0.0, 0.0, 0.5], True)
     stub._add(linker, [other], 0)
     assert len(added) == 2
+
+
+def test_of_a_layer_over_a_line_only_what_was_not_walked_before_is_walked(monkeypatch):
+    """Turns of a spiral along one border have layers that share a stretch: seed 103 ran ten moves twice."""
+    lower, layer = line(*range(31)), Line(line(*range(31)).points + [0.0, 0.0, 0.2], False)
+    monkeypatch.setattr(finish.zigzag, "skimmed", lambda *_: [layer, lower])
+    added = []
+
+    class Stub(Finish):
+        def __init__(self):
+            self.field, self.walked, self.stock = SimpleNamespace(tool=SHORT_TOOLS["flat"]), Walked(), None
+            self.zone = SimpleNamespace(form=None)
+            self.settings = SimpleNamespace(found=NONE)
+            self.residual = SimpleNamespace(cut=lambda points, tool: None)
+
+    stub = Stub()
+    stub.walked.add(layer.points[8:20])
+    linker = SimpleNamespace(motions=SimpleNamespace(tolerance=1e-9), trajectories=[], refused=0,
+                             add=lambda way, thin: added.append(way.points) or True)
+    stub._add_one(linker, lower, 0.1, 0.05, None)
+    whole = [p for p in added if len(p) == 31]
+    assert len(added) == 3 and len(whole) == 1 and whole[0] is lower.points
+    assert [len(p) for p in added[:2]] == [8 + 1 + OVERLAP, 31 - 19 + OVERLAP]
 
 
 def test_turns_of_a_line_that_fall_on_one_another_are_found():
