@@ -36,6 +36,7 @@ FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 MOST_LEGS = 400
+MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
@@ -187,7 +188,9 @@ class Linker:
         if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return np.vstack([entry, start]), points, True
         ramp = self._ramp(points, closed, over)
-        return None if ramp is None else (entry, ramp, True)
+        if ramp is None or self.depths.known(ramp) > MOST_AGAIN:
+            return None  # what is known of a way down can be left out only where it is come to from above
+        return entry, ramp, True
 
     def _from_air(self, points: F64) -> Way | None:
         start, tool = points[0], self.field.tool

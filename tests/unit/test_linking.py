@@ -322,3 +322,17 @@ def test_where_the_tool_dug_ramps_are_at_most_half_as_steep():
     careful.found = Counterexamples({careful.field.tool.id: np.array([[15.0, 10.0, 1.0]])})
     assert usual.add(straight(6, 24, 10, 1.0)) and careful.add(straight(6, 24, 10, 1.0))
     assert np.tan(steepest_cut(careful)) <= CARE * np.tan(RAMP) < np.tan(steepest_cut(usual))
+
+
+@pytest.mark.parametrize("known", [0, 3, 4, 9])
+def test_straight_on_no_way_down_is_gone_again(known):
+    """Ten moves of it run twice were what the proof found with seed 103 of the sweep."""
+    x = np.linspace(8.0, 22.0, 29)
+    points = np.column_stack([x, np.full(29, 10.0), np.full(29, 2.0)])
+    link = linker(top=3.0)
+    link.at = np.array([7.0, 10.0, 2.6])
+    link.stock.cut(np.array([[3.0, 10.0, 2.6], [7.0, 10.0, 2.6]]), link.field.tool)
+    entry, ramp, joined = link._straight_on(points, False)
+    assert joined and len(ramp) > len(points) + 9 and ramp[0, 2] == pytest.approx(2.6)
+    link.depths.cut(ramp[:known + 1])
+    assert (link._straight_on(points, False) is None) == (known > 3)
