@@ -8,6 +8,7 @@ import pytest
 from geometry.nurbs import NurbsSurface
 from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, plan_part, slope_field, tool
+from toolpath.counterexamples import NONE
 from toolpath.family import Target
 from toolpath.finish import Finish, _Strategy
 from toolpath.isoparametric import Flank
@@ -154,7 +155,8 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
     class Stub(Finish):
         def __init__(self):
             self.checks, self.given, self.walked = SimpleNamespace(points=np.zeros((4, 3))), 4, Walked()
-            self.settings, self.stock = SimpleNamespace(scallop_height=0.02), SimpleNamespace(become=lambda _: None)
+            self.settings = SimpleNamespace(scallop_height=0.02, found=NONE)
+            self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
             self.strategy, self.depths = _Strategy("zlevel", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
 
         def _along_borders(self):
