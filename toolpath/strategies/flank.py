@@ -241,7 +241,7 @@ def _free(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surround
     down = _descends(dense, slope, DIP * SKIN * tool.diameter)
     at = np.arange(len(met), dtype=np.float64)
     uphill = [part.reversed() for part in dense.parts(binary_dilation(down) & ~met, at, least)]
-    parts = [_begun_level(part, slope, least) for part in (*dense.parts(~(met | down), at, least), *uphill)]
+    parts = [*dense.parts(~(met | down), at, least), *(_begun_level(part, slope, least) for part in uphill)]
     return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
             for p in parts if p is not None]
 
