@@ -22,6 +22,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
+from toolpath.leaning import Surroundings
 from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -145,7 +146,7 @@ class Finish:
         if turning is None or self.zone.form is not Form.STEEP or not (self.faces and len(self.checks.points)):
             return (), ()
         met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
-        around = flank.Surroundings(met, turning, self.stock.copied(), field.discs, field.clear)
+        around = Surroundings(met, turning, self.stock.copied(), field.discs, field.clear)
         walls = [wall for face in self.faces for wall in face.alone or (face,)]
         found = flank.flanked(walls, self.checks, field.tool, self.cut, settings, around, field.allowance)
         return found.runs, tuple({"strategy": flank.NAME, "reason": reason} for reason in found.refused)

@@ -35,6 +35,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.isoparametric import Laid
 from toolpath.levels import true_runs
+from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.posed import Blocked
 from toolpath.residual import leaning_depths
 
@@ -57,9 +58,6 @@ LEFT_SHARE = 0.95  # of a band must keep to what may be left
 ENDS = 1e-3  # of the length: what the way on beyond an end is taken from
 DENSE, MOST_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
 FINER_POSES = 4  # trials, each with more poses
-RAISES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the radius, along the axis, where the end of the tool is in the way
-RISE = 0.3  # mm a mm: how fast a pass is raised and lowered again
-LEAST_PIECE = 1.0  # of the radius: what is shorter is left to others
 
 
 @dataclass(frozen=True)
@@ -69,52 +67,6 @@ class Wanted:
     left: float
     depth: float
     chord: float
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A pass, or part of one, as the tool walks it.
-
-    tips : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
-    away : (k, 3) float64, unit, out of the wall
-    reach : mm from the tip, how far up the flank is at work
-    """
-
-    tips: F64
-    axes: F64
-    away: F64
-    reach: float
-
-    def reversed(self) -> Piece:
-        """The same, walked the other way."""
-        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1], self.reach)
-
-    def at(self, places: F64) -> Piece:
-        """The piece through other poses; places : (m,) numbers of its own poses, those between them by fractions."""
-        k = np.clip(places.astype(np.int64), 0, len(self.tips) - 2)
-        share = (places - k)[:, None]
-        tips, axes, away = ((1.0 - share) * a[k] + share * a[k + 1] for a in (self.tips, self.axes, self.away))
-        axes, away = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (axes, away))
-        return Piece(tips, axes, away, self.reach)
-
-    def parts(self, good: NDArray[np.bool_], places: F64, least: float) -> list[Piece]:
-        """What of it goes through good places only, each ``least`` mm or more at the tip.
-
-        good   : (m,) bool, whether it may go through a place
-        places : (m,) ascending, from 0 to the last pose, as for ``at``
-        """
-        out = []
-        for i, j in true_runs(good):
-            own = np.arange(np.floor(places[i]) + 1.0, np.ceil(places[j - 1]))
-            part = self.at(np.concatenate([[places[i]], own, [places[j - 1]]]))
-            if j - i > 1 and float(np.linalg.norm(np.diff(part.tips, axis=0), axis=1).sum()) >= least:
-                out.append(part)
-        return out
-
-    @property
-    def top(self) -> float:
-        """mm, the highest place of the flank at work."""
-        return float((self.tips[:, 2] + self.reach * self.axes[:, 2]).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,29 +257,6 @@ def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], sta
     return ends[0], ends[1]
 
 
-def thinned_poses(tips: F64, axes: F64, reach: float, tolerance: float) -> NDArray[np.int64]:
-    """Rows (k,) of poses that will do: between them tip and the place ``reach`` mm up the axis stay within a tolerance.
-
-    tips, axes : (n, 3) float64, mm and unit, evenly spaced; tolerance : mm
-    """
-    way = np.hstack([tips, tips + reach * axes])
-    keep = np.zeros(len(way), np.bool_)
-    keep[[0, -1]] = True
-    todo = [(0, len(way) - 1)]
-    while todo:
-        a, b = todo.pop()
-        if b - a < 2:
-            continue
-        share = np.arange(1, b - a)[:, None] / (b - a)
-        off = way[a + 1:b] - ((1.0 - share) * way[a] + share * way[b])
-        miss = np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1))
-        worst = int(miss.argmax())
-        if miss[worst] > tolerance:
-            keep[a + 1 + worst] = True
-            todo += [(a, a + 1 + worst), (a + 1 + worst, b)]
-    return np.flatnonzero(keep)
-
-
 def _fitted(band: Band, wanted: Wanted) -> Band:
     """A band with its shift, standing off as far as what it sweeps wants."""
     wall, tool, low, high = band.wall, band.tool, band.low, band.high
@@ -407,31 +336,3 @@ def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radiu
     places = begin[:, None] + HEIGHTS[:, None] * axis[:, None]
     miss = np.ptp(wall.off(places.reshape(-1, 3)).reshape(len(xi), -1), axis=1)
     return np.asarray(miss), np.asarray(axis / np.linalg.norm(axis, axis=1, keepdims=True))
-
-
-def raised_poses(tip: F64, axis: F64, blocked: Blocked, radius: float,
-                 most: float) -> tuple[F64, NDArray[np.bool_]]:
-    """By how much (n,) mm poses are raised along their axes, and (n,) bool where they are not free even so.
-
-    tip, axis    : (n, 3) float64, mm and unit, in the order of the pass, close together
-    blocked      : whether poses are not free
-    radius, most : mm; it is raised in shares of the radius, by ``most`` at most, and evenly before and behind
-    """
-    need = np.full(len(tip), np.nan)
-    todo = np.arange(len(tip))
-    for share in RAISES:
-        if share * radius > most or not len(todo):
-            break
-        met = blocked(tip[todo] + share * radius * axis[todo], axis[todo])
-        need[todo[~met]] = share * radius
-        todo = todo[met]
-    # what is met may begin before the pose that meets it
-    out = maximum_filter1d(np.nan_to_num(need), 3, mode="nearest")
-    way = RISE * np.linalg.norm(np.diff(tip, axis=0), axis=1)
-    for order in (range(1, len(out)), range(len(out) - 2, -1, -1)):
-        for k in order:
-            before, gone = (k - 1, way[k - 1]) if order.step > 0 else (k + 1, way[k])
-            out[k] = max(out[k], out[before] - gone)
-    met = np.isnan(need)
-    met[~met] = blocked((tip + out[:, None] * axis)[~met], axis[~met])
-    return out, met

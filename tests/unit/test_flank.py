@@ -8,7 +8,8 @@ import pytest
 import toolpath.flank as flank
 from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
-from toolpath.flank import Wall, Wanted, bands, thinned_poses
+from toolpath.flank import Wall, Wanted, bands
+from toolpath.piece import Piece, thinned_poses
 from toolpath.residual import leaning_depths
 
 ASKED = Wanted(0.02, 0.002, 0.002)
@@ -246,7 +247,7 @@ def test_a_pass_in_parts_goes_where_it_went_and_through_good_places_only():
     around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(5)])
     axes = 0.1 * around + np.array([0.0, 0.0, 1.0])
     axes /= np.linalg.norm(axes, axis=1)[:, None]
-    whole = flank.Piece(10.0 * around, axes, around, 8.0)
+    whole = Piece(10.0 * around, axes, around, 8.0)
     at = np.linspace(0.0, 4.0, 41)
     dense = whole.at(at)
     assert dense.tips[::10] == pytest.approx(whole.tips) and dense.axes[::10] == pytest.approx(whole.axes)

@@ -1,13 +1,13 @@
-"""Flank passes as motions: what the stock lets through, and how fast tip and flank go."""
+"""Passes of a leaning tool as motions: what the stock lets through, and how fast tip and flank go."""
 
 import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.flank import Piece
+from toolpath.leaning import LEAST_PACE, _begun_level, _descends, _steady, loaded, paced
+from toolpath.piece import Piece
 from toolpath.stock import StockMap
-from toolpath.strategies.flank import LEAST_PACE, _begun_level, _descends, _steady, loaded, paced
 from zones.reach import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0

@@ -1,0 +1,321 @@
+"""Passes of a leaning tool as motions: what of them is free of stock, their feeds, their ways in and out.
+
+A pass is one step of work: the tool comes down along its own axis beside the beginning, goes to it, along the pass, off
+it, and up along its axis again; where it turns to the next one it is outside of everything. What it would meet of part,
+fixtures and stock is asked pose by pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.levels import true_runs
+from toolpath.motion import Motion, Trajectory
+from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.posed import Blocked
+from toolpath.settings import CutData, PlanSettings, Turning
+from toolpath.stock import SKIN, StockMap
+from zones.reach import Clearances, Disc
+
+LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most
+MOST_LEAD = 1.5  # mm
+THICK = 0.12  # of the diameter: what a leaning tool may take off at once
+LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
+IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
+UP_Z = np.array([0.0, 0.0, 1.0])
+ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
+STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
+DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
+CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
+LOADED = "there is more stock in its way than a leaning tool may take off"
+STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
+LEAST_FEED = 0.1  # mm/min
+LEAST_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What a leaning tool must not meet, access frame.
+
+    enters  : whether it enters part or fixtures
+    turning : what the machine can do
+    stock   : StockMap as it stands; passes are taken off it, one after the other
+    discs   : shank and holder with their clearance
+    clear   : Clearances
+    """
+
+    enters: Blocked
+    turning: Turning
+    stock: StockMap
+    discs: tuple[Disc, ...]
+    clear: Clearances
+
+    def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
+        """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
+        low = lowest(tips, axes, tool, self.discs, self.turning.up)
+        return self.enters(tips, axes) | ~self.turning.stands(axes) | (low < self.turning.table)
+
+    def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float) -> NDArray[np.bool_]:
+        """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank."""
+        return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """What passes of a leaning tool would be.
+
+    runs    : the trajectories of each pass, in the order they are walked
+    refused : why there are no others, in words
+    """
+
+    runs: tuple[tuple[Trajectory, ...], ...]
+    refused: tuple[str, ...]
+
+
+def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, settings: PlanSettings,
+            around: Surroundings) -> Runs:
+    """Passes as far as they can be walked one after the other, each off the stock that those before it leave.
+
+    found  : name of the face and pass, for each
+    around : Surroundings; its stock is taken off
+    """
+    runs, refused = [], []
+    for name, piece in found:
+        parts = free_parts(piece, tool, settings, around)
+        if not parts:
+            refused.append(f"{name}: {LOADED}")
+        for part in parts:
+            made = with_ways(part, tool, cut, settings, around)
+            if isinstance(made, str):
+                refused.append(f"{name}: {made}")
+                continue
+            runs.append(made)
+            for t in made:
+                if t.motion is Motion.CUT and t.axes is not None:
+                    around.stock.cut_leaning(t.points, t.axes, tool)
+    return Runs(tuple(runs), tuple(dict.fromkeys(refused)))
+
+
+def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64) -> F64:
+    """(n,) float64, mm: how low a tool reaches along ``up`` (3,), with shank and holder grown by their clearance.
+
+    tips, axes : (n, 3) float64, mm and unit, leaning less than 90 degrees off ``up``
+    """
+    rise = axes @ up
+    lean = np.sqrt(np.maximum(1.0 - rise * rise, 0.0))
+    out = tool.corner_radius * (rise - 1.0) - (tool.radius - tool.corner_radius) * lean
+    for d in discs:
+        out = np.minimum(out, d.height * rise - d.radius * lean)
+    return np.asarray(tips @ up + out)
+
+
+def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], clear: Clearances,
+           thick: float) -> NDArray[np.bool_]:
+    """(n,) bool: poses at which stock stands in neck, shank or holder, or deeper in the cutting part than ``thick`` mm.
+
+    Under the end of the tool that is no more than the skin a way down may take.
+
+    tips, axes : (n, 3) float64, mm and unit
+
+    Bodies are places on rings, two lattice steps apart; stock is what the nearest node shows, half a cell aside.
+    Less than 1.5 steps deep the cutting part is not asked: nodes in the wall are there. Where that is more than twice
+    ``thick`` the lattice is too coarse to tell, and every pose counts as loaded.
+    """
+    step = stock.lattice.step
+    deep, spacing = max(thick, CELLS * step), 2.0 * step
+    if thick > 0.0 and deep > 2.0 * thick:
+        return np.ones(len(tips), np.bool_)
+    room = max((stock.highest - float(tips[:, 2].min())) / max(float(axes[:, 2].min()), 1e-3), 0.0)
+    corner, flat = tool.corner_radius, tool.radius - tool.corner_radius
+
+    def heights(begin: float, end: float) -> F64:
+        end = max(min(end, room + max(d.radius for d in discs) if discs else room + tool.radius), begin)
+        return np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)
+
+    flank, bottom = [np.zeros((0, 3))], max(min(thick, SKIN * tool.diameter), CELLS * step)
+    for h in heights(min(bottom, tool.flute_length), tool.flute_length).tolist():
+        low = max(corner - h, 0.0)
+        if corner > bottom and low > corner - bottom:
+            continue
+        at = flat + math.sqrt((corner - bottom) ** 2 - low * low) if corner > bottom else tool.radius
+        at = max(min(at, tool.radius - deep), 0.0)
+        flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
+    bodies = [np.zeros((0, 3))]
+    outer = [(0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
+             (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
+             *((d.radius, d.height, math.inf) for d in discs)]
+    for radius, begin, end in outer:
+        for h in heights(begin, end).tolist():
+            bodies += [_ring(r, h, spacing) for r in np.linspace(0.0, radius, int(np.ceil(radius / (4.0 * step))) + 1)]
+    return stock.stands_in(tips, axes, np.vstack(flank), np.vstack(bodies))
+
+
+def _ring(radius: float, height: float, spacing: float) -> F64:
+    """(k, 3) mm: places on a ring round the axis."""
+    count = max(int(np.ceil(2.0 * np.pi * radius / spacing)), 1)
+    at = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([radius * np.cos(at), radius * np.sin(at), np.full(count, height)])
+
+
+def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
+    """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
+
+    Over what stands on the floor it is raised along its axis. Where it goes down steeper than the ramp, as behind what
+    it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill.
+    """
+    thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
+
+    def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
+        return around.met(tips, axes, tool, thick) | settings.found.bars(tool, tips)
+
+    dense = piece.at(_places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
+    met = loaded_at(dense.tips, dense.axes)
+    if met.any():
+        up, met = raised_poses(dense.tips, dense.axes,
+                               lambda tips, axes: loaded_at(tips, axes) | around.blocked(tips, axes, tool),
+                               tool.radius, piece.reach)
+        dense = replace(dense, tips=dense.tips + up[:, None] * dense.axes)
+        met = binary_dilation(met)
+    slope = math.tan(settings.ramp_angle)
+    down = _descends(dense, slope, DIP * SKIN * tool.diameter)
+    at = np.arange(len(met), dtype=np.float64)
+    uphill = [part.reversed() for part in dense.parts(binary_dilation(down) & ~met, at, least)]
+    parts = [*dense.parts(~(met | down), at, least), *(_begun_level(part, slope, least) for part in uphill)]
+    return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
+            for p in parts if p is not None]
+
+
+def _begun_level(piece: Piece, slope: float, least: float) -> Piece | None:
+    """A part without what of either end goes down along the axis steeper than ``slope``; None if under ``least`` mm.
+
+    There is fresh stock at an end: over the brink of a valley the tool would dig into it however short the way is.
+    """
+    steep = _steps_down(piece, slope)[1]
+    level = np.flatnonzero(~steep)
+    if not len(level):
+        return None
+    kept = piece.at(np.arange(level[0], level[-1] + 2, dtype=np.float64))
+    return kept if float(np.linalg.norm(np.diff(kept.tips, axis=0), axis=1).sum()) >= least else None
+
+
+def _steps_down(piece: Piece, slope: float) -> tuple[F64, NDArray[np.bool_]]:
+    """(n - 1,) mm that each step goes down along the axis, and (n - 1,) bool whether steeper than ``slope``."""
+    way, axis = np.diff(piece.tips, axis=0), 0.5 * (piece.axes[1:] + piece.axes[:-1])
+    down = np.asarray(-(way * axis).sum(axis=1))
+    return down, down > slope * np.linalg.norm(way + down[:, None] * axis, axis=1) + STEEPER
+
+
+def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
+    """(n,) bool: poses on a way down along the axis that is steeper than ``slope`` and takes more than ``most`` mm."""
+    down, steep = _steps_down(piece, slope)
+    out = np.zeros(len(piece.tips), np.bool_)
+    for i, j in true_runs(steep):
+        out[i:j + 1] |= down[i:j].sum() > most
+    return out
+
+
+def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
+              around: Surroundings) -> tuple[Trajectory, ...] | str:
+    """A pass with its ways in and out, or why there is none, in words."""
+    thick = THICK * tool.diameter
+    walked = around.turning.along(piece.tips, piece.axes)
+    if walked is None:
+        return "the rotary axes do not get along it"
+    tips, axes, least = walked
+    feeds = paced(tips, axes, piece.reach, cut.feed, least)
+    if feeds is None:
+        return "the tip would all but stand while the flank goes round it"
+    dense = Piece(tips, axes, axes, piece.reach).at(_places(tips, axes, piece.reach, LOOK * tool.radius))
+    if around.met(dense.tips, dense.axes, tool, thick).any():
+        return LOADED
+    ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
+    if ways[0] is None or ways[1] is None:
+        return "the tool does not get there along its own axis"
+    (first, clear), (last, free) = ways[0], ways[1]
+    last = last[::-1]
+    out: list[Trajectory] = []
+
+    def go(motion: Motion, points: F64, feed: float, axis: F64) -> None:
+        if float(np.linalg.norm(points[-1] - points[0])) > 1e-6:
+            out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
+
+    a, b = axes[0], axes[-1]
+    high = float((first[0] - first[1]) @ a)
+    slow = first[1] + min(IN_FRONT, high) * a
+    go(Motion.APPROACH, np.array([first[0], slow]), cut.link_feed if clear else cut.plunge_feed, a)
+    go(Motion.APPROACH, np.array([slow, first[1]]), cut.plunge_feed, a)
+    go(Motion.CONNECT, first[1:], cut.feed, a)
+    for i, j in _steady(feeds):
+        out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
+    go(Motion.CONNECT, last[:2], cut.feed, b)
+    go(Motion.LIFT, last[1:], cut.link_feed if free else cut.feed, b)
+    return tuple(out)
+
+
+def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | None:
+    """(n - 1,) mm/min of the tip, so that no place of the flank goes faster than ``feed`` and the machine keeps up.
+
+    tips, axes : (n, 3) float64, mm and unit
+    reach      : mm from the tip, how far up the flank is at work
+    least      : (n - 1,) minutes each block takes the machine
+
+    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake. On a straight move of the
+    tip with an evenly turning axis no place between tip and ``reach`` goes farther than the farther of both ends.
+    """
+    gone = [np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)]
+    minutes = np.maximum(gone[0], gone[1]) / feed
+    own = gone[0] / np.maximum(minutes, 1e-12)
+    if gone[0].sum() < LEAST_PACE * feed * minutes.sum():
+        return None
+    out = np.minimum(own, gone[0] / np.maximum(least, 1e-12))
+    return np.maximum(np.minimum(out, feed), LEAST_FEED)
+
+
+def _steady(feeds: F64) -> list[tuple[int, int]]:
+    """Runs of blocks (first, one past the last) whose feeds are within a step of ``STEADY``."""
+    level = np.floor(np.log(feeds / feeds.max()) / math.log(STEADY) + 1e-9)
+    at = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(feeds)]
+    return list(zip(at[:-1], at[1:], strict=True))
+
+
+def _places(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
+    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
+    gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
+    counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
+    return np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
+
+
+def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
+            thick: float) -> tuple[F64, bool] | None:
+    """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
+
+    Off the wall where there is room for that; else straight down along the flank, where the end of the tool is round
+    enough not to dig up what stands at the wall.
+    """
+    axis, tip = piece.axes[0], piece.tips[0]
+    aside = piece.away[0] - (piece.away[0] @ axis) * axis
+    aside /= np.linalg.norm(aside)
+    room = min(LEAD * tool.radius, MOST_LEAD)
+    down_the_wall = [(0.0, thick)] if ROUND_END * tool.corner_radius >= thick else []
+    for lead, stock in ((room, 0.0), (0.25 * room, 0.0), *down_the_wall):
+        beside = tip + lead * aside
+        dip = tip[2] - float(lowest(tip[None], axis[None], tool, around.discs, UP_Z)[0])
+        high = (settings.clearance + max(dip, 0.0) - beside[2]) / axis[2]
+        if high <= 0.0:
+            return None
+        down = beside + np.linspace(high, 0.0, int(np.ceil(high / (LOOK * tool.radius))) + 5)[:, None] * axis
+        over = beside + np.linspace(0.0, 1.0, 5)[:, None] * (tip - beside)
+        axes = np.tile(axis, (len(down), 1))
+        if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
+            continue
+        if not (around.met(down, axes, tool, stock) | settings.found.bars(tool, down)).any():
+            return np.array([beside + high * axis, beside, tip]), stock == 0.0
+    return None
