@@ -25,6 +25,7 @@ CLOSER_REACH, CLOSER_STEP = 0.15, 0.02
 MOST_SEEDS, MOST_DEEP, DEEP_A_MOVE = 4500, 1500, 4
 SURE = 5.0  # gouge tolerances: what is deeper is found without a closer look
 CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper are looked round
+ASIDE = np.array([0.3571, 0.2833, 0.8901]) / np.linalg.norm([0.3571, 0.2833, 0.8901])  # no edge or face lies along it
 FACETS_OFF = 2e-3
 """mm, what facets may lie under samples that are on the exact surface."""
 
@@ -181,6 +182,13 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
     return out
 
 
+def _inside(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
+    """(n,) bool: whether points (n, 3), mm, are in the part, by what a ray on no axis meets first."""
+    way = np.broadcast_to(ASIDE, points.shape)
+    _, hit = first_hits(tree, points, way)
+    return np.asarray((hit >= 0) & (tree.mesh.normals[hit] @ ASIDE > 0.0))
+
+
 def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     through, hit = first_hits(tree, points, -normals, t_min=1e-4)
     # a sample of the exact surface may stand over its facet: that is no place where the ray leaves the part
@@ -189,8 +197,11 @@ def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
         low = through[over]
         again, hit[over] = first_hits(tree, points[over] - low[:, None] * normals[over], -normals[over], t_min=1e-4)
         through[over] = low + again
-    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it
+    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it, but where
+    # it meets the edge opposite, of a hollow between two rims of one height; then the middle is not in the part
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
+    ends = np.flatnonzero((hit >= 0) & leaves)
+    leaves[ends] = _inside(tree, points[ends] - 0.5 * through[ends, None] * normals[ends])
     stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
     t, out = tree.arrays, np.empty(len(points))
     deepest(t.lower, t.upper, t.child, t.first, t.size, t.corners, np.ascontiguousarray(points),

@@ -8,7 +8,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
-from tests.hand_parts import dome
+from tests.hand_parts import dome, slope_field
 from verify.guard import (
     DEEP_A_MOVE,
     MOST_SEEDS,
@@ -35,6 +35,19 @@ def test_a_gouge_under_the_exact_surface_is_as_deep_as_it_is(off):
     points, normals = _on_sphere(off)
     depth = gouge_depths(TriangleTree(dome(RADIUS)), points, normals, np.full(len(points), 0.01))
     np.testing.assert_allclose(depth, 0.01, atol=1e-3)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_ray_from_rim_to_rim_over_a_hollow_is_out_of_the_part(side):
+    """Both rims are as high and what it meets opposite may be the wall there, as if it had been inside all the way."""
+    nodes = np.linspace(-6.0, 6.0, 25)
+    tree = TriangleTree(slope_field(lambda x, y: y * y / 12.0 + x * x / 40.0, n=24))
+    x = np.random.default_rng(1).uniform(-4.0, 4.0, 500)
+    points = np.column_stack([x, np.full(500, 6.0 * side), 3.0 + np.interp(x, nodes, nodes**2 / 40.0)])
+    normals = np.tile([0.0, side, 0.0], (500, 1))
+    assert gouge_depths(tree, points, normals, np.full(500, 20.0)).max() < 1e-3
+    depth = gouge_depths(tree, points - [0.0, 0.0, 4.0], normals, np.full(500, 0.5))
+    np.testing.assert_allclose(depth, 0.5, atol=5e-3)
 
 
 def test_places_round_the_lowest_samples_are_looked_at_closely():
