@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
-from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, nearest, sold
+from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
 from zones.fixtures import over_the_part
 from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
 from zones.sight import able
@@ -91,12 +91,14 @@ class Buyer:
     def need(self, cutter: Cutter, tips: F64) -> F64:
         """Neck length and stickout (k, 2), mm, the tool has to have at tips (k, 3), mm, where its cutting part fits.
 
-        One at hand keeps at least its own: instead of it, nothing is lost.
+        One at hand keeps at least its own: instead of it, nothing is lost. One to buy has flutes up the whole of its
+        corner.
         """
         if not len(tips):
             return np.zeros((0, 2))
         body = self.body(cutter)
-        return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (0.0, 0.0))
+        own = float(catalogue(np.array(body.corner_radius)))
+        return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (own, own))
 
     def touches(self, cutter: Cutter, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
         """Rows (k,) of the samples that the cutting part alone touches and can finish, and its tips (k, 3), mm."""

@@ -115,6 +115,15 @@ def test_a_longer_neck_of_a_cutter_at_hand_is_named_as_such():
     assert set(found.why) == {"taken"}
 
 
+def test_a_ball_to_buy_has_flutes_up_the_whole_of_its_corner():
+    """Over open ground no neck is needed; a ball of 40 with flutes of 4 mm is no tool."""
+    mesh = terraces([0, 60], [0, 60], [[2]])
+    short = ball(3.0, "T1", neck=5.0, shank=8.0, stickout=40.0)
+    buyer = buyer_of(mesh, [short], samples_of(mesh, 0.1))
+    need = buyer.need(Cutter(40.0, 20.0, "T1", False), np.array([[30.0, 30.0, 2.0]]))
+    assert need[0, 0] == 20.0 and need[0, 1] >= 20.0
+
+
 def test_beside_a_high_wall_one_stout_tool_does():
     mesh = terraces([0, 12, 40], [-20, 34], [[14, 2]])
     short = ball(3.0, "T1", neck=5.0, shank=8.0, stickout=40.0)
