@@ -197,8 +197,8 @@ def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
         low = through[over]
         again, hit[over] = first_hits(tree, points[over] - low[:, None] * normals[over], -normals[over], t_min=1e-4)
         through[over] = low + again
-    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it, but where
-    # it meets the edge opposite, of a hollow between two rims of one height; then the middle is not in the part
+    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it, but for
+    # the edge opposite, where both rims of a hollow are of one height; then the middle is not in the part
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
     ends = np.flatnonzero((hit >= 0) & leaves)
     leaves[ends] = _inside(tree, points[ends] - 0.5 * through[ends, None] * normals[ends])
