@@ -22,7 +22,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.leaning import Surroundings
+from toolpath.leaning import Runs, Surroundings
 from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -30,7 +30,7 @@ from toolpath.posed import enters
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SKIN, StockMap
-from toolpath.strategies import flank, floor, isoparametric, spot, zigzag, zlevel
+from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from toolpath.walked import Depths, Walked
@@ -102,22 +102,25 @@ class Finish:
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingsteps of the zone; none where no pass is walked.
 
-        Where passes along the borders of its faces are not much more way than the usual ones, or where the flank of a
-        tool that leans lies on its walls, these are walked as well, each until no more than the scallop is left. What
-        leaves the fewest samples above it stays, of those that leave as many the fastest.
+        Where passes along the borders of its faces are not much more way than the usual ones, where the flank of a tool
+        that leans lies on its walls, or where its tilted end has the curvature of its faces, these are walked as well,
+        each until no more than the scallop is left. What leaves the fewest samples above it stays, of those that leave
+        as many the fastest.
         """
         every = np.ones(len(self.checks.points), np.bool_)
         other, refused = self._along_borders()
-        runs, unflanked = self._beside_walls()
-        refused += unflanked
-        if other is None and not runs:
+        leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0
+        if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)
-        tries = [self._copied(s) for s in (self.strategy, other, self.strategy if runs else None) if s is not None]
-        made = [t._rounds(step_id, every) for t in (tries[:-1] if runs else tries)]
+        tries = [self._copied(s) for s in (self.strategy, other) if s is not None]
+        made = [t._rounds(step_id, every) for t in tries]
         seconds = [sum(step.seconds for step in steps) for steps in made]
-        if runs:
-            made.append(tries[-1]._flanked(step_id, runs, every))
+        leaning, unled = self._leaning(min(seconds)) if leans else ([], ())
+        refused += unled
+        for name, runs in leaning:
+            tries.append(self._copied(self.strategy))
+            made.append(tries[-1]._led(step_id, name, runs, every))
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
@@ -140,21 +143,30 @@ class Finish:
                                                "strategy": replace(taken.strategy, rejected=tuple(rejected))})
         return made[best]
 
-    def _beside_walls(self) -> tuple[tuple[tuple[Trajectory, ...], ...], tuple[dict[str, object], ...]]:
-        """Passes of the leaning flank along the walls of the zone, and why there are none."""
-        turning, field, settings = self.settings.turning, self.field, self.settings
-        if turning is None or self.zone.form is not Form.STEEP or not (self.faces and len(self.checks.points)):
-            return (), ()
-        met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
-        around = Surroundings(met, turning, self.stock.copied(), field.discs, field.clear)
-        walls = [wall for face in self.faces for wall in face.alone or (face,)]
-        found = flank.flanked(walls, self.checks, field.tool, self.cut, settings, around, field.allowance)
-        return found.runs, tuple({"strategy": flank.NAME, "reason": reason} for reason in found.refused)
+    def _leaning(self, most: float) -> tuple[list[Led], tuple[dict[str, object], ...]]:
+        """Passes of a leaning tool, by the name of their strategy, and why there are none; most : s, the usual ones."""
+        alone = [one for face in self.faces for one in face.alone or (face,)]
+        given = self.checks, self.field.tool, self.cut, self.settings
+        found: list[tuple[str, Runs]] = []
+        if self.zone.form is Form.STEEP:
+            found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)))
+        if self.zone.form is not Form.LEVEL and matched.suits(self.field.tool):
+            curved = [face for face in alone if not face.flat]
+            found.append((matched.NAME, matched.matched(curved, *given, self._surroundings(), self.field.allowance,
+                                                        most)))
+        return [(name, runs.runs) for name, runs in found if runs.runs], tuple(
+            {"strategy": name, "reason": reason} for name, runs in found for reason in runs.refused)
 
-    def _flanked(self, step_id: str, runs: Sequence[tuple[Trajectory, ...]],
-                 wanted: NDArray[np.bool_]) -> list[Workingstep]:
-        """A workingstep for each pass of the flank, and one for what these leave."""
-        zone, name, number = self.zone, flank.NAME, int(step_id[1:])
+    def _surroundings(self) -> Surroundings:
+        field, settings = self.field, self.settings
+        met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
+        assert settings.turning is not None
+        return Surroundings(met, settings.turning, self.stock.copied(), field.discs, field.clear)
+
+    def _led(self, step_id: str, name: str, runs: Sequence[tuple[Trajectory, ...]],
+             wanted: NDArray[np.bool_]) -> list[Workingstep]:
+        """A workingstep for each pass of a leaning tool, and one for what these leave."""
+        zone, number = self.zone, int(step_id[1:])
         steps, faces = [], " ".join(f"F{f}" for f in self.zone.faces[:12])
         for k, run in enumerate(runs):
             here = f"S{number + k:02d}"
@@ -336,6 +348,9 @@ def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
     """Whether a zone is finished by a flat end that stands on it."""
     return zone.form is Form.LEVEL and tool.radius > tool.corner_radius
 
+
+Led = tuple[str, Sequence[tuple[Trajectory, ...]]]
+"""Name of a strategy and the trajectories of each of its passes."""
 
 Rounds = Callable[[int, NDArray[np.int64]], list[list[Line]]]
 """Lines of round k for the samples (indices into the zone's checks) that still need some."""

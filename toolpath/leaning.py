@@ -8,7 +8,7 @@ fixtures and stock is asked pose by pose.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.levels import true_runs
 from toolpath.motion import Motion, Trajectory
-from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.piece import LEAST_PIECE, Piece, places_along, raised_poses, thinned_poses
 from toolpath.posed import Blocked
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
@@ -34,6 +34,7 @@ UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
 STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
+LAYER, MOST_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 LOADED = "there is more stock in its way than a leaning tool may take off"
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
@@ -63,9 +64,9 @@ class Surroundings:
         low = lowest(tips, axes, tool, self.discs, self.turning.up)
         return self.enters(tips, axes) | ~self.turning.stands(axes) | (low < self.turning.table)
 
-    def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float) -> NDArray[np.bool_]:
+    def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
         """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank."""
-        return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick)
+        return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick, under)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
     around : Surroundings; its stock is taken off
     """
     runs, refused = [], []
-    for name, piece in found:
+    for name, piece in _layered(found, tool, around):
         parts = free_parts(piece, tool, settings, around)
         if not parts:
             refused.append(f"{name}: {LOADED}")
@@ -102,6 +103,13 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
                 if t.motion is Motion.CUT and t.axes is not None:
                     around.stock.cut_leaning(t.points, t.axes, tool)
     return Runs(tuple(runs), tuple(dict.fromkeys(refused)))
+
+
+def _layered(found: Sequence[tuple[str, Piece]], tool: ToolBody, around: Surroundings) -> Iterator[tuple[str, Piece]]:
+    """Passes with their layers, each asked for when those before it are off the stock."""
+    for name, piece in found:
+        for part in lowered(piece, tool, around) if piece.on_end else [piece]:
+            yield name, part
 
 
 def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64) -> F64:
@@ -118,10 +126,10 @@ def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64)
 
 
 def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], clear: Clearances,
-           thick: float) -> NDArray[np.bool_]:
+           thick: float, under: float | None = None) -> NDArray[np.bool_]:
     """(n,) bool: poses at which stock stands in neck, shank or holder, or deeper in the cutting part than ``thick`` mm.
 
-    Under the end of the tool that is no more than the skin a way down may take.
+    Under the end of the tool ``under`` mm may stand; where None, as much, and no more than the skin a way down takes.
 
     tips, axes : (n, 3) float64, mm and unit
 
@@ -140,7 +148,8 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
         end = max(min(end, room + max(d.radius for d in discs) if discs else room + tool.radius), begin)
         return np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)
 
-    flank, bottom = [np.zeros((0, 3))], max(min(thick, SKIN * tool.diameter), CELLS * step)
+    under = min(thick, SKIN * tool.diameter) if under is None else under
+    flank, bottom = [np.zeros((0, 3))], max(under, CELLS * step)
     for h in heights(min(bottom, tool.flute_length), tool.flute_length).tolist():
         low = max(corner - h, 0.0)
         if corner > bottom and low > corner - bottom:
@@ -165,29 +174,52 @@ def _ring(radius: float, height: float, spacing: float) -> F64:
     return np.column_stack([radius * np.cos(at), radius * np.sin(at), np.full(count, height)])
 
 
+def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
+    """A pass on the end of a tool, preceded by itself raised, layer by layer from the highest down, where more stands
+    over it than the end takes off at once.
+
+    Where not even ``MOST_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
+    """
+    thick = THICK * tool.diameter
+    layer = LAYER * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
+    dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
+    need, todo = np.zeros(len(dense.tips), np.int64), np.arange(len(dense.tips))
+    for k in range(MOST_LAYERS + 1):
+        there = dense.raised(k * layer)
+        todo = todo[around.met(there.tips[todo], there.axes[todo], tool, thick)]
+        need[todo] = k + 1
+        if not len(todo):
+            break
+    need[todo] = 0
+    at = np.arange(len(need), dtype=np.float64)
+    return [*(part.raised(k * layer) for k in range(int(need.max()), 0, -1)
+              for part in dense.parts(binary_dilation(need >= k), at, LEAST_PIECE * tool.radius)), piece]
+
+
 def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
     """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
 
-    Over what stands on the floor it is raised along its axis. Where it goes down steeper than the ramp, as behind what
-    it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill.
+    Over what stands on the floor a flank is raised along its axis. Where it goes down steeper than the ramp, as behind
+    what it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill; of a pass
+    on the end it is left out.
     """
     thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
 
     def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
         return around.met(tips, axes, tool, thick) | settings.found.bars(tool, tips)
 
-    dense = piece.at(_places(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
+    dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     met = loaded_at(dense.tips, dense.axes)
     if met.any():
         up, met = raised_poses(dense.tips, dense.axes,
                                lambda tips, axes: loaded_at(tips, axes) | around.blocked(tips, axes, tool),
-                               tool.radius, piece.reach)
+                               tool.radius, 0.0 if piece.on_end else piece.reach)
         dense = replace(dense, tips=dense.tips + up[:, None] * dense.axes)
         met = binary_dilation(met)
     slope = math.tan(settings.ramp_angle)
     down = _descends(dense, slope, DIP * SKIN * tool.diameter)
     at = np.arange(len(met), dtype=np.float64)
-    uphill = [part.reversed() for part in dense.parts(binary_dilation(down) & ~met, at, least)]
+    uphill = [] if piece.on_end else [p.reversed() for p in dense.parts(binary_dilation(down) & ~met, at, least)]
     parts = [*dense.parts(~(met | down), at, least), *(_begun_level(part, slope, least) for part in uphill)]
     return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
             for p in parts if p is not None]
@@ -233,7 +265,7 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     feeds = paced(tips, axes, piece.reach, cut.feed, least)
     if feeds is None:
         return "the tip would all but stand while the flank goes round it"
-    dense = Piece(tips, axes, axes, piece.reach).at(_places(tips, axes, piece.reach, LOOK * tool.radius))
+    dense = Piece(tips, axes, axes, piece.reach).at(places_along(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
         return LOADED
     ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
@@ -249,7 +281,7 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
 
     a, b = axes[0], axes[-1]
     high = float((first[0] - first[1]) @ a)
-    slow = first[1] + min(IN_FRONT, high) * a
+    slow = first[1] + min(IN_FRONT + (SKIN * tool.diameter if piece.on_end else 0.0), high) * a
     go(Motion.APPROACH, np.array([first[0], slow]), cut.link_feed if clear else cut.plunge_feed, a)
     go(Motion.APPROACH, np.array([slow, first[1]]), cut.plunge_feed, a)
     go(Motion.CONNECT, first[1:], cut.feed, a)
@@ -286,27 +318,17 @@ def _steady(feeds: F64) -> list[tuple[int, int]]:
     return list(zip(at[:-1], at[1:], strict=True))
 
 
-def _places(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
-    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
-    gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
-    counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
-    return np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
-
-
 def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
             thick: float) -> tuple[F64, bool] | None:
     """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
 
-    Off the wall where there is room for that; else straight down along the flank, where the end of the tool is round
-    enough not to dig up what stands at the wall.
+    True where no stock is met but at the very end. Beside it where there is room for that; else straight down: along a
+    wall where the end of the tool is round enough not to dig up what stands there, and on its end where there is no
+    more than a skin under it.
     """
     axis, tip = piece.axes[0], piece.tips[0]
-    aside = piece.away[0] - (piece.away[0] @ axis) * axis
-    aside /= np.linalg.norm(aside)
-    room = min(LEAD * tool.radius, MOST_LEAD)
-    down_the_wall = [(0.0, thick)] if ROUND_END * tool.corner_radius >= thick else []
-    for lead, stock in ((room, 0.0), (0.25 * room, 0.0), *down_the_wall):
-        beside = tip + lead * aside
+    for aside, stock, under in _leads(piece, tool, thick):
+        beside = tip + aside
         dip = tip[2] - float(lowest(tip[None], axis[None], tool, around.discs, UP_Z)[0])
         high = (settings.clearance + max(dip, 0.0) - beside[2]) / axis[2]
         if high <= 0.0:
@@ -316,6 +338,20 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         axes = np.tile(axis, (len(down), 1))
         if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
             continue
-        if not (around.met(down, axes, tool, stock) | settings.found.bars(tool, down)).any():
+        if not (around.met(down, axes, tool, stock, under) | settings.found.bars(tool, down)).any():
             return np.array([beside + high * axis, beside, tip]), stock == 0.0
     return None
+
+
+def _leads(piece: Piece, tool: ToolBody, thick: float) -> list[tuple[F64, float, float]]:
+    """Where beside the beginning of a piece the tool may come down, (3,) mm off it, with the stock it may meet there,
+    mm, at its flank and under its end."""
+    room, skin, axis = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0]
+    if piece.on_end:
+        back = piece.tips[0] - piece.tips[1]
+        back -= (back @ axis) * axis
+        return [(room * back / np.linalg.norm(back), 0.0, 0.0), (np.zeros(3), 0.0, skin)]
+    aside = piece.away[0] - (piece.away[0] @ axis) * axis
+    aside /= np.linalg.norm(aside)
+    down_the_wall = [(0.0 * aside, thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []
+    return [(room * aside, 0.0, 0.0), (0.25 * room * aside, 0.0, 0.0), *down_the_wall]

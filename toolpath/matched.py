@@ -23,6 +23,7 @@ from toolpath.locations import tips
 from toolpath.nose import Contacts, Nose, strip_edges
 
 STATIONS = 33  # along a pass, at which tilts are looked for
+SPARSE = 2  # stations on, at which turns are looked for
 FIRST_STEP, LEAST_STEP = 0.05, 1e-4  # of the unit square, between passes
 SOLVED = 5e-3  # of the step between passes: as near the edges of neighbours are brought
 TRIALS = 14
@@ -189,25 +190,27 @@ class Matched:
         directions lie aside, or where the curvature grows to one side. Of a few turns at each station the way through
         all of them is taken that is widest less what it turns from one to the next.
         """
-        at = self.contacts(self.stations, eta)
-        widths = np.empty((len(TURNS), STATIONS))
+        at = self.contacts(self.stations, eta).every(SPARSE)
+        count = len(at.uv)
+        widths = np.empty((len(TURNS), count))
         for k, angle in enumerate(TURNS):
-            turn = np.full(STATIONS, angle)
+            turn = np.full(count, angle)
             tilt = self.nose.least_tilt(at, turn, self.wanted.depth, self.wanted.least_tilt)
             edges = strip_edges(*self.nose.heights(at, np.nan_to_num(tilt), turn), self.wanted.scallop)
             left, right = (((self.iso.surface.points(np.clip(e, *self.iso.surface.domain)) - at.point) * at.left).sum(1)
                            for e in edges)
             widths[k] = np.where(np.isnan(tilt), 0.0, 2.0 * np.minimum(left, -right))
         cost = TURN_COST * self.tool.radius * np.abs(TURNS[:, None] - TURNS)
-        best, back = widths[:, 0], np.zeros((STATIONS, len(TURNS)), np.int64)
-        for m in range(1, STATIONS):
+        best, back = widths[:, 0], np.zeros((count, len(TURNS)), np.int64)
+        for m in range(1, count):
             through = best[None, :] - cost
             back[m] = through.argmax(axis=1)
             best = widths[:, m] + through.max(axis=1)
         out = [int(best.argmax())]
-        for m in range(STATIONS - 1, 0, -1):
+        for m in range(count - 1, 0, -1):
             out.append(int(back[m, out[-1]]))
-        return np.convolve(np.pad(TURNS[out[::-1]], len(EVEN) // 2, mode="edge"), EVEN, "valid")
+        turns = np.interp(self.stations, self.stations[::SPARSE], TURNS[out[::-1]])
+        return np.convolve(np.pad(turns, len(EVEN) // 2, mode="edge"), EVEN, "valid")
 
     def _next(self, edge: F64, begin: float, step: float) -> Strip:
         """The farthest pass beyond ``begin`` whose strip still reaches ``edge`` all along, to SOLVED of the step."""
@@ -235,8 +238,28 @@ class Matched:
                 trial = kept.eta + (upper - kept.eta) * float(np.clip(under / (under - over), 0.05, 0.95))
         return kept
 
+    def stands(self, at: Contacts, tilt: F64, turn: F64) -> tuple[F64, F64]:
+        """Tips (k, 3) mm and axes (k, 3) at contacts, for tilts and turns (k,) rad."""
+        axis = self.nose.axes(at, tilt, turn)
+        return tips(at.point, at.normal, self.tool, axis), axis
+
+    def poses(self, s: Strip, xi: F64) -> tuple[F64, F64, F64]:
+        """Tips (k, 3) mm, axes and normals (k, 3) of a pass at xi (k,)."""
+        at = self.contacts(xi, s.eta)
+        return *self.stands(at, *s.leans(xi)), at.normal
+
     def located(self, s: Strip) -> tuple[F64, F64]:
-        """Tips (k, 3) mm and axes (k, 3) of a pass, so close that moves between them add no more than the chord.
+        """Tips (k, 3) mm and axes (k, 3) of a pass, where ``ways`` has it.
+
+        Raises
+        ------
+        GeometryError
+            As ``ways``.
+        """
+        return self.poses(s, self.ways(s))[:2]
+
+    def ways(self, s: Strip) -> F64:
+        """Places xi (k,) of a pass so close that moves between them add no more than the chord.
 
         A move takes the tip straight and turns the axis on the great circle. Half way, what that moves the contact
         along the normal is held against the chord: what the tip is off, and the axis times the radius.
@@ -246,25 +269,18 @@ class Matched:
         GeometryError
             Code 'bad_pass': not even steps of a 4096th of a station's keep to the chord.
         """
-        nose = self.nose
-
-        def poses(xi: F64) -> tuple[F64, F64, F64]:
-            at = self.contacts(xi, s.eta)
-            axis = nose.axes(at, *s.leans(xi))
-            return tips(at.point, at.normal, self.tool, axis), axis, at.normal
-
         xi = s.xi
         for _ in range(FINEST):
-            tip, axis, _ = poses(xi)
+            tip, axis, _ = self.poses(s, xi)
             middle = 0.5 * (xi[1:] + xi[:-1])
             half = axis[1:] + axis[:-1]
             half /= np.linalg.norm(half, axis=1)[:, None]
-            true_tip, true_axis, normal = poses(middle)
+            true_tip, true_axis, normal = self.poses(s, middle)
             off = 0.5 * (tip[1:] + tip[:-1]) - true_tip
             moved = np.abs((off * normal).sum(axis=1)) + self.tool.radius * np.linalg.norm(half - true_axis, axis=1)
             far = moved > self.wanted.chord
             if not far.any():
-                return tip, axis
+                return xi
             xi = np.sort(np.concatenate([xi, middle[far]]))
         raise GeometryError(f"{self.tool.id}: the pass at {s.eta:.4f} turns too fast for a chord of "
                             f"{self.wanted.chord:g} mm", code="bad_pass", subjects=(self.tool.id,),

@@ -24,7 +24,8 @@ from geometry.toolbody import ToolBody
 from toolpath.matching import clear_tilt, nose_radii
 
 ANGLES = 65  # places on each half of the nose
-BISECTIONS = 12  # of a tilt: to a 4000th of what it may be
+TRIED = 33  # the same, when a tilt is looked for: between two of them it may be a third deeper than at them
+BISECTIONS = 10  # of a tilt: to a 1000th of what it may be
 TOUCH = 1e-7  # mm: rounding of a place that touches
 ROOM = np.radians(3.0)  # a tilt is looked for up to so much beyond what is clear on a quadric
 MOST_ROOM = np.radians(40.0)
@@ -43,6 +44,10 @@ class Contacts:
     normal: F64
     way: F64
     left: F64
+
+    def every(self, step: int) -> Contacts:
+        """Each so manieth of them."""
+        return Contacts(*(a[::step] for a in (self.uv, self.point, self.normal, self.way, self.left)))
 
     @classmethod
     def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> Contacts:
@@ -89,11 +94,12 @@ class Nose:
         """The least tilts (m,), rad, from ``least`` on, with no place of the nose deeper than ``depth`` mm in the
         surface within the domain; nan where none is small enough."""
         k_1 = np.maximum(-self.surface.curvature(np.clip(at.uv, *self.surface.domain))[:, 0], 0.0)
-        low = np.full(len(at.uv), least)
-        high = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MOST_ROOM), least) + ROOM
-        for room in (0.0, MOST_ROOM - ROOM):
-            high = high + room * self._enters(at, high, turn, depth)
+        clear = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MOST_ROOM), least)
+        low, high = np.full(len(at.uv), least), clear + ROOM
         bad = self._enters(at, high, turn, depth)
+        if bad.any():
+            high = np.where(bad, clear + MOST_ROOM, high)
+            bad = self._enters(at, high, turn, depth)
         high = np.where(self._enters(at, low, turn, depth), high, low)
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
@@ -102,7 +108,7 @@ class Nose:
         return np.where(bad, np.nan, high)
 
     def _enters(self, at: Contacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
-        high, feet = self.heights(at, tilt, turn)
+        high, feet = self.heights(at, tilt, turn, TRIED)
         known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3) | ~np.isfinite(high)
         return np.asarray((known & ~(high >= -depth - TOUCH)).any(axis=(0, 2)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,26 +22,30 @@ class Piece:
     """A pass, or part of one, as the tool walks it.
 
     tips : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
-    away : (k, 3) float64, unit, out of the wall
-    reach : mm from the tip, how far up the flank is at work
+    away : (k, 3) float64, unit, out of the surface
+    reach : mm from the tip, how far up the flank is at work; of an end, how far off the axis
+    on_end : whether it is the end of the tool that is at work, leaning forward: it is not walked the other way
     """
 
     tips: F64
     axes: F64
     away: F64
     reach: float
+    on_end: bool = False
 
     def reversed(self) -> Piece:
         """The same, walked the other way."""
-        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1], self.reach)
+        return Piece(self.tips[::-1], self.axes[::-1], self.away[::-1], self.reach, self.on_end)
+
+    def raised(self, by: float) -> Piece:
+        """The same, every pose moved along its axis by so many mm."""
+        return replace(self, tips=self.tips + by * self.axes)
 
     def at(self, places: F64) -> Piece:
         """The piece through other poses; places : (m,) numbers of its own poses, those between them by fractions."""
-        k = np.clip(places.astype(np.int64), 0, len(self.tips) - 2)
-        share = (places - k)[:, None]
-        tips, axes, away = ((1.0 - share) * a[k] + share * a[k + 1] for a in (self.tips, self.axes, self.away))
-        axes, away = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (axes, away))
-        return Piece(tips, axes, away, self.reach)
+        tips, axes = between(self.tips, self.axes, places)
+        away = between(self.tips, self.away, places)[1]
+        return Piece(tips, axes, away, self.reach, self.on_end)
 
     def parts(self, good: NDArray[np.bool_], places: F64, least: float) -> list[Piece]:
         """What of it goes through good places only, each ``least`` mm or more at the tip.
@@ -61,6 +65,22 @@ class Piece:
     def top(self) -> float:
         """mm, the highest place of the flank at work."""
         return float((self.tips[:, 2] + self.reach * self.axes[:, 2]).max())
+
+
+def places_along(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
+    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up."""
+    gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
+    counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
+    return np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
+
+
+def between(tips: F64, axes: F64, places: F64) -> tuple[F64, F64]:
+    """Tips and axes (m, 3) at ``places_along``: straight between poses, axes made unit."""
+    k = np.clip(places.astype(np.int64), 0, max(len(tips) - 2, 0))
+    share = (places - k)[:, None]
+    after = np.minimum(k + 1, len(tips) - 1)
+    tip, axis = ((1.0 - share) * a[k] + share * a[after] for a in (tips, axes))
+    return tip, axis / np.linalg.norm(axis, axis=1, keepdims=True)
 
 
 def thinned_poses(tips: F64, axes: F64, reach: float, tolerance: float) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.kernels.stock import HALF_DIAGONAL, loaded, meets, overlaps, sink, stamp, stamp_leaning, standing
+from toolpath.piece import between, places_along
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
@@ -25,6 +26,8 @@ POOLED = 12  # nodes a side of the squares whose highest stock is kept
 AIR_TOLERANCE = 0.01  # mm
 UPRIGHT = 1e-12  # of the normal of a face of a block
 ON_EDGE = 1e-9  # mm
+APART, MOST_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
+ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
 
 
@@ -129,16 +132,20 @@ class StockMap:
               tool.corner_radius)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
-        """Take away what the flank of a leaning tool has cut at poses, tips (n, 3) mm and axes (n, 3) unit.
+        """Take away what a leaning tool has cut along poses, tips (n, 3) mm and axes (n, 3) unit.
 
-        Only at the poses: between them, and with its nose, it takes more. So neither map falls too low.
+        Of its cutting part cylinders that lie inside, at poses a few lattice steps apart: neither map falls too low.
         """
-        low, high = tool.corner_radius, tool.flute_length
-        sides = 0.5 * (high - low) * np.abs(axes[:, :2]) + tool.radius * np.sqrt(1.0 - np.minimum(axes[:, :2]**2, 1.0))
         lat = self.lattice
-        for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
-            stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), np.ascontiguousarray(axes),
-                          sides, tool.radius, low, high, shrink)
+        spacing = max(APART * lat.step, MOST_POSED * tool.radius)
+        tips, axes = between(tips, axes, places_along(tips, axes, tool.flute_length, spacing))
+        r, high = tool.corner_radius, tool.flute_length
+        bent = ROUND if r > 0.0 else (0.5 * np.pi,)
+        for radius, low in ((tool.radius - r + r * np.sin(a), r - r * np.cos(a)) for a in bent):
+            sides = 0.5 * (high - low) * np.abs(axes[:, :2]) + radius * np.sqrt(1.0 - np.minimum(axes[:, :2]**2, 1.0))
+            for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
+                stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
+                              np.ascontiguousarray(axes), sides, radius, low, high, shrink)
 
     def stands_in(self, tips: F64, axes: F64, flank: F64, bodies: F64) -> NDArray[np.bool_]:
         """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.

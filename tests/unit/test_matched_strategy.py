@@ -1,0 +1,154 @@
+"""Passes on a matched end as motions: what they leave by the proof's measure, layers through stock, where they stop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
+from tests.unit.test_matched import bowl, measured, passes_along_y
+from toolpath.family import Target
+from toolpath.leaning import LAYER, THICK, Surroundings, lowered
+from toolpath.matched import Wanted
+from toolpath.motion import Motion
+from toolpath.piece import Piece
+from toolpath.posed import enters
+from toolpath.settings import CutData, PlanSettings, Turning
+from toolpath.stock import SKIN, StockMap
+from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.strategies.matched import matched, predicted, suits
+from zones.reach import Clearances
+
+SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0
+LOOP = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float)
+BULL = tool(12.0, 1.0)
+HOLLOW = slope_field(lambda x, y: x * x / 120.0 + y * y / 300.0, size=40.0, n=100)
+SURFACE = bowl(60.0, 150.0)
+FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+               np.array([0.0, 0.0, 1.0]), -100.0)
+
+
+def settings_of(turning=FREE):
+    return PlanSettings(SCALLOP, 0.002, 0.0, LIFT, 20.0, 19.0, RAMP, turning=turning)
+
+
+def found(mesh=HOLLOW, margin=1.0, allowance=0.0, turning=FREE, body=BULL, most=1e9, part=None):
+    tree = TriangleTree(mesh)
+    samples = samples_of(HOLLOW, 2.0, {2})
+    target = Target(samples.points, samples.normals, samples.points, 0.7)
+    if part is not None:
+        rows = part(samples.points)
+        target = Target(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
+    clear = Clearances()
+    around = Surroundings(enters(tree, body, clear, allowance - LIFT), turning,
+                          StockMap.around(tree, mesh.bounds, margin, 0.25), (), clear)
+    cut = CutData(10_000, FEED, 200, 3000, 3.6)
+    return matched([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, body, cut, settings_of(turning), around,
+                   allowance, most), around
+
+
+def cuts(runs):
+    return [(t.points, t.axes) for run in runs.runs for t in run if t.motion is Motion.CUT]
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """The hollow with 1 mm of stock on it."""
+    return found()
+
+
+def test_a_hollow_is_cut_to_the_scallop_and_no_deeper(whole):
+    left = measured(SURFACE, BULL, cuts(whole[0]))
+    assert left.max() <= SCALLOP and left.min() > -0.002
+
+
+def test_an_allowance_is_left_on_all_of_it():
+    runs, _ = found(allowance=0.2)
+    left = measured(SURFACE, BULL, cuts(runs)) - 0.2
+    assert left.max() <= SCALLOP and left.min() > -0.002
+
+
+def test_there_are_layers_where_more_stands_than_the_end_takes(whole):
+    """A pass through 1 mm of stock is preceded by one that leaves no more than the end takes at once."""
+    runs, around = whole
+    thin, _ = found(margin=0.5)
+    assert len(runs.runs) == 2 * len(thin.runs)
+    way = np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))])
+    axes = np.tile([np.sin(0.05), 0.0, np.cos(0.05)], (41, 1))
+    fresh = StockMap.box(TriangleTree(box_mesh([-30, -30, -2], [30, 30, 0])), np.array([-30.0, -30, -2]),
+                         np.array([30.0, 30, 2.5]), 0.25)
+    piece = Piece(way, axes, axes, BULL.radius, on_end=True)
+    layers = lowered(piece, BULL, replace(around, stock=fresh))
+    assert layers[-1] is piece
+    heights = [float((layer.tips[0] - way[0]) @ axes[0]) for layer in layers]
+    step = LAYER * min(THICK, SKIN) * BULL.diameter
+    np.testing.assert_allclose(np.diff(heights), -step, atol=1e-9)
+    assert heights[0] >= 2.5 - SKIN * BULL.diameter - 0.5
+
+
+def test_each_pass_comes_down_through_no_more_than_a_skin(whole):
+    """Along its axis, at the plunge feed, from beside or above; the stock it is let into is what a descent may take."""
+    runs, _ = whole
+    for run in runs.runs:
+        kinds = [t.motion for t in run]
+        assert kinds[0] is Motion.APPROACH and kinds[-1] is Motion.LIFT and Motion.CUT in kinds
+        ways = [t for t in run if t.motion is Motion.APPROACH]
+        for t in ways:
+            gone = np.diff(t.points, axis=0)
+            assert np.linalg.norm(np.cross(gone, t.axes[0]), axis=1).max() < 1e-6
+        assert ways[-1].feed == 200.0
+        assert np.linalg.norm(ways[-1].points[0] - ways[-1].points[-1]) >= SKIN * BULL.diameter or len(ways) == 1
+
+
+def test_a_pass_ends_at_what_stands_in_its_way():
+    """A post on the hollow: no pose comes into it, and away from it the surface is cut all the same."""
+    mesh = joined(HOLLOW, box_mesh([4, 4, -1], [9, 9, 30]))
+    runs, around = found(mesh)
+    assert any("nowhere" not in r for r in runs.refused) or not runs.refused
+    poses = cuts(runs)
+    for tips, axes in poses:
+        assert not around.blocked(tips, axes, BULL).any()
+    left = measured(SURFACE, BULL, poses)
+    g = (np.arange(120) + 0.5) / 120 * 40.0 - 20.0
+    x, y = np.meshgrid(g, g, indexing="ij")
+    far = (np.hypot(x - 6.5, y - 6.5) > 25.0).ravel()
+    near = ((np.abs(x - 6.5) < 2.0) & (np.abs(y - 6.5) < 2.0)).ravel()
+    for order in (far, far.reshape(120, 120).T.ravel()):  # whichever parameter runs first
+        assert np.median(left[order]) <= SCALLOP
+    assert left[near].min() > 0.5
+
+
+def test_only_what_is_wanted_is_walked(whole):
+    runs, _ = found(part=lambda p: p[:, 0] > 8.0)
+    tips = np.vstack([t for t, _ in cuts(runs)])
+    assert len(runs.runs) < len(whole[0].runs) and tips[:, 0].min() > -8.0
+
+
+def test_what_the_machine_cannot_take_is_left():
+    stiff = replace(FREE, stands=lambda axes: np.zeros(len(axes), bool))
+    runs, _ = found(turning=stiff)
+    assert not runs.runs and runs.refused == ("F2: the tool is hardly anywhere free with its end on it",)
+
+
+def test_slower_than_the_usual_passes_is_told_with_both_figures():
+    runs, _ = found(most=1.0)
+    assert not runs.runs and "s, the usual passes 1" in runs.refused[0]
+
+
+def test_balls_have_no_end_to_match():
+    assert suits(BULL) and suits(tool(6.0, 0.0)) and not suits(ball(6.0))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_time_told_ahead_is_about_what_passes_take(turned, whole):
+    """Along the less curved way passes are fewer; what is told for that is within a third of the passes themselves."""
+    asked = Wanted(0.8 * SCALLOP, 0.0005, np.radians(1.0), 0.0005)
+    iso = passes_along_y(SURFACE)
+    along, across = (predicted(replace(iso, turned=t), BULL, asked, FEED) for t in (True, False))
+    assert along < across
+    thin, _ = found(margin=0.5)
+    taken = 60.0 / FEED * sum(float(np.linalg.norm(np.diff(t, axis=0), axis=1).sum()) for t, _ in cuts(thin))
+    assert along == pytest.approx(taken, rel=0.35)

@@ -1,0 +1,199 @@
+"""Faces finished by a tilted flat or bull-nose end whose nose has their curvature (``toolpath.matched``), as motions.
+
+A face is laid out as a whole and each pass is walked where it serves what is wanted. Where the tool would meet
+something with the axis it needs there, or the machine cannot take that axis, the pass breaks off and the rest is left
+to others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.spatial import cKDTree
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.family import Target
+from toolpath.isoparametric import IsoSurface, Laid
+from toolpath.leaning import LOOK, Runs, Surroundings, in_turn
+from toolpath.matched import Matched, Strip, Wanted
+from toolpath.matching import clear_tilt, matching_tilt, strip_width
+from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.settings import CutData, PlanSettings
+from toolpath.strategies.isoparametric import Faces
+
+NAME = "matched"
+LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind
+SHARE = 0.25  # of the chordal tolerance: how deep the nose may be, and what leaving out poses may add
+LAID_SHARE = 0.8  # of the scallop, given to the strips; chords and facets take the rest
+ALONG, UP = 65, 33  # places of a face at which it is asked what it serves
+TRIED = 9  # places each way at which the tool is tried before passes are laid out
+LEAST_FREE = 0.25  # of those that are wanted
+LEAST_AREA = 4.0  # of the squared radius
+LEAST_STRIP = 1e-3  # mm
+MOST_LOOK = 0.5  # mm between poses that are held against what stands round the pass
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """Places of a face over the unit square: (UP, ALONG, 3) mm and unit normals, eta (UP,), and which are wanted."""
+
+    place: F64
+    normal: F64
+    eta: F64
+    wanted: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, iso: IsoSurface, near: cKDTree, spacing: float) -> _Lattice:
+        at = np.linspace(0.0, 1.0, UP)
+        xi, eta = np.meshgrid(np.linspace(0.0, 1.0, ALONG), at)
+        place, normal = (a.reshape(UP, ALONG, 3) for a in iso.contact(xi.ravel(), eta.ravel()))
+        if not (np.isfinite(place).all() and np.isfinite(normal).all()):
+            raise GeometryError("it has a place without a normal", code="bad_pass",
+                                remedy="machine it by another strategy")
+        size = max(float(np.linalg.norm(np.diff(place, axis=k), axis=2).mean()) for k in (0, 1))
+        far = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG)
+        return cls(place, normal, at, far <= spacing + size)
+
+    def serves(self, s: Strip) -> NDArray[np.bool_]:
+        """(ALONG,) bool, evenly along the unit square: whether a strip cuts something wanted there."""
+        xi = np.linspace(0.0, 1.0, ALONG)
+        low, high = np.interp(xi, s.xi, s.low), np.interp(xi, s.xi, s.high)
+        room = 0.5 / (UP - 1)
+        own = (self.eta[:, None] >= low - room) & (self.eta[:, None] <= high + room)
+        return np.asarray((own & self.wanted).any(axis=0))
+
+
+def suits(tool: ToolBody) -> bool:
+    """Whether a tool has an end that can be matched: a nose circle of some radius."""
+    return tool.radius > tool.corner_radius + 1e-9
+
+
+def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData, settings: PlanSettings,
+            around: Surroundings, allowance: float, most: float) -> Runs:
+    """The passes of a matched end for what of faces is wanted.
+
+    faces     : of the zone, exact
+    target    : Target; faces are wanted where its points are
+    around    : Surroundings
+    allowance : mm, to leave on the part
+    most      : s, what the usual passes take: passes that would take longer are not laid out
+    """
+    chord = SHARE * settings.chordal_tolerance
+    asked = Wanted(LAID_SHARE * settings.scallop_height, chord, LEAST_TILT, chord)
+    ends = _Ends(tool, asked, around, allowance, cKDTree(target.points), target.spacing)
+    found: list[tuple[str, Piece]] = []
+    refused: list[str] = []
+    for face in faces:
+        if face.area < LEAST_AREA * tool.radius**2:
+            continue
+        try:
+            for laid in face.over_square:
+                made = ends.pieces(laid, cut.feed, most)
+                if isinstance(made, str):
+                    refused.append(f"{face.name}: {made}")
+                else:
+                    found += [(face.name, piece) for piece in made]
+        except GeometryError as refusal:
+            refused.append(f"{face.name}: {refusal.message}")
+    runs = in_turn(found, tool, cut, settings, around)
+    return replace(runs, refused=tuple(dict.fromkeys([*refused, *runs.refused])))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """What the passes of a zone have in common.
+
+    asked         : Wanted of them
+    near, spacing : tree of the places wanted and mm between these
+    """
+
+    tool: ToolBody
+    asked: Wanted
+    around: Surroundings
+    allowance: float
+    near: cKDTree
+    spacing: float
+
+    @cached_property
+    def grown(self) -> ToolBody:
+        """The tool with the allowance all round: with its tip lower by that along the axis it is where this one is."""
+        a = self.allowance
+        return replace(self.tool, diameter=self.tool.diameter + 2.0 * a, corner_radius=self.tool.corner_radius + a)
+
+    def blocked(self, tip: F64, axis: F64) -> NDArray[np.bool_]:
+        """(n,) bool: whether the tool cannot be where the grown one has its tip (n, 3), mm."""
+        return self.around.blocked(tip + self.allowance * axis, axis, self.tool)
+
+    def pieces(self, laid: Laid, feed: float, most: float) -> list[Piece] | str:
+        """The pieces of the passes of a face, from one border to the other, or why there are none, in words."""
+        if not isinstance(laid, IsoSurface):
+            return "it is gone over with others as one"
+        seconds, iso = min(((predicted(one, self.grown, self.asked, feed), one) for one in (
+            laid, replace(laid, turned=not laid.turned))), key=lambda found: found[0])
+        lattice = _Lattice.of(iso, self.near, self.spacing)
+        seconds *= float(lattice.wanted.mean())
+        if seconds >= most:
+            return f"its matched end would take {seconds:.0f} s, the usual passes {most:.0f}"
+        if not self._free(lattice, iso):
+            return "the tool is hardly anywhere free with its end on it"
+        over = Matched.over(iso, self.grown, self.asked)
+        out: list[Piece] = []
+        for s in over.lay_out():
+            served = lattice.serves(s)
+            if served.any():
+                out += self._walked(over, s, served)
+        return out or "the tool is nowhere free with its end on it"
+
+    def _free(self, lattice: _Lattice, iso: IsoSurface) -> bool:
+        """Whether the tool can stand on its end in enough of the places that are wanted."""
+        rows, columns = (np.linspace(0, n - 1, TRIED).astype(int) for n in (UP, ALONG))
+        plan, free, none = Matched(iso, self.grown, self.asked, 0.0), 0, np.zeros(TRIED)
+        for i in rows.tolist():
+            at = plan.contacts(np.linspace(0.0, 1.0, TRIED), float(lattice.eta[i]))
+            tilt = plan.nose.least_tilt(at, none, self.asked.depth, self.asked.least_tilt)
+            tip, axis = plan.stands(at, np.nan_to_num(tilt), none)
+            good = ~np.isnan(tilt) & lattice.wanted[i, columns]
+            free += int((~self.blocked(tip[good], axis[good])).sum())
+        return free >= max(LEAST_FREE * float(lattice.wanted[np.ix_(rows, columns)].sum()), 1.0)
+
+    def _walked(self, over: Matched, s: Strip, served: NDArray[np.bool_]) -> list[Piece]:
+        """The pieces of one pass where it is wanted and the tool is free."""
+        xi = over.ways(s)
+        tip, axis, normal = over.poses(s, xi)
+        whole, own = Piece(tip, axis, normal, self.tool.radius, on_end=True), np.arange(len(xi), dtype=np.float64)
+        gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
+        looks = np.arange(0.0, gone[-1], min(LOOK * self.tool.radius, MOST_LOOK))
+        places = np.unique(np.concatenate([own, np.interp(looks, gone, own)]))
+        dense = whole.at(places)
+        here = np.clip(np.interp(places, own, xi), 0.0, 1.0)
+        asked = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
+        good = asked & ~self.blocked(dense.tips, dense.axes)
+        return [part.raised(self.allowance)
+                for part in whole.parts(good, places, LEAST_PIECE * self.tool.radius)]
+
+
+def predicted(iso: IsoSurface, tool: ToolBody, asked: Wanted, feed: float) -> float:
+    """About how long passes along xi take over the whole of a face, s.
+
+    By the closed form of a strip along the feed, principal or not, with the narrowest place of each pass for all of it.
+
+    feed : mm/min
+    """
+    at = np.linspace(0.0, 1.0, TRIED)
+    xi, eta = (a.ravel() for a in np.meshgrid(at, at))
+    width, across = iso.across(xi, eta)
+    k_1, k_2 = -np.sort(iso.surface.curvature(iso.parameters(xi, eta)), axis=1).T
+    tilt = np.fmax(np.fmax(clear_tilt(k_1, tool), matching_tilt(across, tool)), asked.least_tilt)
+    strip = strip_width(tilt, across, k_1 + k_2 - across, tool, asked.scallop)
+    apart = np.maximum(np.nan_to_num(strip), LEAST_STRIP) / np.maximum(width, 1e-12)
+    place = iso.contact(xi, eta)[0].reshape(TRIED, TRIED, 3)
+    length = np.linalg.norm(np.diff(place, axis=1), axis=2).sum(axis=1)
+    return 60.0 / feed * float(np.trapezoid(length / apart.reshape(TRIED, TRIED).min(axis=1), at))
