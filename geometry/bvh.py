@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from geometry.errors import GeometryError
-from geometry.kernels.bvh import LEAF_SIZE, TreeArrays, build_nodes, column_rows, facet_rows
-from geometry.mesh import TriangleMesh
+from geometry.kernels.bvh import LEAF_SIZE, TreeArrays, build_nodes, column_rows, facet_rows, hull_rows
+from geometry.mesh import F64, TriangleMesh
 
 
 class TriangleTree:
@@ -32,6 +34,12 @@ class TriangleTree:
                                 subjects=(f"vertex {bad}",), remedy="mesh the shape again")
         self.mesh = mesh
         self.arrays = _arrays(mesh, leaf_size)
+
+    @cached_property
+    def hulls(self) -> F64:
+        """(k, 16) ``hull_rows`` of the nodes: only what asks along many axes needs them, and they are long."""
+        t = self.arrays
+        return hull_rows(t.lower, t.upper, t.parent, t.first, t.size, t.corners)
 
     def __len__(self) -> int:
         return len(self.arrays.order)

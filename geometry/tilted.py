@@ -82,9 +82,9 @@ def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips:
         raise GeometryError("need 0 <= corner radius <= radius for every body", code="bad_cutter",
                             subjects=("bodies",))
     out = np.zeros(len(points), np.bool_)
-    if not len(rows) or not len(points):
+    if not len(rows) or not len(points) or not len(tree):
         return out
-    args: tuple[Any, ...] = (tree.arrays, turns, frame, points, rows, float(rows[:, 2].min()),
+    args: tuple[Any, ...] = (tree.arrays, tree.hulls, turns, frame, points, rows, float(rows[:, 2].min()),
                              float(rows[:, 0].max()))
     if numba.get_num_threads() == 1:
         kernels.along_range(*args, 0, len(points), out)  # type: ignore[call-arg]

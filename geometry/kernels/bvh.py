@@ -30,6 +30,7 @@ BINS = 16
 # which adds at most 31 levels for 2**31 triangles.
 DEPTH_OF_MEDIAN = 30
 STACK = 72
+UNEVEN = 0.6  # of the mean second moment of corners: from here on they show which way a node is longest
 
 # Facets by quality: the plane is of no use (no area, or vertical) / usable with care / well conditioned.
 EDGES_ONLY, CAREFUL, SOUND = 0.0, 1.0, 2.0
@@ -255,4 +256,119 @@ def column_rows(node_lo, node_hi, child, parent, first, count, corners):
                     if c > out[i, 7]:
                         out[i, 7] = c
                 i = parent[i]
+    return out
+
+
+@njit(**KERNEL)
+def _unit(x, y, z):
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@njit(**KERNEL)
+def _plate_axes(normal, total, moment, lo, hi):
+    """Three unit ways n, a and b across each other: n as a node's triangles look on average, a its longest across n.
+
+    normal (3,) sum of areas times normals; total (4,) and moment (6,) sums over its corners of x, y, z and 1, and of
+    xx, yy, zz, yz, zx, xy; lo and hi (3,) its upright box. Where corners spread much the same all ways across n, a is
+    the longest side of the upright box, so that the box of a plate is no wider than it.
+    """
+    nx, ny, nz = _unit(normal[0], normal[1], normal[2])
+    if not abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-9:  # no area, or nothing that can be squared
+        nx, ny, nz = 0.0, 0.0, 1.0
+    if abs(nx) <= min(abs(ny), abs(nz)):
+        ex, ey, ez = _unit(0.0, -nz, ny)
+    elif abs(ny) <= abs(nz):
+        ex, ey, ez = _unit(nz, 0.0, -nx)
+    else:
+        ex, ey, ez = _unit(-ny, nx, 0.0)
+    gx, gy, gz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+    x, y, z = total[0] / total[3], total[1] / total[3], total[2] / total[3]
+    xx, yy, zz = moment[0] / total[3] - x * x, moment[1] / total[3] - y * y, moment[2] / total[3] - z * z
+    yz, zx, xy = moment[3] / total[3] - y * z, moment[4] / total[3] - z * x, moment[5] / total[3] - x * y
+    ee = ex * (xx * ex + xy * ey + zx * ez) + ey * (xy * ex + yy * ey + yz * ez) + ez * (zx * ex + yz * ey + zz * ez)
+    eg = gx * (xx * ex + xy * ey + zx * ez) + gy * (xy * ex + yy * ey + yz * ez) + gz * (zx * ex + yz * ey + zz * ez)
+    gg = gx * (xx * gx + xy * gy + zx * gz) + gy * (xy * gx + yy * gy + yz * gz) + gz * (zx * gx + yz * gy + zz * gz)
+    ax, ay, az = ex, ey, ez
+    if math.sqrt((0.5 * (ee - gg)) ** 2 + eg * eg) > UNEVEN * 0.5 * (ee + gg):
+        turn = 0.5 * math.atan2(2.0 * eg, ee - gg)
+        c, s = math.cos(turn), math.sin(turn)
+        ax, ay, az = c * ex + s * gx, c * ey + s * gy, c * ez + s * gz
+    else:
+        u, v = (hi[0] - lo[0]) * (1.0 - nx * nx), (hi[1] - lo[1]) * (1.0 - ny * ny)
+        w = (hi[2] - lo[2]) * (1.0 - nz * nz)
+        if u > 0.0 and u >= max(v, w):
+            ax, ay, az = _unit(1.0 - nx * nx, -nx * ny, -nx * nz)
+        elif v > 0.0 and v >= w:
+            ax, ay, az = _unit(-ny * nx, 1.0 - ny * ny, -ny * nz)
+        elif w > 0.0:
+            ax, ay, az = _unit(-nz * nx, -nz * ny, 1.0 - nz * nz)
+        if not abs(nx * ax + ny * ay + nz * az) < 1e-12:
+            ax, ay, az = ex, ey, ez
+    return nx, ny, nz, ax, ay, az, ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
+
+
+@njit(**KERNEL)
+def hull_rows(node_lo, node_hi, parent, first, count, corners):
+    """(k, 16) leaning box of each node: its middle, three unit ways n, a and b, half sides along them, half diagonal.
+
+    n is how the triangles of the node look on average, a the way they spread most across that; mm.
+    """
+    k = node_lo.shape[0]
+    normal, total, moment = np.zeros((k, 3)), np.zeros((k, 4)), np.zeros((k, 6))
+    low, high = np.full((k, 3), np.inf), np.full((k, 3), -np.inf)
+    out = np.zeros((k, 16))
+    mx, my, mz = 0.5 * (node_lo[0, 0] + node_hi[0, 0]), 0.5 * (node_lo[0, 1] + node_hi[0, 1]), 0.5 * (
+        node_lo[0, 2] + node_hi[0, 2])  # moments are taken about it, so that they do not cancel
+    for i in range(k - 1, -1, -1):
+        for t in range(first[i], first[i] + count[i]):
+            p, q, r = corners[t, 0], corners[t, 1], corners[t, 2]
+            ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+            vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+            normal[i, 0] += uy * vz - uz * vy
+            normal[i, 1] += uz * vx - ux * vz
+            normal[i, 2] += ux * vy - uy * vx
+            for c in range(3):
+                x, y, z = corners[t, c, 0] - mx, corners[t, c, 1] - my, corners[t, c, 2] - mz
+                total[i, 0] += x
+                total[i, 1] += y
+                total[i, 2] += z
+                total[i, 3] += 1.0
+                moment[i, 0] += x * x
+                moment[i, 1] += y * y
+                moment[i, 2] += z * z
+                moment[i, 3] += y * z
+                moment[i, 4] += z * x
+                moment[i, 5] += x * y
+        if i > 0:
+            above = parent[i]
+            for j in range(3):
+                normal[above, j] += normal[i, j]
+            for j in range(4):
+                total[above, j] += total[i, j]
+            for j in range(6):
+                moment[above, j] += moment[i, j]
+        (out[i, 3], out[i, 4], out[i, 5], out[i, 6], out[i, 7], out[i, 8], out[i, 9], out[i, 10],
+         out[i, 11]) = _plate_axes(normal[i], total[i], moment[i], node_lo[i], node_hi[i])
+        for j in range(3):
+            out[i, j] = 0.5 * (node_lo[i, j] + node_hi[i, j])
+    for leaf in range(k):
+        for t in range(first[leaf], first[leaf] + count[leaf]):
+            for c in range(3):
+                i = leaf
+                while i >= 0:
+                    x, y, z = corners[t, c, 0] - out[i, 0], corners[t, c, 1] - out[i, 1], corners[t, c, 2] - out[i, 2]
+                    for j in range(3):
+                        at = out[i, 3 + 3 * j] * x + out[i, 4 + 3 * j] * y + out[i, 5 + 3 * j] * z
+                        low[i, j], high[i, j] = min(low[i, j], at), max(high[i, j], at)
+                    i = parent[i]
+    for i in range(k):
+        square = 0.0
+        for j in range(3):
+            half, middle = 0.5 * (high[i, j] - low[i, j]), 0.5 * (high[i, j] + low[i, j])
+            out[i, 12 + j] = half
+            square += half * half
+            for c in range(3):
+                out[i, c] += middle * out[i, 3 + 3 * j + c]
+        out[i, 15] = math.sqrt(square)
     return out

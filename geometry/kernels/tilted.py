@@ -6,10 +6,10 @@ Notation
     body    a row of (k, 3): radius R, corner radius r, and the height of the body's lower end above the tip. Every body
             goes on upwards without end, as in ``geometry.kernels.drop``
     floor   lowest height, in the axis frame, at which a point can be inside some body: tip + least height
-Nodes keep their boxes in the part's frame. In the axis frame such a box is held by the upright box round its eight
-turned corners: centre turn c, half sides |turn| h. The node's covering plane turns with the part, and bounds as long as
-it still faces upwards. Triangles of a leaf are turned corner by corner and handed to the exact primitives of the
-upright drop, so the answer is as exact as there; only the pruning is looser.
+A body is its core, the disc of radius R - r at height r above its lower end and all above, grown by r on all sides: it
+is convex, and how far a point is from it takes two differences and a root. A node is left out where a plane parts its
+leaning box from every body. Triangles of a leaf are turned corner by corner and handed to the exact primitives of the
+upright drop, so the answer is as exact as there.
 """
 
 from __future__ import annotations
@@ -22,45 +22,17 @@ from numba import njit, prange
 from geometry.kernels.bvh import STACK, TreeArrays, facet_row
 from geometry.kernels.drop import BLOCK_TOLERANCE, bull_of
 from geometry.kernels.options import KERNEL
-from geometry.kernels.revolved import lift_of, node_bound
+from geometry.kernels.revolved import lift_of
 
-FACING = 0.05  # covering planes steeper than this (n_z over n_xy) are not used, as in the tree itself
+SLACK = 1e-7  # mm, more than rounding: what is as near as that to a body is looked into
+LOOKS = 4  # from box to body and back, before a box is taken to be entered
+RUN = 64  # tips one thread asks for in a row
 
 
 @njit(**KERNEL, inline="always")
 def _turned(t, x, y, z):
     return (t[0, 0] * x + t[0, 1] * y + t[0, 2] * z, t[1, 0] * x + t[1, 1] * y + t[1, 2] * z,
             t[2, 0] * x + t[2, 1] * y + t[2, 2] * z)
-
-
-@njit(**KERNEL)
-def _may_enter(lower, upper, column, t, x, y, z, floor, widest, bodies):
-    """Whether a node could hold a point inside some body; no only where that is certain."""
-    hx, hy, hz = 0.5 * (upper[0] - lower[0]), 0.5 * (upper[1] - lower[1]), 0.5 * (upper[2] - lower[2])
-    cx, cy, cz = _turned(t, lower[0] + hx, lower[1] + hy, lower[2] + hz)
-    top = cz + abs(t[2, 0]) * hx + abs(t[2, 1]) * hy + abs(t[2, 2]) * hz
-    if top <= floor:
-        return False
-    ex = abs(t[0, 0]) * hx + abs(t[0, 1]) * hy + abs(t[0, 2]) * hz
-    ey = abs(t[1, 0]) * hx + abs(t[1, 1]) * hy + abs(t[1, 2]) * hz
-    u, v = max(abs(cx - x) - ex, 0.0), max(abs(cy - y) - ey, 0.0)
-    if u * u + v * v > widest * widest:
-        return False
-    a, b, c, sine, slant = 0.0, 0.0, np.inf, 0.0, 1.0
-    if column[7] < np.inf:
-        # the half space -a x - b y + z <= c, turned
-        nx, ny, nz = _turned(t, -column[5], -column[6], 1.0)
-        lean = math.sqrt(nx * nx + ny * ny)
-        if nz > FACING * lean:
-            a, b, c = -nx / nz, -ny / nz, column[7] / nz
-            length = math.sqrt(lean * lean + nz * nz)
-            sine, slant = lean / length, length / nz
-    row = (cx - ex, cx + ex, cy - ey, cy + ey, top, a, b, c, sine, slant)
-    for k in range(bodies.shape[0]):
-        start = z + bodies[k, 2] + BLOCK_TOLERANCE
-        if node_bound(bull_of(bodies[k, 0], bodies[k, 1]), row, x, y, start) > start:
-            return True
-    return False
 
 
 @njit(**KERNEL)
@@ -83,13 +55,83 @@ def _enters(tree, i, t, x, y, z, floor, widest, bodies):
 
 
 @njit(**KERNEL)
-def is_blocked_along(tree: TreeArrays, t, x, y, z, bodies, floor, widest, stack):
-    """Whether some triangle lifts some body by more than 1e-9 mm along the axis.
+def _apart(hull, ux, uy, uz, px, py, pz, bodies):
+    """Whether a node's box stands off every body: certain where it says so.
 
-    t (3, 3) turn, (x, y, z) tip in the axis frame, bodies (k, 3), stack (STACK,) int64 to work in.
+    hull (16,) of ``geometry.kernels.bvh.hull_rows``, (ux, uy, uz) tool axis and (px, py, pz) tip in the frame of the
+    mesh. Box and body are both convex. First their balls and the plane of the slab are tried; then the point of the box
+    and that of the body nearest each other are looked for by going to and fro, and the plane across that way is tried.
     """
-    if not _may_enter(tree.lower[0], tree.upper[0], tree.column[0], t, x, y, z, floor, widest, bodies):
-        return False
+    x, y, z = hull[0] - px, hull[1] - py, hull[2] - pz
+    s = x * ux + y * uy + z * uz
+    rx, ry, rz = x - s * ux, y - s * uy, z - s * uz
+    rho = math.sqrt(rx * rx + ry * ry + rz * rz)
+    ball = hull[15] + SLACK
+    local = False
+    n = a = b = vn = va = vb = q = 0.0
+    for k in range(bodies.shape[0]):
+        if s + ball <= bodies[k, 2]:
+            continue
+        r = min(bodies[k, 1], bodies[k, 0])
+        d, h = bodies[k, 0] - r, bodies[k, 2] + r
+        e, f = max(rho - d, 0.0), max(h - s, 0.0)
+        if e * e + f * f >= (r + ball) * (r + ball):
+            continue
+        if not local:
+            n = hull[3] * ux + hull[4] * uy + hull[5] * uz
+            a = hull[6] * ux + hull[7] * uy + hull[8] * uz
+            b = hull[9] * ux + hull[10] * uy + hull[11] * uz
+            vn = hull[3] * x + hull[4] * y + hull[5] * z
+            va = hull[6] * x + hull[7] * y + hull[8] * z
+            vb = hull[9] * x + hull[10] * y + hull[11] * z
+            q = math.sqrt(max(1.0 - n * n, 0.0))
+            local = True
+        if n >= 0.0:
+            if n * h - r - d * q >= vn + hull[12] + SLACK:
+                continue
+        elif n * h + r + d * q <= vn - hull[12] - SLACK:
+            continue
+        tn = ta = tb = 0.0  # the point of the box, from its middle
+        parted = False
+        for _ in range(LOOKS):
+            wn, wa, wb = vn + tn, va + ta, vb + tb
+            up = wn * n + wa * a + wb * b
+            wn, wa, wb = wn - up * n, wa - up * a, wb - up * b
+            away = math.sqrt(wn * wn + wa * wa + wb * wb)
+            e, f = max(away - d, 0.0), max(h - up, 0.0)
+            far = math.sqrt(e * e + f * f)
+            gap = far - r
+            if gap <= SLACK:
+                break
+            e, f = e / (far * away) if e > 0.0 else 0.0, f / far
+            gn, ga, gb = e * wn - f * n, e * wa - f * a, e * wb - f * b  # out of the body, to this point
+            if (gap - abs(gn) * hull[12] - gn * tn - abs(ga) * hull[13] - ga * ta - abs(gb) * hull[14] - gb * tb
+                    >= SLACK):
+                parted = True
+                break
+            tn = min(max(tn - gap * gn, -hull[12]), hull[12])
+            ta = min(max(ta - gap * ga, -hull[13]), hull[13])
+            tb = min(max(tb - gap * gb, -hull[14]), hull[14])
+        if not parted:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def is_blocked_along(tree: TreeArrays, hulls, t, x, y, z, bodies, floor, widest, stack, last):
+    """Some triangle, in leaf order, that lifts some body by more than 1e-9 mm along the axis; -1 where none does.
+
+    hulls (k, 16) of the nodes, t (3, 3) turn, (x, y, z) tip in the axis frame, bodies (k, 3), stack (STACK,) int64 to
+    work in, last a triangle to try first or -1.
+    """
+    if last >= 0 and _enters(tree, last, t, x, y, z, floor, widest, bodies):
+        return last
+    ux, uy, uz = t[2, 0], t[2, 1], t[2, 2]
+    px = t[0, 0] * x + t[1, 0] * y + ux * z
+    py = t[0, 1] * x + t[1, 1] * y + uy * z
+    pz = t[0, 2] * x + t[1, 2] * y + uz * z
+    if _apart(hulls[0], ux, uy, uz, px, py, pz, bodies):
+        return -1
     stack[0] = 0
     top = 1
     while top > 0:
@@ -99,31 +141,34 @@ def is_blocked_along(tree: TreeArrays, t, x, y, z, bodies, floor, widest, stack)
         if inner < 0:
             for i in range(tree.first[node], tree.first[node] + tree.size[node]):
                 if _enters(tree, i, t, x, y, z, floor, widest, bodies):
-                    return True
+                    return i
             continue
         for child in range(inner, inner + 2):
-            if _may_enter(tree.lower[child], tree.upper[child], tree.column[child], t, x, y, z, floor, widest, bodies):
+            if not _apart(hulls[child], ux, uy, uz, px, py, pz, bodies):
                 stack[top] = child
                 top += 1
-    return False
+    return -1
 
 
 @njit(**KERNEL)
-def _one(tree, turns, which, tips, bodies, least, widest, i):
+def along_range(tree, hulls, turns, which, tips, bodies, least, widest, lo, hi, out):
+    """Whether the tool is blocked at the tips lo .. hi - 1 of tips (n, 3), each in the frame turns[which].
+
+    What blocked the last one is tried first: neighbours tend to be blocked by the same triangle, and any will do.
+    """
     stack = np.empty(STACK, np.int64)
-    z = tips[i, 2]
-    return is_blocked_along(tree, turns[which[i]], tips[i, 0], tips[i, 1], z, bodies, z + least, widest, stack)
-
-
-@njit(**KERNEL)
-def along_range(tree, turns, which, tips, bodies, least, widest, lo, hi, out):
-    """``is_blocked_along`` for the tips lo .. hi - 1 of tips (n, 3), each in the frame turns[which]."""
+    last = -1
     for i in range(lo, hi):
-        out[i] = _one(tree, turns, which, tips, bodies, least, widest, i)
+        z = tips[i, 2]
+        found = is_blocked_along(tree, hulls, turns[which[i]], tips[i, 0], tips[i, 1], z, bodies, z + least, widest,
+                                 stack, last)
+        out[i] = found >= 0
+        last = found if found >= 0 else last
 
 
 @njit(**KERNEL, parallel=True)
-def along_parallel(tree, turns, which, tips, bodies, least, widest, out):
+def along_parallel(tree, hulls, turns, which, tips, bodies, least, widest, out):
     """``along_range`` over all tips, on the threads numba has; the same bytes on any number of them."""
-    for i in prange(tips.shape[0]):
-        out[i] = _one(tree, turns, which, tips, bodies, least, widest, i)
+    n = tips.shape[0]
+    for j in prange((n + RUN - 1) // RUN):
+        along_range(tree, hulls, turns, which, tips, bodies, least, widest, j * RUN, min((j + 1) * RUN, n), out)

@@ -10,6 +10,7 @@ from drop_shapes import CUTTERS, SHAPES, walls
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many
 from geometry.errors import GeometryError
+from geometry.mesh import TriangleMesh
 from geometry.tilted import axis_frames, blocked_along
 
 SPECIAL = [[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [1e-9, 0, -1], [1e-7, 1e-7, 1]]
@@ -90,6 +91,78 @@ def test_threads_do_not_count_and_nothing_blocks_nothing():
         numba.set_num_threads(before)
     assert not blocked_along(tree, frames, which, tips, np.zeros((0, 3))).any()
     assert blocked_along(tree, frames, [], np.zeros((0, 3)), [(1.0, 1.0, 0.0)]).shape == (0,)
+
+
+def strips():
+    """A plate of needles a thousand times as long as wide, and one beside it that leans, cut the other way."""
+    x = np.linspace(0.0, 8.0, 401)
+    at = np.concatenate([np.column_stack([x, 0.0 * x, z + 0.0 * x]) for z in (0.0, 10.0, 20.0)])
+    cells = (np.arange(400)[None, :] + 401 * np.arange(2)[:, None]).ravel()
+    faces = np.concatenate([np.column_stack([cells, cells + 1, cells + 402]),
+                            np.column_stack([cells, cells + 402, cells + 401])])
+    lean = axis_frames([[0.5, 0.3, 1.0]])[0]
+    return TriangleMesh(np.vstack([at, at[:, [2, 0, 1]] @ lean + [12.0, 3.0, -4.0]]),
+                        np.vstack([faces, faces + len(at)]))
+
+
+def questions(mesh, seed):
+    """Frames and tips in the order passes ask them: fans of axes round one place, walks with axes that turn slowly, and
+    places on the lattice of the mesh's own corners, where tool and facet meet exactly."""
+    rng = np.random.default_rng(seed)
+    lo, hi = mesh.bounds
+    tips, ways = [], []
+    for _ in range(12):
+        middle, place = rng.normal(size=3), lo - 1.0 + rng.random(3) * (hi - lo + 2.0)
+        ways.append(middle / np.linalg.norm(middle) + 0.4 * rng.normal(size=(60, 3)))
+        tips.append(np.broadcast_to(place, (60, 3)))
+        share = np.linspace(0.0, 1.0, 60)[:, None]
+        ways.append(middle / np.linalg.norm(middle) + 0.8 * share * rng.normal(size=3))
+        tips.append(place + share * rng.normal(size=3) * 4.0)
+    corners = mesh.vertices[rng.integers(0, len(mesh.vertices), 240)]
+    ways.append(np.array(SPECIAL, float)[rng.integers(0, 4, 240)])
+    tips.append(corners + rng.integers(-2, 3, (240, 3)))
+    frames = axis_frames(np.vstack(ways))
+    return frames, np.einsum("kij,kj->ki", frames, np.vstack(tips))
+
+
+@pytest.mark.parametrize("shape", [*SHAPES, "strips"])
+def test_what_is_left_out_and_what_blocked_last_change_no_answer(shape):
+    """Against a tree of a single leaf, every triangle of which is asked, each question alone; with any threads."""
+    mesh = strips() if shape == "strips" else SHAPES[shape]()
+    tree, plain = TriangleTree(mesh), TriangleTree(mesh, leaf_size=len(mesh.faces))
+    for seed, bodies in enumerate(([(1.0, 1.0, 0.0), (2.0, 0.0, 6.0), (3.0, 0.0, 8.0)], [(2.0, 0.5, 0.0)],
+                                   [(1.0, 0.0, 0.0), (4.0, 0.0, 2.0), (1.5, 0.0, 1.0)], [(0.0, 0.0, 0.0)])):
+        frames, tips = questions(mesh, seed)
+        n = len(tips)
+        got = blocked_along(tree, frames, np.arange(n), tips, bodies)
+        alone = [bool(blocked_along(plain, frames[j:j + 1], [0], tips[j:j + 1], bodies)[0]) for j in range(n)]
+        np.testing.assert_array_equal(got, alone)
+        mixed = np.random.default_rng(seed).permutation(n)
+        np.testing.assert_array_equal(blocked_along(tree, frames, mixed, tips[mixed], bodies), got[mixed])
+        before = numba.get_num_threads()
+        try:
+            for threads in {1, before}:
+                numba.set_num_threads(threads)
+                np.testing.assert_array_equal(blocked_along(tree, frames, np.arange(n), tips, bodies), got)
+        finally:
+            numba.set_num_threads(before)
+    assert got.mean() < 0.9
+
+
+@pytest.mark.parametrize("shape", [*SHAPES, "strips"])
+def test_leaning_boxes_hold_their_triangles(shape):
+    mesh = strips() if shape == "strips" else SHAPES[shape]()
+    tree = TriangleTree(mesh)
+    t, hulls = tree.arrays, tree.hulls
+    ways = hulls[:, 3:12].reshape(-1, 3, 3)
+    np.testing.assert_allclose(ways @ ways.transpose(0, 2, 1), np.broadcast_to(np.eye(3), ways.shape), atol=1e-11)
+    for leaf in np.flatnonzero(t.child < 0).tolist():
+        corners, node = t.corners[t.first[leaf]:t.first[leaf] + t.size[leaf]].reshape(-1, 3), leaf
+        while node >= 0:
+            off = corners - hulls[node, :3]
+            assert (np.abs(off @ ways[node].T) <= hulls[node, 12:15] + 1e-9).all()
+            assert (np.linalg.norm(off, axis=1) <= hulls[node, 15] + 1e-9).all()
+            node = int(t.parent[node])
 
 
 @pytest.mark.parametrize(("changes", "subject"), [
