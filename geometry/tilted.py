@@ -44,9 +44,13 @@ def axis_frames(axes: ArrayLike) -> F64:
     flip = np.where(unit[:, 2:] < 0.0, [1.0, -1.0, -1.0], 1.0)  # what points down is turned about X first
     x, y, z = (unit * flip).T
     f = 1.0 / (1.0 + z)
-    rows = [np.stack([1.0 - f * x * x, -f * x * y, -x], axis=-1),
-            np.stack([-f * x * y, 1.0 - f * y * y, -y], axis=-1), np.stack([x, y, z], axis=-1)]
-    return np.ascontiguousarray(np.stack(rows, axis=1) * flip[:, None, :] + 0.0)
+    out = np.empty((len(unit), 3, 3))
+    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = 1.0 - f * x * x, -f * x * y, -x
+    out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = -f * x * y, 1.0 - f * y * y, -y
+    out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = x, y, z
+    out *= flip[:, None, :]
+    out += 0.0  # no zero with a sign
+    return out
 
 
 def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips: ArrayLike,

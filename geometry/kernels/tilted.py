@@ -55,8 +55,8 @@ def _enters(tree, i, t, x, y, z, floor, widest, bodies):
 
 
 @njit(**KERNEL)
-def _apart(hull, ux, uy, uz, px, py, pz, bodies):
-    """Whether a node's box stands off every body: certain where it says so.
+def _off(hull, ux, uy, uz, px, py, pz, bodies):
+    """How far the middle of a node's box is from a body that may enter the box; infinite where certainly none does.
 
     hull (16,) of ``geometry.kernels.bvh.hull_rows``, (ux, uy, uz) tool axis and (px, py, pz) tip in the frame of the
     mesh. Box and body are both convex. First their balls and the plane of the slab are tried; then the point of the box
@@ -113,8 +113,8 @@ def _apart(hull, ux, uy, uz, px, py, pz, bodies):
             ta = min(max(ta - gap * ga, -hull[13]), hull[13])
             tb = min(max(tb - gap * gb, -hull[14]), hull[14])
         if not parted:
-            return False
-    return True
+            return max(rho - bodies[k, 0], bodies[k, 2] - s)
+    return np.inf
 
 
 @njit(**KERNEL)
@@ -130,7 +130,7 @@ def is_blocked_along(tree: TreeArrays, hulls, t, x, y, z, bodies, floor, widest,
     px = t[0, 0] * x + t[1, 0] * y + ux * z
     py = t[0, 1] * x + t[1, 1] * y + uy * z
     pz = t[0, 2] * x + t[1, 2] * y + uz * z
-    if _apart(hulls[0], ux, uy, uz, px, py, pz, bodies):
+    if _off(hulls[0], ux, uy, uz, px, py, pz, bodies) == np.inf:
         return -1
     stack[0] = 0
     top = 1
@@ -143,10 +143,15 @@ def is_blocked_along(tree: TreeArrays, hulls, t, x, y, z, bodies, floor, widest,
                 if _enters(tree, i, t, x, y, z, floor, widest, bodies):
                     return i
             continue
-        for child in range(inner, inner + 2):
-            if not _apart(hulls[child], ux, uy, uz, px, py, pz, bodies):
-                stack[top] = child
-                top += 1
+        left = _off(hulls[inner], ux, uy, uz, px, py, pz, bodies)
+        right = _off(hulls[inner + 1], ux, uy, uz, px, py, pz, bodies)
+        later = inner if left > right else inner + 1  # deeper in the tool goes first: it is likelier to block
+        if max(left, right) < np.inf:
+            stack[top] = later
+            top += 1
+        if min(left, right) < np.inf:
+            stack[top] = inner + inner + 1 - later
+            top += 1
     return -1
 
 
