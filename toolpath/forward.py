@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
@@ -108,8 +109,7 @@ class Profile:
 
     def pieces(self) -> F64:
         """(k, 6, 4) float64: contact and normal as cubics of the way into each interval."""
-        spline = CubicSpline(self.ways, np.column_stack([self.contact, self.normal]))
-        return np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+        return np.ascontiguousarray(self._spline.c.transpose(1, 2, 0))
 
     def parameters(self, way: F64) -> F64:
         """(n,) float64, the parameters at ways (n,) mm."""
@@ -117,9 +117,13 @@ class Profile:
 
     def centres(self, way: F64, radius: float) -> F64:
         """(n, 3) float64, mm: centres of a ball of a radius (mm) that touches the pass at ways (n,) mm."""
-        spline = CubicSpline(self.ways, np.column_stack([self.contact, self.normal]))(way)
+        spline = self._spline(way)
         normal = spline[:, 3:] / np.linalg.norm(spline[:, 3:], axis=1)[:, None]
         return np.asarray(spline[:, :3] + radius * normal)
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.ways, np.column_stack([self.contact, self.normal]))
 
 
 def _way(points: F64) -> F64:

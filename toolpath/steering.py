@@ -217,20 +217,24 @@ def _chain(tries: F64, cost: F64, stiff: float, ends: tuple[F64 | None, F64 | No
 
     ends : (3,) axes before the first and after the last station, or None
     """
-    def turned(a: F64, b: F64) -> F64:
-        return np.asarray(2.0 * stiff * (1.0 - a @ b.T))
-
-    best = cost[0] + (turned(tries[0], ends[0][None])[:, 0] if ends[0] is not None else 0.0)
-    back = np.zeros(cost.shape, np.int64)
+    # Another axis at one station changes two turns, each by 4 stiff at most: an axis dearer than that is on no chain.
+    kept = [np.flatnonzero(c <= c.min() + 8.0 * stiff) for c in cost]
+    best, back = cost[0, kept[0]], []
+    if ends[0] is not None:
+        best = best + 2.0 * stiff * (1.0 - tries[0, kept[0]] @ ends[0])
     for k in range(1, len(cost)):
-        through = best[None, :] + turned(tries[k], tries[k - 1])
-        back[k] = through.argmin(axis=1)
-        best = cost[k] + through.min(axis=1)
+        # of 2 stiff (1 - a b) + best the part that counts, in one product
+        here, there = tries[k, kept[k]], tries[k - 1, kept[k - 1]]
+        through = np.column_stack([-2.0 * stiff * here, np.ones(len(here))]) @ np.column_stack([there, best]).T
+        back.append(through.argmin(axis=1))
+        best = cost[k, kept[k]] + 2.0 * stiff + through[np.arange(len(here)), back[-1]]
     if ends[1] is not None:
-        best = best + turned(tries[-1], ends[1][None])[:, 0]
-    out = [int(best.argmin())]
+        best = best + 2.0 * stiff * (1.0 - tries[-1, kept[-1]] @ ends[1])
+    at = int(best.argmin())
+    out = [int(kept[-1][at])]
     for k in range(len(cost) - 1, 0, -1):
-        out.append(int(back[k, out[-1]]))
+        at = int(back[k - 1][at])
+        out.append(int(kept[k - 1][at]))
     return np.array(out[::-1], np.int64)
 
 
