@@ -139,7 +139,7 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
     """
     step = stock.lattice.step
     deep, spacing = max(thick, CELLS * step), 2.0 * step
-    if thick > 0.0 and deep > 2.0 * thick:
+    if not len(tips) or thick > 0.0 and deep > 2.0 * thick:
         return np.ones(len(tips), np.bool_)
     room = max((stock.highest - float(tips[:, 2].min())) / max(float(axes[:, 2].min()), 1e-3), 0.0)
     corner, flat = tool.corner_radius, tool.radius - tool.corner_radius

@@ -71,6 +71,13 @@ def test_neck_shank_and_holder_meet_no_stock_at_all():
     assert not asked(block((6.0, 5.0), (8.0, 25.0, 24.0)), [17.0, 15.0, 0.5], upright, body, 0.9, holder)
 
 
+def test_no_pose_is_asked_without_an_error():
+    """A pass that is in the part wherever it is raised to has none left: seed 15 of the five-axis sweep ended there."""
+    stock = block((0.0, 0.0), (30.0, 30.0, 3.0))
+    none = loaded(stock, np.zeros((0, 3)), np.zeros((0, 3)), tool(6.0, 1.0), (), Clearances(), 0.6)
+    assert none.shape == (0,) and none.dtype == np.bool_
+
+
 def test_a_lattice_too_coarse_to_tell_lets_nothing_through():
     assert asked(block((0.0, 0.0), (1.0, 1.0, 1.0)), [15.0, 15.0, 5.0], LEAN, tool(0.6, 0.1), 0.06)
 
