@@ -191,9 +191,14 @@ def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
         if not len(todo):
             break
     need[todo] = 0
-    at = np.arange(len(need), dtype=np.float64)
-    return [*(part.raised(k * layer) for k in range(int(need.max()), 0, -1)
-              for part in dense.parts(binary_dilation(need >= k), at, LEAST_PIECE * tool.radius)), piece]
+    free = np.ones(len(need), np.bool_)
+    free[todo] = False
+    at, out = np.arange(len(need), dtype=np.float64), []
+    for k in range(int(need.max()), 0, -1):
+        own = np.flatnonzero(binary_dilation(need >= k))
+        through = free & (at >= own[0]) & (at <= own[-1])  # to begin again in the middle of it costs more than to go on
+        out += [part.raised(k * layer) for part in dense.parts(through, at, LEAST_PIECE * tool.radius)]
+    return [*out, piece]
 
 
 def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
@@ -268,7 +273,10 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     dense = Piece(tips, axes, axes, piece.reach).at(places_along(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
         return LOADED
-    ways = [_way_in(p, tool, settings, around, thick) for p in (piece, piece.reversed())]
+    straight_up = [(np.zeros(3), thick, SKIN * tool.diameter)]  # where it has been it may go as it stands
+    back = piece.reversed()
+    ways = [_way_in(piece, tool, settings, around, _leads(piece, tool, thick)),
+            _way_in(back, tool, settings, around, straight_up if piece.on_end else _leads(back, tool, thick))]
     if ways[0] is None or ways[1] is None:
         return "the tool does not get there along its own axis"
     (first, clear), (last, free) = ways[0], ways[1]
@@ -318,8 +326,13 @@ def _steady(feeds: F64) -> list[tuple[int, int]]:
     return list(zip(at[:-1], at[1:], strict=True))
 
 
+Lead = tuple[F64, float, float]
+"""Where a tool may come down, (3,) mm off the beginning of a pass, and what stock it may meet there, mm, at its flank
+and under its end."""
+
+
 def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
-            thick: float) -> tuple[F64, bool] | None:
+            leads: Sequence[Lead]) -> tuple[F64, bool] | None:
     """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
 
     True where no stock is met but at the very end. Beside it where there is room for that; else straight down: along a
@@ -327,7 +340,7 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
     more than a skin under it.
     """
     axis, tip = piece.axes[0], piece.tips[0]
-    for aside, stock, under in _leads(piece, tool, thick):
+    for aside, stock, under in leads:
         beside = tip + aside
         dip = tip[2] - float(lowest(tip[None], axis[None], tool, around.discs, UP_Z)[0])
         high = (settings.clearance + max(dip, 0.0) - beside[2]) / axis[2]
@@ -343,9 +356,8 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
     return None
 
 
-def _leads(piece: Piece, tool: ToolBody, thick: float) -> list[tuple[F64, float, float]]:
-    """Where beside the beginning of a piece the tool may come down, (3,) mm off it, with the stock it may meet there,
-    mm, at its flank and under its end."""
+def _leads(piece: Piece, tool: ToolBody, thick: float) -> list[Lead]:
+    """Where the tool may come down at the beginning of a piece, the best first."""
     room, skin, axis = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0]
     if piece.on_end:
         back = piece.tips[0] - piece.tips[1]

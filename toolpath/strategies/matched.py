@@ -36,6 +36,7 @@ LAID_SHARE = 0.8  # of the scallop, given to the strips; chords and facets take 
 ALONG, UP = 65, 33  # places of a face at which it is asked what it serves
 TRIED = 9  # places each way at which the tool is tried before passes are laid out
 LEAST_FREE = 0.25  # of those that are wanted
+OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
 LEAST_AREA = 4.0  # of the squared radius
 LEAST_STRIP = 1e-3  # mm
 MOST_LOOK = 0.5  # mm between poses that are held against what stands round the pass
@@ -88,7 +89,7 @@ def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
     """
     chord = SHARE * settings.chordal_tolerance
     asked = Wanted(LAID_SHARE * settings.scallop_height, chord, LEAST_TILT, chord)
-    ends = _Ends(tool, asked, around, allowance, cKDTree(target.points), target.spacing)
+    ends = _Ends(tool, asked, around, allowance, settings.lift, cKDTree(target.points), target.spacing)
     found: list[tuple[str, Piece]] = []
     refused: list[str] = []
     for face in faces:
@@ -112,6 +113,7 @@ class _Ends:
     """What the passes of a zone have in common.
 
     asked         : Wanted of them
+    lift          : mm, by which a pass may stand off where facets of the part are in its way
     near, spacing : tree of the places wanted and mm between these
     """
 
@@ -119,6 +121,7 @@ class _Ends:
     asked: Wanted
     around: Surroundings
     allowance: float
+    lift: float
     near: cKDTree
     spacing: float
 
@@ -168,16 +171,30 @@ class _Ends:
         """The pieces of one pass where it is wanted and the tool is free."""
         xi = over.ways(s)
         tip, axis, normal = over.poses(s, xi)
-        whole, own = Piece(tip, axis, normal, self.tool.radius, on_end=True), np.arange(len(xi), dtype=np.float64)
+        own = np.arange(len(xi), dtype=np.float64)
         gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
         looks = np.arange(0.0, gone[-1], min(LOOK * self.tool.radius, MOST_LOOK))
         places = np.unique(np.concatenate([own, np.interp(looks, gone, own)]))
-        dense = whole.at(places)
+        whole, met = self._off(Piece(tip, axis, normal, self.tool.radius, on_end=True), places)
         here = np.clip(np.interp(places, own, xi), 0.0, 1.0)
         asked = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
-        good = asked & ~self.blocked(dense.tips, dense.axes)
+        good = asked & ~met
         return [part.raised(self.allowance)
                 for part in whole.parts(good, places, LEAST_PIECE * self.tool.radius)]
+
+    def _off(self, piece: Piece, places: F64) -> tuple[Piece, NDArray[np.bool_]]:
+        """A pass as little off the surface as is free wherever standing off frees it, and (m,) bool where it is not.
+
+        Facets of a hollow lie over its surface, and a matched nose is close to it far to both sides.
+        """
+        farthest = piece.raised(self.lift).at(places)
+        least = self.blocked(farthest.tips, farthest.axes)
+        for share in OFFS:
+            tried = piece.raised(share * self.lift)
+            dense = tried.at(places)
+            if not self.blocked(dense.tips[~least], dense.axes[~least]).any():
+                return tried, least
+        return piece.raised(self.lift), least
 
 
 def predicted(iso: IsoSurface, tool: ToolBody, asked: Wanted, feed: float) -> float:
