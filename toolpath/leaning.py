@@ -29,6 +29,7 @@ LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes
 MOST_LEAD = 1.5  # mm
 THICK = 0.12  # of the diameter: what a leaning tool may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
+LEAST_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
@@ -62,7 +63,8 @@ class Surroundings:
     def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
         """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
         low = lowest(tips, axes, tool, self.discs, self.turning.up)
-        return self.enters(tips, axes) | ~self.turning.stands(axes) | (low < self.turning.table)
+        lies = np.minimum(axes @ self.turning.up, axes[:, 2]) < LEAST_UP
+        return self.enters(tips, axes) | lies | ~self.turning.stands(axes) | (low < self.turning.table)
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
         """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank."""
@@ -141,7 +143,8 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
     deep, spacing = max(thick, CELLS * step), 2.0 * step
     if not len(tips) or thick > 0.0 and deep > 2.0 * thick:
         return np.ones(len(tips), np.bool_)
-    room = max((stock.highest - float(tips[:, 2].min())) / max(float(axes[:, 2].min()), 1e-3), 0.0)
+    over, across = stock.highest - float(tips[:, 2].min()), stock.lattice.step * math.hypot(*stock.top.shape)
+    room = max(min(over / max(float(axes[:, 2].min()), 1e-3), over + across), 0.0)  # along the axis, until out of it
     corner, flat = tool.corner_radius, tool.radius - tool.corner_radius
 
     def heights(begin: float, end: float) -> F64:
