@@ -125,5 +125,9 @@ def strip_edges(high: F64, feet: F64, height: float) -> F64:
     k = np.where(over.any(axis=2), over.argmax(axis=2), high.shape[2] - 1).clip(1)
     i, j = np.indices(k.shape)
     a, b = high[i, j, k - 1], high[i, j, k]
-    share = np.clip((height - a) / np.where(b > a, b - a, 1.0), 0.0, 1.0)[..., None]
+    # heights grow with the second power of the way aside at least: their roots, from the lowest place on, lie no higher
+    # than a straight line between two places, and on it where contact is of the first order
+    deepest = np.minimum(np.fmin.reduce(high, axis=2), 0.0)
+    p, q, at = (np.sqrt(np.maximum(v - deepest, 0.0)) for v in (a, b, height))
+    share = np.clip((at - p) / np.where(q > p, q - p, 1.0), 0.0, 1.0)[..., None]
     return np.asarray(feet[i, j, k - 1] + share * (feet[i, j, k] - feet[i, j, k - 1]))

@@ -112,6 +112,22 @@ def test_the_strip_is_where_the_nose_stands_lower_than_the_height():
     assert high.min() > -1e-6
 
 
+@pytest.mark.parametrize(("surface", "depth"), [(bowl(-200.0, -150.0), 0.0), (bowl(60.0, 150.0, 1e-5), 0.0),
+                                                (bowl(60.0, 150.0, 1e-5), 1e-3), (bowl(80.0, -90.0), 0.0)])
+def test_edges_lie_where_a_nose_of_many_places_has_them(surface, depth):
+    """Of a strip but two places of the nose wide a straight line between heights took 6 %."""
+    body, rng = tool(30.0, 0.0), np.random.default_rng(6)
+    at = Contacts.on(surface, rng.uniform(0.3, 0.7, (20, 2)), np.tile([0.0, 1.0], (20, 1)))
+    nose, turn = Nose(surface, body, surface.domain), rng.uniform(-0.1, 0.1, 20)
+    tilt = nose.least_tilt(at, turn, depth, np.radians(0.25))
+
+    def halves(count):
+        edges = strip_edges(*nose.heights(at, tilt, turn, count), 0.005)
+        return np.array([((surface.points(e) - at.point) * at.left).sum(axis=1) for e in edges])
+
+    assert halves(65) == pytest.approx(halves(8193), rel=0.01)
+
+
 def test_a_tilt_below_the_least_enters_and_one_above_does_not():
     surface, body = bowl(40.0, 25.0, 2e-5), tool(12.0, 1.0)
     uv = np.random.default_rng(1).uniform(0.2, 0.8, (12, 2))
