@@ -1,9 +1,15 @@
-"""Flat ends matched to curvature against balls: on a plane, and on surfaces in the range of papers/001.
+"""Flat ends matched to curvature against balls: on a plane, on surfaces in the range of papers/001, on a blade.
 
-Run from the root of the checkout: ``python benchmarks/bench_matching.py [--plane] [--ranges A B C]``; both where
-nothing is asked. What passes leave, and how deep they cut, is measured by ``verify.removal`` on the exact surface, 1 mm
-apart. The bound is the closed form of a strip at the match, or at the least tilt where there is none, integrated over
-the surface: as many passes as if each could be as wide everywhere as it is in the middle of its strip.
+Run from the root of the checkout: ``python benchmarks/bench_matching.py [--plane] [--ranges A B C] [--split A B C D]
+[--blade --public DIR]``; the first two where nothing is asked.
+
+split : the ranges whole, fed the better way, and parted; and D, whose curvatures change places: 600 mm across all over,
+        1200 mm along on one half and 150 mm on the other
+blade : both sides of a blade of the KJ66 wheel; nothing of the wheel is looked at but that face
+
+What passes leave, and how deep they cut, is measured by ``verify.removal`` on the exact surface, 1 mm apart (0.15 mm on
+the blade). The bound is the closed form of a strip at the match, or at the least tilt where there is none, integrated
+over the surface: as many passes as if each could be as wide everywhere as it is in the middle of its strip.
 """
 
 from __future__ import annotations
@@ -14,27 +20,44 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 from scipy.interpolate import make_interp_spline  # noqa: E402
 
+from geometry.facepatches import read_patches  # noqa: E402
+from geometry.footpoints import foot_points  # noqa: E402
 from geometry.gridmap import GridMap  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
+from geometry.sampling import sample_surface  # noqa: E402
+from geometry.step import read_part  # noqa: E402
 from geometry.toolbody import ToolBody  # noqa: E402
+from geometry.trim import trim_faces  # noqa: E402
+from service.convert import parse_setup  # noqa: E402
+from service.prepare import placement_of  # noqa: E402
+from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface  # noqa: E402
 from toolpath.isoparametric import lay_out as ball_passes  # noqa: E402
 from toolpath.locations import tips  # noqa: E402
 from toolpath.matched import Matched, Wanted  # noqa: E402
 from toolpath.matching import matching_tilt, strip_width  # noqa: E402
+from toolpath.parted import Part, parted  # noqa: E402
+from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
 from verify.removal import Moves, residual_on_normals  # noqa: E402
 from verify.toolaxes import ToolAxes  # noqa: E402
+
+Poses = tuple[F64, F64]
+"""A pass: tips (k, 3), mm, and axes (k, 3), unit."""
 
 HALF, SPANS = 130.0, 48  # mm, of the range each way; of the splines through it
 SCALLOP, DEPTH, CHORD = 0.005, 0.001, 0.0003  # mm
 LEFT_SHARE = 0.95  # of the scallop, given to the strips; what lies between places that are looked at takes the rest
-LEAST = {"A": 0.0, "B": 0.0, "C": 0.25}  # degrees
+LEAST = {"A": 0.0, "B": 0.0, "C": 0.25, "D": 0.0}  # degrees
+WHEEL = "imp_kj66_compressor_wheel.step"
+BLADE_TOOL, BLADE_SCALLOP, BLADE_CHORD, BLADE_LEAST = 6.0, 0.01, 0.0005, float(np.radians(0.25))
+BLADE_AREA = 1000.0  # mm², at least, of a side of a blade
 
 
 def range_a(x: F64, y: F64) -> F64:
@@ -52,8 +75,16 @@ def range_c(x: F64, y: F64) -> F64:
     return -range_a(x, y)
 
 
+def range_d(x: F64, y: F64) -> F64:
+    """A hollow of 600 mm across, of 1200 mm along and, from the middle on, of 150 mm."""
+    at = np.linspace(-HALF, HALF, 521)
+    step = np.clip((at + 20.0) / 40.0, 0.0, 1.0)
+    curved = 1.0 / 1200.0 + (1.0 / 150.0 - 1.0 / 1200.0) * step * step * (3.0 - 2.0 * step)
+    return np.asarray(x * x / 1200.0 + make_interp_spline(at, curved, 3).antiderivative(2)(y))
+
+
 RANGES: dict[str, tuple[Callable[[F64, F64], F64], bool]] = {
-    "A": (range_a, True), "B": (range_b, True), "C": (range_c, False)}
+    "A": (range_a, True), "B": (range_b, True), "C": (range_c, False), "D": (range_d, True)}
 
 
 def spline_of(height: Callable[[F64, F64], F64]) -> NurbsSurface:
@@ -90,16 +121,31 @@ def bound(iso: IsoSurface, tool: ToolBody, least: float) -> tuple[float, float]:
     return float(np.mean(counts)), max(counts)
 
 
-def measured(surface: NurbsSurface, tool: ToolBody, passes: list[tuple[F64, F64]]) -> tuple[float, float]:
-    """The most that passes leave and the deepest they cut, mm; passes as tips and axes."""
-    at = (np.arange(260) + 0.5) / 260.0
-    points, normals = surface.points_and_normals(np.stack(np.meshgrid(at, at), axis=-1).reshape(-1, 2))
+def measured(points: F64, normals: F64, tool: ToolBody, passes: list[Poses]) -> tuple[float, float]:
+    """The most that passes leave at places (n, 3) and the deepest they cut, mm."""
     start, stop = (np.concatenate([t[cut] for t, _ in passes]) for cut in (slice(-1), slice(1, None)))
     first, last = (np.concatenate([a[cut] for _, a in passes]) for cut in (slice(-1), slice(1, None)))
     moves = Moves(start, stop, np.ones(len(start), bool), np.zeros(len(start), np.int32),
                   ToolAxes.between(first, last))
     left, _ = residual_on_normals(points, normals, np.full(len(points), 2.0), moves, [tool], bow=1e-5)
     return float(left.max()), float(-left.min())
+
+
+def everywhere(surface: NurbsSurface) -> tuple[F64, F64]:
+    """Places and normals 1 mm apart in plan."""
+    at = (np.arange(260) + 0.5) / 260.0
+    return surface.points_and_normals(np.stack(np.meshgrid(at, at), axis=-1).reshape(-1, 2))
+
+
+def metres(passes: list[Poses]) -> float:
+    """How far the tip goes along passes."""
+    return 1e-3 * float(sum(np.linalg.norm(np.diff(tip, axis=0), axis=1).sum() for tip, _ in passes))
+
+
+def laid(isos: list[IsoSurface], tool: ToolBody, wanted: Wanted) -> list[Poses]:
+    """Passes over pieces of a surface."""
+    made = [Matched.over(iso, tool, wanted) for iso in isos]
+    return [m.located(s) for m in made for s in m.lay_out()]
 
 
 def ranges(names: list[str]) -> None:
@@ -113,16 +159,110 @@ def ranges(names: list[str]) -> None:
         balls = len(ball_passes(iso, 15.0, SCALLOP))
         for tool in (end(60.0, 0.0), end(60.0, 3.0)):
             begin = time.perf_counter()
-            made = Matched.over(iso, tool, Wanted(LEFT_SHARE * SCALLOP, DEPTH, least, CHORD))
-            strips = made.lay_out()
-            passes = [made.located(s) for s in strips]
+            passes = laid([iso], tool, Wanted(LEFT_SHARE * SCALLOP, DEPTH, least, CHORD))
             seconds = time.perf_counter() - begin
-            most, deep = measured(surface, tool, passes)
+            most, deep = measured(*everywhere(surface), tool, passes)
             mean, worst = bound(iso, tool, least)
-            told = (name, f"{tool.kind} 60, corner {tool.corner_radius:g}", len(strips),
-                    f"{mean:.1f}, {worst:.1f}", balls, f"{balls / len(strips):.1f}", f"{most:.5f}", f"{deep:.5f}",
+            told = (name, f"{tool.kind} 60, corner {tool.corner_radius:g}", len(passes),
+                    f"{mean:.1f}, {worst:.1f}", balls, f"{balls / len(passes):.1f}", f"{most:.5f}", f"{deep:.5f}",
                     f"{seconds:.0f}")
             print(f"| {' | '.join(map(str, told))} |", flush=True)
+
+
+def split(names: list[str]) -> None:
+    """Passes over the ranges whole, fed the better way, and parted; the last column is the way that was foreseen, with
+    the ends and the way round."""
+    print("| range | tool | split | pieces: xi, eta, feed | passes | m | most left mm | deepest mm | s | foreseen m |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name in names:
+        height, turned = RANGES[name]
+        surface = spline_of(height)
+        iso = whole(surface, turned)
+        wanted = Wanted(LEFT_SHARE * SCALLOP, DEPTH, float(np.radians(LEAST[name])), CHORD)
+        for tool in (end(60.0, 0.0), end(60.0, 3.0)):
+            one, several = (parted(iso, tool, wanted, cut=cut) for cut in (False, True))
+            for told, parts in (("off", one), ("on", several))[:1 if len(several) == 1 else 2]:
+                begin = time.perf_counter()
+                passes = laid([p.iso for p in parts], tool, wanted)
+                seconds = time.perf_counter() - begin
+                row(name, f"{tool.kind} 60, corner {tool.corner_radius:g}", told if len(several) > 1 else "off = on",
+                    described(parts), len(passes), f"{metres(passes):.2f}",
+                    *(f"{v:.5f}" for v in measured(*everywhere(surface), tool, passes)), f"{seconds:.0f}",
+                    f"{1e-3 * sum(p.way for p in parts):.2f}")
+
+
+def row(*told: object) -> None:
+    """A row of a table."""
+    print(f"| {' | '.join(map(str, told))} |", flush=True)
+
+
+def described(parts: list[Part]) -> str:
+    """Pieces in words."""
+    return "; ".join(f"{p.low[0]:.2f}-{p.high[0]:.2f}, {p.low[1]:.2f}-{p.high[1]:.2f}, "
+                     f"{'v' if p.iso.turned else 'u'}" for p in parts)
+
+
+def ball_poses(iso: IsoSurface, radius: float, scallop: float, chord: float) -> list[Poses]:
+    """Passes of a ball whose axis is the normal."""
+    out = []
+    for eta in ball_passes(iso, radius, scallop).tolist():
+        profile = Profile.of(iso.curve(eta), chord, radius)
+        ways = steps(profile, radius, chord, scallop)
+        even = profile.width * np.arange(len(profile.normal))
+        axis = np.column_stack([np.interp(ways, even, n) for n in profile.normal.T])
+        axis /= np.linalg.norm(axis, axis=1)[:, None]
+        out.append((profile.centres(ways, radius) - radius * axis, axis))
+    return out
+
+
+def blade_faces(folder: Path) -> dict[str, tuple[TrimmedFace, F64, F64]]:
+    """Of both sides of a blade the trimmed face, and places and normals on it, by what the side is."""
+    setup = parse_setup((ROOT / "examples/setups/kj66_compressor_wheel.json").read_text())
+    part = read_part(folder / WHEEL, placement=placement_of(setup), solid=setup.part.solid, chord=0.02)
+    large = [f.number for f in part.faces if f.surface == "bspline" and f.area > BLADE_AREA]
+    patches = read_patches(folder / WHEEL, large, placement=placement_of(setup), solid=setup.part.solid)
+    sides = {}
+    for number in large:
+        exact, own = patches[number], part.mesh.face_ids == number
+        if 2 in exact.surface.orders:  # ruled, as the sides of blades are and the hub is not
+            curved = exact.surface.curvature(exact.parameters(part.uv[own].reshape(-1, 2)))
+            sides[number] = float(np.median(curved.sum(axis=1)))
+    out = {}
+    for told, number in (("hollow side", min(sides, key=lambda n: sides[n])),
+                         ("round side", max(sides, key=lambda n: sides[n]))):
+        exact = patches[number]
+        patch = trim_faces(part, [number], lambda p, _n, _f: np.zeros(len(p), np.int64), 1e3)[0][0]
+        face = TrimmedFace(number, exact.surface, tuple(exact.parameters(q) for q in patch.loops), patch.area)
+        s = sample_surface(part.mesh, 45.0, seed=2, triangles=np.flatnonzero(part.mesh.face_ids == number))
+        foot = foot_points(exact.surface, s.points, exact.parameters(part.uv[s.triangle].mean(axis=1)))
+        out[f"F{number}, {told}"] = (face, *exact.surface.points_and_normals(foot.uv))
+    return out
+
+
+def blade(folder: Path | None) -> None:
+    """Both sides of a blade of the wheel by ends and by a ball as wide, the face alone looked at."""
+    if folder is None or not (folder / WHEEL).exists():
+        print(f"no blade: {WHEEL} is not in the folder given by --public")
+        return
+    print("| face | tool | split | pieces | passes | m | most left mm | deepest mm | s |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    wanted = Wanted(LEFT_SHARE * BLADE_SCALLOP, DEPTH, BLADE_LEAST, BLADE_CHORD)
+    for told, (face, points, normals) in blade_faces(folder).items():
+        isos = [IsoSurface(face.surface, piece.map) for piece in face.pieces]
+        radius = BLADE_TOOL / 2.0
+        passes = [p for iso in isos for p in ball_poses(iso, radius, LEFT_SHARE * BLADE_SCALLOP, BLADE_CHORD)]
+        ball = end(BLADE_TOOL, radius)
+        row(told, f"ball {BLADE_TOOL:g}", "", len(isos), len(passes), f"{metres(passes):.2f}",
+            *(f"{v:.5f}" for v in measured(points, normals, ball, passes)), "")
+        for tool in (end(BLADE_TOOL, 0.0), end(BLADE_TOOL, 1.0)):
+            for cut in (False, True):
+                begin = time.perf_counter()
+                parts = [p for iso in isos for p in parted(iso, tool, wanted, cut=cut)]
+                passes = laid([p.iso for p in parts], tool, wanted)
+                seconds = time.perf_counter() - begin
+                row(told, f"{tool.kind} {BLADE_TOOL:g}, corner {tool.corner_radius:g}", "on" if cut else "off",
+                    described(parts), len(passes), f"{metres(passes):.2f}",
+                    *(f"{v:.5f}" for v in measured(points, normals, tool, passes)), f"{seconds:.0f}")
 
 
 def plane() -> None:
@@ -149,11 +289,19 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--plane", action="store_true")
     asked.add_argument("--ranges", nargs="+", choices=sorted(RANGES))
+    asked.add_argument("--split", nargs="*", choices=sorted(RANGES))
+    asked.add_argument("--blade", action="store_true")
+    asked.add_argument("--public", type=Path, help="folder of the parts by others")
     given = asked.parse_args()
-    if given.plane or not given.ranges:
+    nothing = not (given.plane or given.ranges or given.blade or given.split is not None)
+    if given.plane or nothing:
         plane()
-    if given.ranges or not given.plane:
-        ranges(given.ranges or sorted(RANGES))
+    if given.ranges or nothing:
+        ranges(given.ranges or ["A", "B", "C"])
+    if given.split is not None:
+        split(given.split or sorted(RANGES))
+    if given.blade:
+        blade(given.public)
 
 
 if __name__ == "__main__":

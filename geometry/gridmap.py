@@ -6,7 +6,7 @@ Notation
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -21,10 +21,15 @@ STRAIGHT = 0.05  # of the mean: at a corner of the square where the border goes 
 
 @dataclass(frozen=True, eq=False)
 class GridMap:
-    """Bicubic splines through a grid: u and v over (eta, xi)."""
+    """Bicubic splines through a grid: u and v over (eta, xi).
+
+    low, high : (2,), xi and eta of the splines between which the unit square lies
+    """
 
     u: RectBivariateSpline
     v: RectBivariateSpline
+    low: tuple[float, float] = (0.0, 0.0)
+    high: tuple[float, float] = (1.0, 1.0)
 
     @classmethod
     def of(cls, grid: F64) -> GridMap:
@@ -55,9 +60,21 @@ class GridMap:
 
     def __call__(self, xi: F64, eta: F64) -> F64:
         """(p, 2) float64, (u, v) at xi and eta, both (p,)."""
-        return np.column_stack([self.u.ev(eta, xi), self.v.ev(eta, xi)])
+        x, y = self._within(xi, eta)
+        return np.column_stack([self.u.ev(y, x), self.v.ev(y, x)])
 
     def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Derivatives of (u, v) along xi and along eta, both (p, 2) float64, parameters by 1."""
-        along = np.column_stack([self.u.ev(eta, xi, dy=1), self.v.ev(eta, xi, dy=1)])
-        return along, np.column_stack([self.u.ev(eta, xi, dx=1), self.v.ev(eta, xi, dx=1)])
+        """Derivatives of (u, v) along xi and along eta at xi and eta, both (p, 2) float64, parameters by 1."""
+        x, y = self._within(xi, eta)
+        wide, tall = (b - a for a, b in zip(self.low, self.high, strict=True))
+        along = np.column_stack([self.u.ev(y, x, dy=1), self.v.ev(y, x, dy=1)])
+        return wide * along, tall * np.column_stack([self.u.ev(y, x, dx=1), self.v.ev(y, x, dx=1)])
+
+    def part(self, low: F64, high: F64) -> GridMap:
+        """The map of what lies between two corners of this one, low and high (2,) xi and eta, as a unit square."""
+        x, y = self._within(*np.stack([low, high], axis=1))
+        return replace(self, low=(float(x[0]), float(y[0])), high=(float(x[1]), float(y[1])))
+
+    def _within(self, xi: F64, eta: F64) -> tuple[F64, F64]:
+        (a, c), (b, d) = self.low, self.high
+        return a + (b - a) * xi, c + (d - c) * eta

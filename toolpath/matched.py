@@ -10,6 +10,7 @@ edges of its strip lag behind the contact.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -99,10 +100,7 @@ class Matched:
         xi = np.linspace(0.0, 1.0, STATIONS)
         length = min(float(np.linalg.norm(np.diff(iso.contact(xi, np.full(STATIONS, eta))[0], axis=0), axis=1).sum())
                      for eta in (0.0, 0.5, 1.0))
-        # edges of a strip as wide as the radius lie so far behind the contact, turned as far as may be: 30 degrees on
-        # the nose, which there is 1 - cos(30) of the radius behind, and half the radius aside
-        lag = tool.radius * (1.0 - np.sqrt(0.75) + 0.5 * float(np.sin(TURNS[-1])))
-        run_out = min(lag / length, MOST_RUN_OUT)
+        run_out = min(longest_lag(tool) / length, MOST_RUN_OUT)
         first = cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
         farthest = min(SPARE_RUN_OUT * first.lag(0.5), MOST_RUN_OUT)
         if farthest <= run_out:
@@ -285,6 +283,14 @@ class Matched:
         raise GeometryError(f"{self.tool.id}: the pass at {s.eta:.4f} turns too fast for a chord of "
                             f"{self.wanted.chord:g} mm", code="bad_pass", subjects=(self.tool.id,),
                             measured=float(moved.max()), limit=self.wanted.chord, remedy="allow a longer chord")
+
+
+def longest_lag(tool: ToolBody) -> float:
+    """How far, mm, the edges of a strip as wide as the radius lie behind the contact, turned as far as may be.
+
+    They are 30 degrees round the nose, which there is 1 - cos(30) of the radius behind, and half the radius aside.
+    """
+    return tool.radius * (1.0 - math.sqrt(0.75) + 0.5 * math.sin(TURNS[-1]))
 
 
 def _evened(tilt: F64) -> F64:

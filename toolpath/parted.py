@@ -1,0 +1,211 @@
+"""A surface cut into pieces that a matched end goes over faster one by one (papers/001, section 5, mended).
+
+Passes are lines of one eta, and as far apart as their narrowest place allows: a place where the end cuts little costs
+the whole pass. So a surface is parted where that place is confined to a part, or where the best way of the feed turns:
+each piece is fed along one side of its own, with passes of its own.
+
+Notation
+    width  : of the strip, mm, by closed form: ``strip_width`` at the least tilt that is clear
+    reach  : (fine, fine) width / (mm by 1 of eta, square to the feed): how far in eta one pass serves at a place
+    passes : integral of 1 / (least reach along the line) over eta, and a half that the last one cuts beyond the border
+
+A piece costs the length of its lines, and at every line the way out over both ends and the way round to the next.
+Over a lattice of the unit square all pieces are priced, either way fed, and of all ways to part it by straight cuts
+from side to side the cheapest is taken, none of which gains less than LEAST_GAIN of what it cuts. How near that comes
+to the passes that are laid: docs/theory/matching.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.isoparametric import IsoSurface
+from toolpath.matched import MOST_RUN_OUT, TURNS, Wanted, longest_lag
+from toolpath.matching import clear_tilt, mean_direction, strip_width
+
+CELLS = 16  # each way, between which cuts lie
+FINE = 4  # places a cell, each way, at which strips are looked at
+LEAST_GAIN = 0.05  # of the way of what is cut: less is not told apart from the error of the closed form
+LAST = 0.5  # of a pass, which the last one of a piece cuts beyond its border
+
+Rectangle = tuple[int, int, int, int]
+"""A piece in cells: least and greatest column (xi), least and greatest row (eta)."""
+Priced = tuple[float, tuple[tuple[bool, Rectangle], ...]]
+"""What pieces cost together, mm, and each with whether it is fed across."""
+
+
+@dataclass(frozen=True, eq=False)
+class Feed:
+    """What feeding one way does, at places in the middle of the lattice, rows along eta.
+
+    reach  : (m, m) float64, of the unit square, that one pass serves square to itself
+    length : (m, m) float64, mm by 1 of the unit square, along the feed
+    """
+
+    reach: F64
+    length: F64
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A piece of a surface and how it is fed.
+
+    iso       : the piece over the unit square, passes along xi
+    low, high : (2,) float64, its corners, xi and eta of the surface it was cut from
+    passes    : float, foreseen, a half beyond the border counted
+    way       : float, mm, foreseen: lines, ways out over their ends and round
+    spread    : float, unitless, 0 where the best feed is the same all over the piece, 1 where it cancels
+    """
+
+    iso: IsoSurface
+    low: F64
+    high: F64
+    passes: float
+    way: float
+    spread: float
+
+
+def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float | None = None,
+           cut: bool = True) -> list[Part]:
+    """The pieces of a surface, each fed the way that is shorter for it; one where parting does not pay.
+
+    tool      : ToolBody, a flat or a bull nose
+    wanted    : its scallop, mm, and least tilt, rad, make the strips
+    round_way : mm of feed that going from the end of a pass to the next one is worth; the diameter when None
+    cut       : False for the whole surface in one, fed the better way
+
+    Raises
+    ------
+    GeometryError
+        As ``IsoSurface.across``. A place where the end does not fit has no reach, and every piece with it no price:
+        passes over it are for ``Matched`` to refuse.
+    """
+    feeds = (feed_of(iso, tool, wanted), feed_of(turned(iso), tool, wanted))
+    feeds = (feeds[0], Feed(feeds[1].reach.T, feeds[1].length.T))
+    lag = longest_lag(tool)
+    ends = 2.0 * lag + (2.0 * tool.radius if round_way is None else round_way)
+    out = []
+    angle, weight = best_feeds(iso)
+    for across, (a, b, c, d) in cheapest(feeds, ends, lag, cut):
+        low, high = np.array([a, c]) / CELLS, np.array([b, d]) / CELLS
+        passes, way = price(feeds, across, (a, b, c, d), ends, lag)
+        inside = (slice(c * FINE, d * FINE), slice(a * FINE, b * FINE))
+        piece = replace(iso, grid=iso.grid.part(*((low[::-1], high[::-1]) if iso.turned else (low, high))))
+        out.append(Part(turned(piece) if across else piece, low, high, passes, way,
+                        mean_direction(angle[inside], weight[inside])[1]))
+    return out
+
+
+def turned(iso: IsoSurface) -> IsoSurface:
+    """The same surface fed along the lines that were across."""
+    return replace(iso, turned=not iso.turned)
+
+
+def middles() -> tuple[F64, F64]:
+    """Xi and eta, both (p,) float64 from 0 to 1, of the places that are looked at, row by row of eta."""
+    at = (np.arange(CELLS * FINE) + 0.5) / (CELLS * FINE)
+    xi, eta = np.meshgrid(at, at)
+    return xi.ravel(), eta.ravel()
+
+
+def feed_of(iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Feed:
+    """What feeding a surface along its xi does, by closed form.
+
+    Notes
+    -----
+    The tangent of the nose lies along the greatest curvature where that is within what the tool turns, and the strip
+    is then cos(turn) as wide square to the feed; beyond, it lies so near to it as the turn lets it, and the curvatures
+    are those along and square to it (Euler). What the surface twists under it is left out.
+    """
+    xi, eta = middles()
+    uv = iso.parameters(xi, eta)
+    along = iso.tangents(xi, eta)[0]
+    k_2, k_1 = np.sort(-iso.surface.curvature(uv), axis=1).T
+    first, _ = iso.surface.forms(uv)
+    across, k_across = iso.across(xi, eta)
+    off = np.arccos(np.sqrt(np.clip((k_across - k_2) / np.maximum(k_1 - k_2, 1e-12), 0.0, 1.0)))
+    turn = np.minimum(off, TURNS[-1])
+    share = np.cos(off - turn) ** 2
+    k_l, k_f = share * k_1 + (1.0 - share) * k_2, share * k_2 + (1.0 - share) * k_1
+    tilt = np.fmax(clear_tilt(k_1, tool), wanted.least_tilt)
+    width = strip_width(tilt, k_l, k_f, tool, wanted.scallop) * np.cos(turn)
+    width = np.where(np.isnan(clear_tilt(k_1, tool)), 0.0, width)
+    e, f, g = first.T
+    length = np.sqrt(e * along[:, 0] ** 2 + 2.0 * f * along[:, 0] * along[:, 1] + g * along[:, 1] ** 2)
+    shape = (CELLS * FINE, CELLS * FINE)
+    return Feed((width / across).reshape(shape), length.reshape(shape))
+
+
+def best_feeds(iso: IsoSurface) -> tuple[F64, F64]:
+    """How the least curvature, along which the end is fed best, lies to the lines of a surface, and what that counts.
+
+    Returns
+    -------
+    angle  : (m, m) float64, rad from the way along xi, on the surface
+    weight : (m, m) float64, area by what both curvatures differ: a place curved alike all round has no best feed
+    """
+    xi, eta = middles()
+    along, over = iso.tangents(xi, eta)
+    first, second = iso.surface.forms(iso.parameters(xi, eta))
+
+    def by(form: F64, a: F64, b: F64) -> F64:
+        return (form[:, 0] * a[:, 0] * b[:, 0] + form[:, 1] * (a[:, 0] * b[:, 1] + a[:, 1] * b[:, 0])
+                + form[:, 2] * a[:, 1] * b[:, 1])
+
+    one = along / np.sqrt(by(first, along, along))[:, None]
+    two = over - by(first, over, one)[:, None] * one
+    size = np.sqrt(by(first, two, two))
+    two /= size[:, None]
+    # the greatest of k cos² + 2 t cos sin + q sin² lies at half the angle of (k - q, 2 t), the least square to it
+    differ = by(second, one, one) - by(second, two, two) + 2.0j * by(second, one, two)
+    area = size * np.sqrt(by(first, along, along))
+    shape = (CELLS * FINE, CELLS * FINE)
+    return (0.5 * np.angle(-differ)).reshape(shape), (area * np.abs(differ)).reshape(shape)
+
+
+def price(feeds: tuple[Feed, Feed], across: bool, piece: Rectangle, ends: float, lag: float) -> tuple[float, float]:
+    """Passes and way (mm) that a piece takes fed along its columns' xi, or along eta where ``across``.
+
+    feeds : along xi and along eta, both with rows along eta
+    piece : in cells
+    ends  : mm, that each pass costs besides its line;  lag : mm, by which it goes on over an end
+
+    Infinite where a line is so short that passes could not go on as far (``matched.MOST_RUN_OUT``), or has no reach.
+    """
+    a, b, c, d = (FINE * n for n in piece)
+    reach, length = (v[c:d, a:b] for v in (feeds[across].reach, feeds[across].length))
+    if across:
+        reach, length = reach.T, length.T
+    lines = length.mean(axis=1) * reach.shape[1] / (CELLS * FINE)
+    least = reach.min(axis=1)
+    short = reach.shape[1] < CELLS * FINE and lag > MOST_RUN_OUT * lines.min()
+    if short or least.min() <= 0.0:
+        return np.inf, np.inf
+    each = 1.0 / (CELLS * FINE * least)
+    return float(each.sum() + LAST), float((each * (lines + ends)).sum() + LAST * (lines.mean() + ends))
+
+
+def cheapest(feeds: tuple[Feed, Feed], ends: float, lag: float, cut: bool = True) -> list[tuple[bool, Rectangle]]:
+    """How the square is best parted by cuts from side to side: whether across, and in which cells, each piece.
+
+    feeds, ends, lag : as for ``price``
+    cut              : False where it is to stay whole
+    """
+    @cache
+    def best(a: int, b: int, c: int, d: int) -> Priced:
+        cost, across = min((price(feeds, way, (a, b, c, d), ends, lag)[1], way) for way in (False, True))
+        kept: Priced = cost, ((across, (a, b, c, d)),)
+        cuts = [((a, m, c, d), (m, b, c, d)) for m in range(a + 1, b) if cut]
+        cuts += [((a, b, c, m), (a, b, m, d)) for m in range(c + 1, d) if cut]
+        for one, two in cuts:
+            (x, p), (y, q) = best(*one), best(*two)
+            if x + y < min((1.0 - LEAST_GAIN) * cost, kept[0]):
+                kept = x + y, p + q
+        return kept
+
+    return list(best(0, CELLS, 0, CELLS)[1])
