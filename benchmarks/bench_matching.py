@@ -24,6 +24,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
+import shapely  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 from scipy.interpolate import make_interp_spline  # noqa: E402
 
 from geometry.facepatches import read_patches  # noqa: E402
@@ -37,7 +39,6 @@ from geometry.toolbody import ToolBody  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import placement_of  # noqa: E402
-from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface  # noqa: E402
 from toolpath.isoparametric import lay_out as ball_passes  # noqa: E402
 from toolpath.locations import tips  # noqa: E402
@@ -57,6 +58,7 @@ LEFT_SHARE = 0.95  # of the scallop, given to the strips; what lies between plac
 LEAST = {"A": 0.0, "B": 0.0, "C": 0.25, "D": 0.0}  # degrees
 WHEEL = "imp_kj66_compressor_wheel.step"
 BLADE_TOOL, BLADE_SCALLOP, BLADE_CHORD, BLADE_LEAST = 6.0, 0.01, 0.0005, float(np.radians(0.25))
+BALL_PLACES = 513  # of a ball along a pass
 BLADE_AREA = 1000.0  # mm², at least, of a side of a blade
 
 
@@ -171,7 +173,7 @@ def ranges(names: list[str]) -> None:
 
 def split(names: list[str]) -> None:
     """Passes over the ranges whole, fed the better way, and parted; the last column is the way that was foreseen, with
-    the ends and the way round."""
+    the ends, and the way round that metres leave out."""
     print("| range | tool | split | pieces: xi, eta, feed | passes | m | most left mm | deepest mm | s | foreseen m |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for name in names:
@@ -181,11 +183,12 @@ def split(names: list[str]) -> None:
         wanted = Wanted(LEFT_SHARE * SCALLOP, DEPTH, float(np.radians(LEAST[name])), CHORD)
         for tool in (end(60.0, 0.0), end(60.0, 3.0)):
             one, several = (parted(iso, tool, wanted, cut=cut) for cut in (False, True))
-            for told, parts in (("off", one), ("on", several))[:1 if len(several) == 1 else 2]:
+            same = len(several) == 1
+            for split_as, parts in (("off", one), ("on", several))[:1 if same else 2]:
                 begin = time.perf_counter()
                 passes = laid([p.iso for p in parts], tool, wanted)
                 seconds = time.perf_counter() - begin
-                row(name, f"{tool.kind} 60, corner {tool.corner_radius:g}", told if len(several) > 1 else "off = on",
+                row(name, f"{tool.kind} 60, corner {tool.corner_radius:g}", "off = on" if same else split_as,
                     described(parts), len(passes), f"{metres(passes):.2f}",
                     *(f"{v:.5f}" for v in measured(*everywhere(surface), tool, passes)), f"{seconds:.0f}",
                     f"{1e-3 * sum(p.way for p in parts):.2f}")
@@ -202,21 +205,25 @@ def described(parts: list[Part]) -> str:
                      f"{'v' if p.iso.turned else 'u'}" for p in parts)
 
 
-def ball_poses(iso: IsoSurface, radius: float, scallop: float, chord: float) -> list[Poses]:
-    """Passes of a ball whose axis is the normal."""
-    out = []
-    for eta in ball_passes(iso, radius, scallop).tolist():
-        profile = Profile.of(iso.curve(eta), chord, radius)
-        ways = steps(profile, radius, chord, scallop)
-        even = profile.width * np.arange(len(profile.normal))
-        axis = np.column_stack([np.interp(ways, even, n) for n in profile.normal.T])
-        axis /= np.linalg.norm(axis, axis=1)[:, None]
-        out.append((profile.centres(ways, radius) - radius * axis, axis))
+def ball_poses(iso: IsoSurface, radius: float, scallop: float) -> list[Poses]:
+    """Passes of a ball whose axis is the normal, and whose tip the contact."""
+    at = np.linspace(0.0, 1.0, BALL_PLACES)
+    return [iso.contact(at, np.full(BALL_PLACES, eta)) for eta in ball_passes(iso, radius, scallop).tolist()]
+
+
+def inside(isos: list[IsoSurface], uv: F64) -> NDArray[np.bool_]:
+    """Which parameters (n, 2) lie in any of some pieces."""
+    at = np.linspace(0.0, 1.0, 400)
+    low, high = np.zeros(400), np.ones(400)
+    out = np.zeros(len(uv), bool)
+    for iso in isos:
+        sides = (at, low), (high, at), (at[::-1], high), (low, at[::-1])
+        out |= shapely.contains_xy(shapely.Polygon(np.concatenate([iso.parameters(*side) for side in sides])), *uv.T)
     return out
 
 
-def blade_faces(folder: Path) -> dict[str, tuple[TrimmedFace, F64, F64]]:
-    """Of both sides of a blade the trimmed face, and places and normals on it, by what the side is."""
+def blade_faces(folder: Path) -> dict[str, tuple[TrimmedFace, F64]]:
+    """Of both sides of a blade the trimmed face, and parameters (n, 2) of places on it, by what the side is."""
     setup = parse_setup((ROOT / "examples/setups/kj66_compressor_wheel.json").read_text())
     part = read_part(folder / WHEEL, placement=placement_of(setup), solid=setup.part.solid, chord=0.02)
     large = [f.number for f in part.faces if f.surface == "bspline" and f.area > BLADE_AREA]
@@ -235,7 +242,7 @@ def blade_faces(folder: Path) -> dict[str, tuple[TrimmedFace, F64, F64]]:
         face = TrimmedFace(number, exact.surface, tuple(exact.parameters(q) for q in patch.loops), patch.area)
         s = sample_surface(part.mesh, 45.0, seed=2, triangles=np.flatnonzero(part.mesh.face_ids == number))
         foot = foot_points(exact.surface, s.points, exact.parameters(part.uv[s.triangle].mean(axis=1)))
-        out[f"F{number}, {told}"] = (face, *exact.surface.points_and_normals(foot.uv))
+        out[f"F{number}, {told}"] = face, foot.uv
     return out
 
 
@@ -244,24 +251,28 @@ def blade(folder: Path | None) -> None:
     if folder is None or not (folder / WHEEL).exists():
         print(f"no blade: {WHEEL} is not in the folder given by --public")
         return
-    print("| face | tool | split | pieces | passes | m | most left mm | deepest mm | s |")
+    print("| face | tool | split | pieces: xi, eta, feed | passes | m | most left mm | deepest mm | s |")
     print("|---|---|---|---|---|---|---|---|---|")
     wanted = Wanted(LEFT_SHARE * BLADE_SCALLOP, DEPTH, BLADE_LEAST, BLADE_CHORD)
-    for told, (face, points, normals) in blade_faces(folder).items():
+    for told, (face, uv) in blade_faces(folder).items():
         isos = [IsoSurface(face.surface, piece.map) for piece in face.pieces]
+        laid_out = inside(isos, uv)
+        print(f"{told}: {face.area:.0f} mm2, {100.0 * laid_out.mean():.2f} % of it laid into squares and looked at")
+        points, normals = face.surface.points_and_normals(uv[laid_out])
         radius = BLADE_TOOL / 2.0
-        passes = [p for iso in isos for p in ball_poses(iso, radius, LEFT_SHARE * BLADE_SCALLOP, BLADE_CHORD)]
+        passes = [p for iso in isos for p in ball_poses(iso, radius, LEFT_SHARE * BLADE_SCALLOP)]
         ball = end(BLADE_TOOL, radius)
         row(told, f"ball {BLADE_TOOL:g}", "", len(isos), len(passes), f"{metres(passes):.2f}",
             *(f"{v:.5f}" for v in measured(points, normals, ball, passes)), "")
         for tool in (end(BLADE_TOOL, 0.0), end(BLADE_TOOL, 1.0)):
-            for cut in (False, True):
+            one, several = ([p for iso in isos for p in parted(iso, tool, wanted, cut=cut)] for cut in (False, True))
+            same = len(one) == len(several)
+            for split_as, parts in (("off", one), ("on", several))[:1 if same else 2]:
                 begin = time.perf_counter()
-                parts = [p for iso in isos for p in parted(iso, tool, wanted, cut=cut)]
                 passes = laid([p.iso for p in parts], tool, wanted)
                 seconds = time.perf_counter() - begin
-                row(told, f"{tool.kind} {BLADE_TOOL:g}, corner {tool.corner_radius:g}", "on" if cut else "off",
-                    described(parts), len(passes), f"{metres(passes):.2f}",
+                row(told, f"{tool.kind} {BLADE_TOOL:g}, corner {tool.corner_radius:g}",
+                    "off = on" if same else split_as, described(parts), len(passes), f"{metres(passes):.2f}",
                     *(f"{v:.5f}" for v in measured(points, normals, tool, passes)), f"{seconds:.0f}")
 
 

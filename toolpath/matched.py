@@ -4,7 +4,7 @@ Each pass is a line of one eta; its tool leans forward, by the least tilt with w
 true surface (``toolpath.nose``), turned aside where that cuts a wider strip. Where the nose begins to stand higher than
 the scallop lie the edges of its strip. Strips are not as wide to the left as to the right, and the next pass is not
 known before its own strip is: passes are put as far apart as lets the edge of the next reach the edge of the last all
-along, solved for both together. A pass runs on over its ends, on the surface as it would go on, by as much as the
+along, solved for both together. A pass runs on over its end, on the surface as it would go on, by as much as the
 edges of its strip lag behind the contact.
 """
 
@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from geometry.errors import GeometryError
@@ -60,6 +61,7 @@ class Strip:
     eta        : where it lies;  xi (m,) its stations, the first and last of them beyond the border
     tilt, turn : (m,) rad
     low, high  : (m,) eta at the edges of the strip, at the stations
+    ends       : xi between which the contact goes, so that contact and edges are cut from border to border
     """
 
     eta: float
@@ -68,6 +70,7 @@ class Strip:
     turn: F64
     low: F64
     high: F64
+    ends: tuple[float, float]
 
     def leans(self, xi: F64) -> tuple[F64, F64]:
         """Tilts and turns, both (k,) rad, between the stations."""
@@ -102,20 +105,20 @@ class Matched:
                      for eta in (0.0, 0.5, 1.0))
         run_out = min(longest_lag(tool) / length, MOST_RUN_OUT)
         first = cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
-        farthest = min(SPARE_RUN_OUT * first.lag(0.5), MOST_RUN_OUT)
+        farthest = min(SPARE_RUN_OUT * max(first.lag(eta) for eta in (0.0, 0.5, 1.0)), MOST_RUN_OUT)
         if farthest <= run_out:
             return first
         return cls(replace(iso, surface=iso.surface.extended(farthest + MARGIN)), tool, wanted, farthest)
 
     def lag(self, eta: float) -> float:
-        """How far behind its contact, in xi, a pass at eta cuts the edges of its strip, at most.
+        """How far behind its contact, in xi, a pass at eta cuts the edges of its strip, at most, turned as it will be.
 
         Raises
         ------
         GeometryError
             As ``strip``.
         """
-        turn = np.zeros(STATIONS)
+        turn = self.widest_turns(eta)
         s = self.strip(eta, turn)
         at = self.contacts(s.xi, eta)
         edges = strip_edges(*self.nose.heights(at, s.tilt, turn), self.wanted.scallop)
@@ -132,6 +135,12 @@ class Matched:
     def stations(self) -> F64:
         """xi (m,) at which tilts are looked for."""
         return np.linspace(-self.run_out, 1.0 + self.run_out, STATIONS)
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(m,) the stations between which the borders lie: what is cut beyond them does not matter."""
+        beyond = np.abs(self.stations - 0.5) - 0.5
+        return np.asarray(beyond < np.ptp(self.stations) / (STATIONS - 1))
 
     def contacts(self, xi: F64, eta: float) -> Contacts:
         """Contacts of the pass at eta."""
@@ -157,13 +166,16 @@ class Matched:
                                 code="bad_pass", subjects=(self.tool.id, f"({where})"),
                                 remedy="take a smaller tool or a ball")
         tilt = _evened(tilt)
-        sides = []
+        sides, ends = [], [0.0, 1.0]
         for half in strip_edges(*self.nose.heights(at, tilt, turn), wanted.scallop):
             x, e = self.iso.square(half, xi, np.full(STATIONS, eta))
             order = np.argsort(x, kind="stable")
             sides.append(np.interp(xi, x[order], e[order]))
+            ends[0] = min(ends[0], float(xi[x <= 0.0].max(initial=xi[0])))
+            ends[1] = max(ends[1], float(xi[x >= 1.0].min(initial=xi[-1])))
         sides = sides if sides[0].sum() > sides[1].sum() else sides[::-1]
-        return Strip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta))
+        return Strip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta),
+                     (ends[0], ends[1]))
 
     def lay_out(self) -> list[Strip]:
         """Passes from one border to the other, as few as the scallop allows.
@@ -175,7 +187,7 @@ class Matched:
         """
         out: list[Strip] = []
         edge, step = np.zeros(STATIONS), FIRST_STEP
-        while edge.min() < 1.0 and (not out or out[-1].eta < 1.0):
+        while edge[self.counted].min() < 1.0 and (not out or out[-1].eta < 1.0):
             begin = out[-1].eta if out else 0.0
             out.append(self._next(edge, begin, step))
             edge, step = out[-1].high, max(out[-1].eta - begin, LEAST_STEP)
@@ -213,7 +225,7 @@ class Matched:
     def _next(self, edge: F64, begin: float, step: float) -> Strip:
         """The farthest pass beyond ``begin`` whose strip still reaches ``edge`` all along, to SOLVED of the step."""
         def miss(s: Strip) -> float:
-            return float(np.where(edge < 1.0, s.low - edge, -np.inf).max())
+            return float(np.where((edge < 1.0) & self.counted, s.low - edge, -np.inf).max())
 
         turn = self.widest_turns(min(begin + step, 1.0))
         kept = self.strip(min(begin + LEAST_STEP, 1.0), turn)
@@ -267,7 +279,7 @@ class Matched:
         GeometryError
             Code 'bad_pass': not even steps of a 4096th of a station's keep to the chord.
         """
-        xi = s.xi
+        xi = np.unique(np.clip(s.xi, *s.ends))
         for _ in range(FINEST):
             tip, axis, _ = self.poses(s, xi)
             middle = 0.5 * (xi[1:] + xi[:-1])

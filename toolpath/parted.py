@@ -9,7 +9,7 @@ Notation
     reach  : (fine, fine) width / (mm by 1 of eta, square to the feed): how far in eta one pass serves at a place
     passes : integral of 1 / (least reach along the line) over eta, and a half that the last one cuts beyond the border
 
-A piece costs the length of its lines, and at every line the way out over both ends and the way round to the next.
+A piece costs the length of its lines, and at every line the way out over its end and the way round to the next.
 Over a lattice of the unit square all pieces are priced, either way fed, and of all ways to part it by straight cuts
 from side to side the cheapest is taken, none of which gains less than LEAST_GAIN of what it cuts. How near that comes
 to the passes that are laid: docs/theory/matching.md.
@@ -17,6 +17,7 @@ to the passes that are laid: docs/theory/matching.md.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -58,7 +59,7 @@ class Part:
     iso       : the piece over the unit square, passes along xi
     low, high : (2,) float64, its corners, xi and eta of the surface it was cut from
     passes    : float, foreseen, a half beyond the border counted
-    way       : float, mm, foreseen: lines, ways out over their ends and round
+    way       : float, mm, foreseen: lines, ways out over their ends, and round
     spread    : float, unitless, 0 where the best feed is the same all over the piece, 1 where it cancels
     """
 
@@ -88,7 +89,7 @@ def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float 
     feeds = (feed_of(iso, tool, wanted), feed_of(turned(iso), tool, wanted))
     feeds = (feeds[0], Feed(feeds[1].reach.T, feeds[1].length.T))
     lag = longest_lag(tool)
-    ends = 2.0 * lag + (2.0 * tool.radius if round_way is None else round_way)
+    ends = lag + (2.0 * tool.radius if round_way is None else round_way)
     out = []
     angle, weight = best_feeds(iso)
     for across, (a, b, c, d) in cheapest(feeds, ends, lag, cut):
@@ -173,17 +174,19 @@ def price(feeds: tuple[Feed, Feed], across: bool, piece: Rectangle, ends: float,
 
     feeds : along xi and along eta, both with rows along eta
     piece : in cells
-    ends  : mm, that each pass costs besides its line;  lag : mm, by which it goes on over an end
+    ends  : mm, that each pass costs besides its line;  lag : mm, by which it goes on over its end
 
     Infinite where a line is so short that passes could not go on as far (``matched.MOST_RUN_OUT``), or has no reach.
     """
     a, b, c, d = (FINE * n for n in piece)
-    reach, length = (v[c:d, a:b] for v in (feeds[across].reach, feeds[across].length))
+    reach, length = feeds[across].reach, feeds[across].length
     if across:
-        reach, length = reach.T, length.T
-    lines = length.mean(axis=1) * reach.shape[1] / (CELLS * FINE)
-    least = reach.min(axis=1)
-    short = reach.shape[1] < CELLS * FINE and lag > MOST_RUN_OUT * lines.min()
+        reach, length, (a, b, c, d) = reach.T, length.T, (c, d, a, b)
+    own = length[c:d, a:b]
+    lines = own.mean(axis=1) * (b - a) / (CELLS * FINE)
+    out = math.ceil(lag * CELLS * FINE / own.mean())  # of places: so far over the end it is the neighbour that is cut
+    least = reach[c:d, a:b + out].min(axis=1)
+    short = b - a < CELLS * FINE and lag > MOST_RUN_OUT * lines.min()
     if short or least.min() <= 0.0:
         return np.inf, np.inf
     each = 1.0 / (CELLS * FINE * least)
