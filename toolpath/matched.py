@@ -61,7 +61,7 @@ class Strip:
     eta        : where it lies;  xi (m,) its stations, the first and last of them beyond the border
     tilt, turn : (m,) rad
     low, high  : (m,) eta at the edges of the strip, at the stations
-    ends       : xi between which the contact goes, so that contact and edges are cut from border to border
+    ends       : xi between which the contact goes, so that the nose from edge to edge goes from border to border
     """
 
     eta: float
@@ -166,12 +166,14 @@ class Matched:
                                 code="bad_pass", subjects=(self.tool.id, f"({where})"),
                                 remedy="take a smaller tool or a ball")
         tilt = _evened(tilt)
+        # between the contact and an edge a turned nose reaches so far ahead of both
+        ahead = xi + self.tool.radius * (1.0 - np.cos(turn)) / np.linalg.norm(np.gradient(at.point, xi, axis=0), axis=1)
         sides, ends = [], [0.0, 1.0]
         for half in strip_edges(*self.nose.heights(at, tilt, turn), wanted.scallop):
             x, e = self.iso.square(half, xi, np.full(STATIONS, eta))
             order = np.argsort(x, kind="stable")
             sides.append(np.interp(xi, x[order], e[order]))
-            ends[0] = min(ends[0], float(xi[x <= 0.0].max(initial=xi[0])))
+            ends[0] = min(ends[0], float(xi[np.maximum(x, ahead) <= 0.0].max(initial=xi[0])))
             ends[1] = max(ends[1], float(xi[x >= 1.0].min(initial=xi[-1])))
         sides = sides if sides[0].sum() > sides[1].sum() else sides[::-1]
         return Strip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta),

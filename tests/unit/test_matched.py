@@ -112,6 +112,24 @@ def test_the_strip_is_where_the_nose_stands_lower_than_the_height():
     assert high.min() > -1e-6
 
 
+@pytest.mark.parametrize("turn", [-20.0, -10.0, 0.0, 20.0])
+@pytest.mark.parametrize(("surface", "least"), [(bowl(60.0, 150.0), 0.0), (bowl(-200.0, -150.0), 0.5)])
+def test_a_pass_goes_on_until_the_nose_from_edge_to_edge_is_over_the_border(surface, least, turn):
+    """Turned, the nose reaches ahead of the contact and of the edge on one side, and lags on the other."""
+    wanted = Wanted(0.0045, 0.001, np.radians(least), 0.0003)
+    made = Matched.over(passes_along_y(surface), tool(12.0, 0.0), wanted)
+    strip = made.strip(0.5, np.full(len(made.stations), np.radians(turn)))
+    assert made.run_out >= strip.ends[1] - 1.0
+    at = made.contacts(np.array(strip.ends), 0.5)
+    tilt, turned = strip.leans(np.array(strip.ends))
+    high, feet = made.nose.heights(at, tilt, turned, 257)
+    for side in range(2):
+        first, last = (made.iso.square(feet[side, k], np.full(257, strip.ends[k]), np.full(257, 0.5))[0]
+                       [:np.argmax(high[side, k] > 0.0045)] for k in (0, 1))
+        assert first.max() <= 2e-3
+        assert last.min() >= 1.0 - 2e-3
+
+
 @pytest.mark.parametrize(("surface", "depth"), [(bowl(-200.0, -150.0), 0.0), (bowl(60.0, 150.0, 1e-5), 0.0),
                                                 (bowl(60.0, 150.0, 1e-5), 1e-3), (bowl(80.0, -90.0), 0.0)])
 def test_edges_lie_where_a_nose_of_many_places_has_them(surface, depth):
