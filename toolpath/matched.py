@@ -24,7 +24,7 @@ from toolpath.isoparametric import IsoSurface
 from toolpath.locations import tips
 from toolpath.nose import Contacts, Nose, strip_edges
 
-STATIONS = 33  # along a pass, at which tilts are looked for
+STATIONS = 33  # along a pass from border to border, at which tilts are looked for; as close beyond
 SPARSE = 2  # stations on, at which turns are looked for
 FIRST_STEP, LEAST_STEP = 0.05, 1e-4  # of the unit square, between passes
 SOLVED = 5e-3  # of the step between passes: as near the edges of neighbours are brought
@@ -122,7 +122,7 @@ class Matched:
         s = self.strip(eta, turn)
         at = self.contacts(s.xi, eta)
         edges = strip_edges(*self.nose.heights(at, s.tilt, turn), self.wanted.scallop)
-        return max(float(np.abs(self.iso.square(e, s.xi, np.full(STATIONS, eta))[0] - s.xi).max()) for e in edges)
+        return max(float(np.abs(self.iso.square(e, s.xi, np.full(len(s.xi), eta))[0] - s.xi).max()) for e in edges)
 
     @property
     def nose(self) -> Nose:
@@ -134,13 +134,14 @@ class Matched:
     @property
     def stations(self) -> F64:
         """xi (m,) at which tilts are looked for."""
-        return np.linspace(-self.run_out, 1.0 + self.run_out, STATIONS)
+        count = math.ceil((STATIONS - 1) * (1.0 + 2.0 * self.run_out)) + 1
+        return np.linspace(-self.run_out, 1.0 + self.run_out, count)
 
     @property
     def counted(self) -> NDArray[np.bool_]:
         """(m,) the stations between which the borders lie: what is cut beyond them does not matter."""
         beyond = np.abs(self.stations - 0.5) - 0.5
-        return np.asarray(beyond < np.ptp(self.stations) / (STATIONS - 1))
+        return np.asarray(beyond < np.ptp(self.stations) / (len(self.stations) - 1))
 
     def contacts(self, xi: F64, eta: float) -> Contacts:
         """Contacts of the pass at eta."""
@@ -170,7 +171,7 @@ class Matched:
         ahead = xi + self.tool.radius * (1.0 - np.cos(turn)) / np.linalg.norm(np.gradient(at.point, xi, axis=0), axis=1)
         sides, ends = [], [0.0, 1.0]
         for half in strip_edges(*self.nose.heights(at, tilt, turn), wanted.scallop):
-            x, e = self.iso.square(half, xi, np.full(STATIONS, eta))
+            x, e = self.iso.square(half, xi, np.full(len(xi), eta))
             order = np.argsort(x, kind="stable")
             sides.append(np.interp(xi, x[order], e[order]))
             ends[0] = min(ends[0], float(xi[np.maximum(x, ahead) <= 0.0].max(initial=xi[0])))
@@ -188,7 +189,7 @@ class Matched:
             As ``strip``.
         """
         out: list[Strip] = []
-        edge, step = np.zeros(STATIONS), FIRST_STEP
+        edge, step = np.zeros(len(self.stations)), FIRST_STEP
         while edge[self.counted].min() < 1.0 and (not out or out[-1].eta < 1.0):
             begin = out[-1].eta if out else 0.0
             out.append(self._next(edge, begin, step))

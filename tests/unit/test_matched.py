@@ -120,6 +120,7 @@ def test_a_pass_goes_on_until_the_nose_from_edge_to_edge_is_over_the_border(surf
     made = Matched.over(passes_along_y(surface), tool(12.0, 0.0), wanted)
     strip = made.strip(0.5, np.full(len(made.stations), np.radians(turn)))
     assert made.run_out >= strip.ends[1] - 1.0
+    assert np.diff(made.stations).max() <= 1.0 / 32.0 + 1e-12  # however far it runs out
     at = made.contacts(np.array(strip.ends), 0.5)
     tilt, turned = strip.leans(np.array(strip.ends))
     high, feet = made.nose.heights(at, tilt, turned, 257)
