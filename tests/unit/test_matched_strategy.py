@@ -9,17 +9,16 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
-from tests.unit.test_matched import bowl, measured, passes_along_y
+from tests.unit.test_matched import bowl, measured
 from toolpath.family import Target
 from toolpath.leaning import LAYER, THICK, Surroundings, lowered
-from toolpath.matched import Wanted
 from toolpath.motion import Motion
 from toolpath.piece import Piece
 from toolpath.posed import enters
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.isoparametric import TrimmedFace
-from toolpath.strategies.matched import matched, predicted, suits
+from toolpath.strategies.matched import matched, suits
 from zones.reach import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0
@@ -140,15 +139,3 @@ def test_slower_than_the_usual_passes_is_told_with_both_figures():
 
 def test_balls_have_no_end_to_match():
     assert suits(BULL) and suits(tool(6.0, 0.0)) and not suits(ball(6.0))
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_time_told_ahead_is_about_what_passes_take(turned, whole):
-    """Along the less curved way passes are fewer; what is told for that is within a third of the passes themselves."""
-    asked = Wanted(0.8 * SCALLOP, 0.0005, np.radians(1.0), 0.0005)
-    iso = passes_along_y(SURFACE)
-    along, across = (predicted(replace(iso, turned=t), BULL, asked, FEED) for t in (True, False))
-    assert along < across
-    thin, _ = found(margin=0.5)
-    taken = 60.0 / FEED * sum(float(np.linalg.norm(np.diff(t, axis=0), axis=1).sum()) for t, _ in cuts(thin))
-    assert along == pytest.approx(taken, rel=0.35)

@@ -1,8 +1,8 @@
 """Faces finished by a tilted flat or bull-nose end whose nose has their curvature (``toolpath.matched``), as motions.
 
-A face is laid out as a whole and each pass is walked where it serves what is wanted. Where the tool would meet
-something with the axis it needs there, or the machine cannot take that axis, the pass breaks off and the rest is left
-to others.
+A face is laid out as a whole, or in the pieces that take less way (``toolpath.parted``), and each pass is walked where
+it serves what is wanted. Where the tool would meet something with the axis it needs there, or the machine cannot take
+that axis, the pass breaks off and the rest is left to others.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from toolpath.family import Target
 from toolpath.isoparametric import IsoSurface, Laid
 from toolpath.leaning import LOOK, Runs, Surroundings, in_turn
 from toolpath.matched import Matched, Strip, Wanted
-from toolpath.matching import clear_tilt, matching_tilt, strip_width
+from toolpath.parted import parted
 from toolpath.piece import LEAST_PIECE, Piece
 from toolpath.settings import CutData, PlanSettings
 from toolpath.strategies.isoparametric import Faces
@@ -38,7 +38,7 @@ TRIED = 9  # places each way at which the tool is tried before passes are laid o
 LEAST_FREE = 0.25  # of those that are wanted
 OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
 LEAST_AREA = 4.0  # of the squared radius
-LEAST_STRIP = 1e-3  # mm
+TURN_S = 4.0  # what it takes to go outside of everything and come down at the next pass
 MOST_LOOK = 0.5  # mm between poses that are held against what stands round the pass
 
 
@@ -139,21 +139,24 @@ class _Ends:
         """The pieces of the passes of a face, from one border to the other, or why there are none, in words."""
         if not isinstance(laid, IsoSurface):
             return "it is gone over with others as one"
-        seconds, iso = min(((predicted(one, self.grown, self.asked, feed), one) for one in (
-            laid, replace(laid, turned=not laid.turned))), key=lambda found: found[0])
-        lattice = _Lattice.of(iso, self.near, self.spacing)
-        seconds *= float(lattice.wanted.mean())
+        parts = parted(laid, self.grown, self.asked, round_way=TURN_S * feed / 60.0)
+        found = [(part, _Lattice.of(part.iso, self.near, self.spacing)) for part in parts]
+        found = [(part, lattice) for part, lattice in found if lattice.wanted.any()]
+        if not all(math.isfinite(part.way) for part, _ in found):
+            return "the end of the tool does not fit it everywhere"
+        seconds = 60.0 / feed * sum(part.way * float(lattice.wanted.mean()) for part, lattice in found)
         if seconds >= most:
             return f"its matched end would take {seconds:.0f} s, the usual passes {most:.0f}"
-        if not self._free(lattice, iso):
-            return "the tool is hardly anywhere free with its end on it"
-        over = Matched.over(iso, self.grown, self.asked)
         out: list[Piece] = []
-        for s in over.lay_out():
-            served = lattice.serves(s)
-            if served.any():
-                out += self._walked(over, s, served)
-        return out or "the tool is nowhere free with its end on it"
+        for part, lattice in found:
+            if not self._free(lattice, part.iso):
+                continue
+            over = Matched.over(part.iso, self.grown, self.asked)
+            for s in over.lay_out():
+                served = lattice.serves(s)
+                if served.any():
+                    out += self._walked(over, s, served)
+        return out or "the tool is hardly anywhere free with its end on it"
 
     def _free(self, lattice: _Lattice, iso: IsoSurface) -> bool:
         """Whether the tool can stand on its end in enough of the places that are wanted."""
@@ -195,22 +198,3 @@ class _Ends:
             if not self.blocked(dense.tips[~least], dense.axes[~least]).any():
                 return tried, least
         return piece.raised(self.lift), least
-
-
-def predicted(iso: IsoSurface, tool: ToolBody, asked: Wanted, feed: float) -> float:
-    """About how long passes along xi take over the whole of a face, s.
-
-    By the closed form of a strip along the feed, principal or not, with the narrowest place of each pass for all of it.
-
-    feed : mm/min
-    """
-    at = np.linspace(0.0, 1.0, TRIED)
-    xi, eta = (a.ravel() for a in np.meshgrid(at, at))
-    width, across = iso.across(xi, eta)
-    k_1, k_2 = -np.sort(iso.surface.curvature(iso.parameters(xi, eta)), axis=1).T
-    tilt = np.fmax(np.fmax(clear_tilt(k_1, tool), matching_tilt(across, tool)), asked.least_tilt)
-    strip = strip_width(tilt, across, k_1 + k_2 - across, tool, asked.scallop)
-    apart = np.maximum(np.nan_to_num(strip), LEAST_STRIP) / np.maximum(width, 1e-12)
-    place = iso.contact(xi, eta)[0].reshape(TRIED, TRIED, 3)
-    length = np.linalg.norm(np.diff(place, axis=1), axis=2).sum(axis=1)
-    return 60.0 / feed * float(np.trapezoid(length / apart.reshape(TRIED, TRIED).min(axis=1), at))
