@@ -8,7 +8,7 @@ fixtures and stock is asked pose by pose.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ MOST_LEAD = 1.5  # mm
 THICK = 0.12  # of the diameter: what a leaning tool may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
 LEAST_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
+LEAST_WAY = 1e-3  # mm, across the axis, that says where a pass comes from
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
@@ -90,28 +91,38 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
     found  : name of the face and pass, for each
     around : Surroundings; its stock is taken off
     """
-    runs, refused = [], []
-    for name, piece in _layered(found, tool, around):
-        parts = free_parts(piece, tool, settings, around)
-        if not parts:
-            refused.append(f"{name}: {LOADED}")
-        for part in parts:
-            made = with_ways(part, tool, cut, settings, around)
-            if isinstance(made, str):
-                refused.append(f"{name}: {made}")
-                continue
-            runs.append(made)
-            for t in made:
-                if t.motion is Motion.CUT and t.axes is not None:
-                    around.stock.cut_leaning(t.points, t.axes, tool)
+    runs: list[tuple[Trajectory, ...]] = []
+    refused: list[str] = []
+    for name, piece in found:
+        layers = lowered(piece, tool, around) if piece.on_end else [piece]
+        before = around.stock.copied() if len(layers) > 1 else None
+        mine: list[tuple[Trajectory, ...]] = []
+        for layer in layers:
+            made, why = _walked(layer, tool, cut, settings, around)
+            refused += [f"{name}: {reason}" for reason in why]
+            mine += made
+        if before is not None and not made:  # layers for nothing
+            around.stock.become(before)
+            mine = []
+        runs += mine
     return Runs(tuple(runs), tuple(dict.fromkeys(refused)))
 
 
-def _layered(found: Sequence[tuple[str, Piece]], tool: ToolBody, around: Surroundings) -> Iterator[tuple[str, Piece]]:
-    """Passes with their layers, each asked for when those before it are off the stock."""
-    for name, piece in found:
-        for part in lowered(piece, tool, around) if piece.on_end else [piece]:
-            yield name, part
+def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
+            around: Surroundings) -> tuple[list[tuple[Trajectory, ...]], list[str]]:
+    """What of a pass is walked, taken off the stock, and why the rest is not, in words."""
+    parts = free_parts(piece, tool, settings, around)
+    runs, refused = [], [] if parts else [LOADED]
+    for part in parts:
+        made = with_ways(part, tool, cut, settings, around)
+        if isinstance(made, str):
+            refused.append(made)
+            continue
+        runs.append(made)
+        for t in made:
+            if t.motion is Motion.CUT and t.axes is not None:
+                around.stock.cut_leaning(t.points, t.axes, tool)
+    return runs, refused
 
 
 def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64) -> F64:
@@ -158,7 +169,10 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
         if corner > bottom and low > corner - bottom:
             continue
         at = flat + math.sqrt((corner - bottom) ** 2 - low * low) if corner > bottom else tool.radius
-        at = max(min(at, tool.radius - deep), 0.0)
+        # over the corner it is the side that counts: what may stand under the end may not stand beside it
+        low = max(corner - max(h - bottom, 0.0), 0.0)
+        beside = flat + math.sqrt(max(corner * corner - low * low, 0.0)) - deep
+        at = max(min(max(at, beside), tool.radius - deep), 0.0)
         flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
     bodies = [np.zeros((0, 3))]
     outer = [(0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
@@ -282,7 +296,7 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
             _way_in(back, tool, settings, around, straight_up if piece.on_end else _leads(back, tool, thick))]
     if ways[0] is None or ways[1] is None:
         return "the tool does not get there along its own axis"
-    (first, clear), (last, free) = ways[0], ways[1]
+    (first, near), (last, off) = ways[0], ways[1]
     last = last[::-1]
     out: list[Trajectory] = []
 
@@ -291,15 +305,14 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
             out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
 
     a, b = axes[0], axes[-1]
-    high = float((first[0] - first[1]) @ a)
-    slow = first[1] + min(IN_FRONT + (SKIN * tool.diameter if piece.on_end else 0.0), high) * a
-    go(Motion.APPROACH, np.array([first[0], slow]), cut.link_feed if clear else cut.plunge_feed, a)
-    go(Motion.APPROACH, np.array([slow, first[1]]), cut.plunge_feed, a)
+    go(Motion.APPROACH, np.array([first[0], first[1] + near * a]), cut.link_feed, a)
+    go(Motion.APPROACH, np.array([first[1] + near * a, first[1]]), cut.plunge_feed, a)
     go(Motion.CONNECT, first[1:], cut.feed, a)
     for i, j in _steady(feeds):
         out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
     go(Motion.CONNECT, last[:2], cut.feed, b)
-    go(Motion.LIFT, last[1:], cut.link_feed if free else cut.feed, b)
+    go(Motion.LIFT, np.array([last[1], last[1] + off * b]), cut.feed, b)
+    go(Motion.LIFT, np.array([last[1] + off * b, last[2]]), cut.link_feed, b)
     return tuple(out)
 
 
@@ -335,12 +348,12 @@ and under its end."""
 
 
 def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
-            leads: Sequence[Lead]) -> tuple[F64, bool] | None:
+            leads: Sequence[Lead]) -> tuple[F64, float] | None:
     """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
 
-    True where no stock is met but at the very end. Beside it where there is room for that; else straight down: along a
-    wall where the end of the tool is round enough not to dig up what stands there, and on its end where there is no
-    more than a skin under it.
+    With it mm above the middle one, down to where nothing stands near the tool. Beside the beginning where there is
+    room for that; else straight down: along a wall where the end of the tool is round enough not to dig up what stands
+    there, and on its end where there is no more than a skin under it.
     """
     axis, tip = piece.axes[0], piece.tips[0]
     for aside, stock, under in leads:
@@ -355,17 +368,32 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
             continue
         if not (around.met(down, axes, tool, stock, under) | settings.found.bars(tool, down)).any():
-            return np.array([beside + high * axis, beside, tip]), stock == 0.0
+            return np.array([beside + high * axis, beside, tip]), min(_near(down, axes, tool, around), high)
     return None
+
+
+def _near(down: F64, axes: F64, tool: ToolBody, around: Surroundings) -> float:
+    """mm above the end of a way down, from where on something may stand in the cells at the rim of the tool.
+
+    down, axes : (n, 3) float64, mm and unit, the last at the bottom
+    """
+    wide = 2.0 * CELLS * around.stock.lattice.step
+    grown = replace(tool, diameter=tool.diameter + 2.0 * wide, corner_radius=tool.corner_radius + wide)
+    met = np.flatnonzero(around.met(down - wide * axes, axes, grown, 0.0, 0.0))
+    high = np.linalg.norm(down - down[-1], axis=1)
+    return IN_FRONT + max(SKIN * tool.diameter, float(high[max(met[0] - 1, 0)]) if len(met) else 0.0)
 
 
 def _leads(piece: Piece, tool: ToolBody, thick: float) -> list[Lead]:
     """Where the tool may come down at the beginning of a piece, the best first."""
     room, skin, axis = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0]
     if piece.on_end:
-        back = piece.tips[0] - piece.tips[1]
-        back -= (back @ axis) * axis
-        return [(room * back / np.linalg.norm(back), 0.0, 0.0), (np.zeros(3), 0.0, skin)]
+        on_the_spot = [(np.zeros(3), 0.0, skin)]
+        way = piece.tips[0] - piece.tips[1:]
+        way = way - (way @ axis)[:, None] * axis
+        size = np.linalg.norm(way, axis=1)
+        far = np.flatnonzero(size > LEAST_WAY)
+        return [*((room * way[k] / size[k], 0.0, 0.0) for k in far[:1].tolist()), *on_the_spot]
     aside = piece.away[0] - (piece.away[0] @ axis) * axis
     aside /= np.linalg.norm(aside)
     down_the_wall = [(0.0 * aside, thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []

@@ -27,6 +27,7 @@ from toolpath.nose import Contacts, Nose, strip_edges
 STATIONS = 33  # along a pass from border to border, at which tilts are looked for; as close beyond
 SPARSE = 2  # stations on, at which turns are looked for
 FIRST_STEP, LEAST_STEP = 0.05, 1e-4  # of the unit square, between passes
+MOST_PASSES = 400
 SOLVED = 5e-3  # of the step between passes: as near the edges of neighbours are brought
 TRIALS = 14
 TURNS = np.radians(np.arange(-20.0, 21.0, 5.0))
@@ -186,11 +187,15 @@ class Matched:
         Raises
         ------
         GeometryError
-            As ``strip``.
+            Code 'bad_pass': they would be more than MOST_PASSES; as ``strip``.
         """
         out: list[Strip] = []
         edge, step = np.zeros(len(self.stations)), FIRST_STEP
         while edge[self.counted].min() < 1.0 and (not out or out[-1].eta < 1.0):
+            if len(out) == MOST_PASSES:
+                raise GeometryError(f"{self.tool.id}: {MOST_PASSES} passes of its end get to {out[-1].eta:.2f} of the "
+                                    "surface only", code="bad_pass", subjects=(self.tool.id,), measured=out[-1].eta,
+                                    limit=1.0, remedy="take a ball, or allow a higher scallop")
             begin = out[-1].eta if out else 0.0
             out.append(self._next(edge, begin, step))
             edge, step = out[-1].high, max(out[-1].eta - begin, LEAST_STEP)

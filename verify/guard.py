@@ -183,10 +183,15 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
 
 
 def _inside(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
-    """(n,) bool: whether points (n, 3), mm, are in the part, by what a ray on no axis meets first."""
-    way = np.broadcast_to(ASIDE, points.shape)
-    _, hit = first_hits(tree, points, way)
-    return np.asarray((hit >= 0) & (tree.mesh.normals[hit] @ ASIDE > 0.0))
+    """(n,) bool: whether points (n, 3), mm, are in the part, by what rays both ways on no axis meet first.
+
+    One of them that leaves the part tells: through a hole of the mesh, or into another solid, the other may not.
+    """
+    out = np.zeros(len(points), np.bool_)
+    for way in (ASIDE, -ASIDE):
+        _, hit = first_hits(tree, points, np.broadcast_to(way, points.shape))
+        out |= (hit >= 0) & (tree.mesh.normals[hit] @ way > 0.0)
+    return out
 
 
 def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:

@@ -11,7 +11,7 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
 from tests.unit.test_matched import bowl, measured
 from toolpath.family import Target
-from toolpath.leaning import LAYER, THICK, Surroundings, lowered
+from toolpath.leaning import LAYER, THICK, Surroundings, _leads, lowered, with_ways
 from toolpath.motion import Motion
 from toolpath.piece import Piece
 from toolpath.posed import enters
@@ -139,3 +139,39 @@ def test_slower_than_the_usual_passes_is_told_with_both_figures():
 
 def test_balls_have_no_end_to_match():
     assert suits(BULL) and suits(tool(6.0, 0.0)) and not suits(ball(6.0))
+
+
+def come_down(corner, overlap):
+    """How fast, beside a wall of stock 14 mm high, the tool comes down to a pass along x whose left side is in it by so
+    much; None where there is no way in."""
+    body, step = tool(12.0, corner), 0.15
+    mesh = box_mesh([-20, -20, -2], [20, 20, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([-20.0, -20.0, -2.0]), np.array([20.0, 20.0, 0.3]), step)
+    y = stock.lattice.y0 + step * np.arange(stock.lattice.ny)
+    stock.top[y > 6.0 - overlap] = 14.0
+    axes = np.tile([np.sin(0.05), 0.0, np.cos(0.05)], (41, 1))
+    way = np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]) + [0.0, 0.0, 0.02]
+    around = Surroundings(lambda tips, a: np.zeros(len(tips), bool), FREE, stock, (), Clearances())
+    cut = CutData(10_000, FEED, 200, 3000, 3.6)
+    made = with_ways(Piece(way, axes, axes, 6.0, on_end=True), body, cut, settings_of(), around)
+    if isinstance(made, str):
+        return None
+    low = [t.feed for t in made if t.motion is Motion.APPROACH and t.points[:, 2].min() < 13.0 - corner]
+    return max(low)
+
+
+@pytest.mark.parametrize("corner", [0.0, 0.5, 1.0, 3.0])
+def test_no_way_in_goes_through_stock_beside_it(corner):
+    """A bull nose came down through 0.9 mm of a wall of stock at the link feed: its corner hid what stood beside it."""
+    assert come_down(corner, -1.0) == 3000.0
+    assert come_down(corner, 0.15) in (200.0, None)  # nearer than the map can tell
+    for overlap in (0.5, 0.9):
+        assert come_down(corner, overlap) is None
+
+
+def test_a_pass_that_begins_on_the_spot_has_a_way_in():
+    axes = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.05, 0.08, 0.08)])
+    piece = Piece(np.array([[0.0, 0, 1], [0, 0, 1], [4.0, 0, 1]]), axes, axes, 6.0, on_end=True)
+    leads = _leads(piece, tool(12.0, 1.0), 1.44)
+    assert all(np.isfinite(aside).all() and abs(aside @ axes[0]) < 1e-9 for aside, _, _ in leads)
+    assert leads[0][0][0] < -1.0 and not leads[-1][0].any()

@@ -8,7 +8,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
 from geometry.nearest import nearest
 from geometry.rays import first_hits
-from tests.hand_parts import dome, slope_field
+from tests.hand_parts import box_mesh, dome, slope_field
 from verify.guard import (
     DEEP_A_MOVE,
     MOST_SEEDS,
@@ -48,6 +48,18 @@ def test_a_ray_from_rim_to_rim_over_a_hollow_is_out_of_the_part(side):
     assert gouge_depths(tree, points, normals, np.full(500, 20.0)).max() < 1e-3
     depth = gouge_depths(tree, points - [0.0, 0.0, 4.0], normals, np.full(500, 0.5))
     np.testing.assert_allclose(depth, 0.5, atol=5e-3)
+
+
+@pytest.mark.parametrize("lost", ["a facet of the top", "the top", "nothing"])
+def test_a_hole_in_the_mesh_hides_no_gouge(lost):
+    """Meshes with a few edges open are read with a warning; what is cut under the hole is as deep as elsewhere."""
+    box = box_mesh([0, 0, 0], [20, 20, 10])
+    top = np.flatnonzero(box.normals[:, 2] > 0.9)
+    gone = {"a facet of the top": top[:1], "the top": top, "nothing": top[:0]}[lost]
+    tree = TriangleTree(TriangleMesh(box.vertices, np.delete(box.faces, gone, axis=0)))
+    points = np.array([[20.0, 5.0, 5.0], [20.0, 10.0, 5.0], [20.0, 15.0, 5.0]])
+    depth = gouge_depths(tree, points, np.tile([1.0, 0.0, 0.0], (3, 1)), np.ones(3))
+    np.testing.assert_allclose(depth, 1.0, atol=0.01)
 
 
 def test_places_round_the_lowest_samples_are_looked_at_closely():

@@ -25,7 +25,7 @@ from toolpath.isoparametric import IsoSurface, Laid
 from toolpath.leaning import LOOK, Runs, Surroundings, in_turn
 from toolpath.matched import Matched, Strip, Wanted
 from toolpath.parted import parted
-from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.piece import LEAST_PIECE, Piece, places_along
 from toolpath.settings import CutData, PlanSettings
 from toolpath.strategies.isoparametric import Faces
 
@@ -39,7 +39,7 @@ LEAST_FREE = 0.25  # of those that are wanted
 OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
 LEAST_AREA = 4.0  # of the squared radius
 TURN_S = 4.0  # what it takes to go outside of everything and come down at the next pass
-MOST_LOOK = 0.5  # mm between poses that are held against what stands round the pass
+MOST_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses held against what stands round the pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +175,7 @@ class _Ends:
         xi = over.ways(s)
         tip, axis, normal = over.poses(s, xi)
         own = np.arange(len(xi), dtype=np.float64)
-        gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
-        looks = np.arange(0.0, gone[-1], min(LOOK * self.tool.radius, MOST_LOOK))
-        places = np.unique(np.concatenate([own, np.interp(looks, gone, own)]))
+        places = places_along(tip, axis, self.tool.stickout, min(LOOK * self.tool.radius, MOST_LOOK))
         whole, met = self._off(Piece(tip, axis, normal, self.tool.radius, on_end=True), places)
         here = np.clip(np.interp(places, own, xi), 0.0, 1.0)
         asked = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
