@@ -22,7 +22,7 @@ from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
-from toolpath.leaning import Runs, Surroundings
+from toolpath.leaning import TURN_S, Runs, Surroundings
 from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
 from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -40,7 +40,6 @@ from zones.zoning import ZoneArea
 
 LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest
-TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4

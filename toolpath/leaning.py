@@ -25,6 +25,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from zones.reach import Clearances, Disc
 
+TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most
 MOST_LEAD = 1.5  # mm
 THICK = 0.12  # of the diameter: what a leaning tool may take off at once
@@ -68,7 +69,8 @@ class Surroundings:
         return self.enters(tips, axes) | lies | ~self.turning.stands(axes) | (low < self.turning.table)
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
-        """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank."""
+        """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank or
+        ``under`` mm under the end, as ``loaded`` has it."""
         return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick, under)
 
 
@@ -196,6 +198,7 @@ def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
     over it than the end takes off at once.
 
     Where not even ``MOST_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
+    What a pose is free of, part and fixtures, it stays free of when raised along its axis.
     """
     thick = THICK * tool.diameter
     layer = LAYER * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)

@@ -88,8 +88,7 @@ def test_there_are_layers_where_more_stands_than_the_end_takes(whole):
     assert heights[0] >= 2.5 - SKIN * BULL.diameter - 0.5
 
 
-def test_each_pass_comes_down_through_no_more_than_a_skin(whole):
-    """Along its axis, at the plunge feed, from beside or above; the stock it is let into is what a descent may take."""
+def test_each_pass_comes_down_along_its_axis_the_last_skin_of_it_at_the_plunge_feed(whole):
     runs, _ = whole
     for run in runs.runs:
         kinds = [t.motion for t in run]
@@ -106,7 +105,6 @@ def test_a_pass_ends_at_what_stands_in_its_way():
     """A post on the hollow: no pose comes into it, and away from it the surface is cut all the same."""
     mesh = joined(HOLLOW, box_mesh([4, 4, -1], [9, 9, 30]))
     runs, around = found(mesh)
-    assert any("nowhere" not in r for r in runs.refused) or not runs.refused
     poses = cuts(runs)
     for tips, axes in poses:
         assert not around.blocked(tips, axes, BULL).any()
@@ -115,8 +113,7 @@ def test_a_pass_ends_at_what_stands_in_its_way():
     x, y = np.meshgrid(g, g, indexing="ij")
     far = (np.hypot(x - 6.5, y - 6.5) > 25.0).ravel()
     near = ((np.abs(x - 6.5) < 2.0) & (np.abs(y - 6.5) < 2.0)).ravel()
-    for order in (far, far.reshape(120, 120).T.ravel()):  # whichever parameter runs first
-        assert np.median(left[order]) <= SCALLOP
+    assert np.median(left[far]) <= SCALLOP  # the post is as far along x as along y: no matter which runs first
     assert left[near].min() > 0.5
 
 

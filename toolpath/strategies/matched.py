@@ -22,7 +22,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
 from toolpath.isoparametric import IsoSurface, Laid
-from toolpath.leaning import LOOK, Runs, Surroundings, in_turn
+from toolpath.leaning import LOOK, TURN_S, Runs, Surroundings, in_turn
 from toolpath.matched import Matched, Strip, Wanted
 from toolpath.parted import parted
 from toolpath.piece import LEAST_PIECE, Piece, places_along
@@ -38,16 +38,13 @@ TRIED = 9  # places each way at which the tool is tried before passes are laid o
 LEAST_FREE = 0.25  # of those that are wanted
 OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
 LEAST_AREA = 4.0  # of the squared radius
-TURN_S = 4.0  # what it takes to go outside of everything and come down at the next pass
 MOST_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses held against what stands round the pass
 
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """Places of a face over the unit square: (UP, ALONG, 3) mm and unit normals, eta (UP,), and which are wanted."""
+    """Of places of a face over the unit square, evenly each way: eta (UP,) of the rows, and which are wanted."""
 
-    place: F64
-    normal: F64
     eta: F64
     wanted: NDArray[np.bool_]
 
@@ -61,7 +58,7 @@ class _Lattice:
                                 remedy="machine it by another strategy")
         size = max(float(np.linalg.norm(np.diff(place, axis=k), axis=2).mean()) for k in (0, 1))
         far = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG)
-        return cls(place, normal, at, far <= spacing + size)
+        return cls(at, far <= spacing + size)
 
     def serves(self, s: Strip) -> NDArray[np.bool_]:
         """(ALONG,) bool, evenly along the unit square: whether a strip cuts something wanted there."""
