@@ -37,7 +37,7 @@ SLAB = 8
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Node (i, j, k) at origin + (i, j, k) step: distance into the stock, cut off at ``step`` either way.
+    """Node (i, j, k) at origin + (i, j, k) step: distance into the stock, cut off at ``band`` either way.
 
     origin : (3,) float64, mm; values : (nx, ny, nz) float32, mm, above zero where stock stands
     """
@@ -45,6 +45,11 @@ class Field:
     origin: F64
     step: float
     values: F32
+
+    @property
+    def band(self) -> float:
+        """Where distances are cut off, mm: the step as a float32, so that a node that is gone is known for one."""
+        return float(np.float32(self.step))
 
     @property
     def volume(self) -> float:
@@ -167,7 +172,7 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
             events, taken = event_table(), spare.get()
-            n = field_tile(field.values, tile, field.origin, field.step, field.step, start, end, axes.axis,
+            n = field_tile(field.values, tile, field.origin, field.step, field.band, start, end, axes.axis,
                            axes.about, axes.angle, moves.feed, free, steep, moves.tool, cutters, ends, bodies.rows,
                            bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
             spare.put(taken)

@@ -50,6 +50,16 @@ def test_nodes_hold_the_distance_to_what_was_cut(kind):
     assert ((run.taken > 0) == run.cut).all() and run.taken.sum() == pytest.approx(LEFT - field.volume, abs=1e-3)
 
 
+@pytest.mark.parametrize("step", [0.5, 0.13461225148968145, 0.3])
+def test_a_node_that_is_gone_is_known_for_one(step):
+    # steps that no float32 holds: rounded towards zero, gone nodes were asked again by every move that passed
+    field = stock_field(MESH, block(), step)
+    run_field(field, path([[-14, 0, -4], [14, 0, -4]]), [mill(6.0, 0.0)], block(), bare=True)
+    deep = field.values[(np.abs(nodes(field) - [0.0, 0.0, -1.0]) < 1.0).all(axis=1).reshape(field.values.shape)]
+    assert len(deep) and (deep.astype(np.float64) == -field.band).all()
+    assert field.values.astype(np.float64).max() == field.band
+
+
 def test_volumes_taken_say_which_move_took_what():
     tool = mill(4.0, 0.0)
     moves = path([[-9, 0, -1], [9, 0, -1], [9, 0, 1], [-9, 0, 1], [-9, 0, -1], [9, 0, -1.5]])

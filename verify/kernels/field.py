@@ -30,6 +30,7 @@ from verify.kernels.rays import gap, plan_distance
 from verify.kernels.stock import CUTTER, _note, _worse, known_depth
 
 LEAST_CUT = 1e-5
+NEAR = 1e-9  # mm, more than rounding of a distance
 RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
 MOST_LOOKS = 128
 VOLUME_UNITS = 1e9
@@ -89,11 +90,29 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
     a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
     top, sectors = -1e30, np.int64(0)
+    straight = p[30] == 0.0
+    mx, my, mz = p[27], p[28], p[29]
+    plan2 = mx * mx + my * my
+    by = 1.0 / plan2 if plan2 > 0.0 else 0.0
+    lowest, highest = min(mz, 0.0), max(mz, 0.0) + length
     for i in range(i0, min(i0 + 4, tile[1])):
         for j in range(j0, min(j0 + 4, tile[3])):
+            sx, sy, sz, _, _, _ = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k0 * h)
             for k in range(k0, min(k0 + 4, tile[5])):
                 v = field[i, j, k]
                 if v > -band:
+                    if straight:
+                        # most nodes lie beside the flutes, under the tip or over the flutes by more than v: no root
+                        # and no search is spent on these
+                        ahead = h * (k - k0)
+                        qx, qy, qz = sx + ahead * p[20], sy + ahead * p[5], sz + ahead * p[8]
+                        far = NEAR + (max(v, h) if steep else v - LEAST_CUT)
+                        s = min(max((qx * mx + qy * my) * by, 0.0), 1.0)
+                        ex, ey = qx - s * mx, qy - s * my
+                        wide = max(cutter[0] + far, 0.0)
+                        if ex * ex + ey * ey > wide * wide or lowest - qz > far or qz - highest > far:
+                            top = max(top, v)
+                            continue
                     qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
                     # the search that a flat or a bull nose asks for pays only where the node may be lowered
                     if a > 1e-12 and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, a + r, r, length) >= v:
