@@ -114,9 +114,10 @@ def _numbered(setup: Setup, tools: Sequence[tuple[str, ProposedTool]]) -> list[O
 def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np.bool_]) -> dict[str, _Added]:
     """The tools by id in one view: their tip limit, and what they reach of the samples in ``rest`` (n,) bool."""
     rows, s = np.flatnonzero(rest), view.samples
+    standing = next(iter(view.fields.values())).standing
     out = {}
     for o in found:
-        limit = tip_field(ready.setup, ready.part, view.rotation, view.obstacles, view.part.bounds, o.body)
+        limit = tip_field(ready.setup, ready.part, view.rotation, standing, view.part.bounds, o.body)
         few = touchable(limit, s.points[rows], s.normals[rows], ready.lift)
         reach = Reach(np.zeros(len(s), np.bool_), np.zeros(len(s), np.bool_), np.zeros((len(s), 3)))
         reach.by_cutter[rows], reach.by_tool[rows], reach.tips[rows] = few

@@ -31,7 +31,7 @@ from zones.model import Decomposition
 from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches
 from zones.planview import ChannelPlan
-from zones.reach import Clearances, TipField, lattice_step
+from zones.reach import Clearances, DiscHeights, TipField, lattice_step
 from zones.regions import Regioner
 from zones.sight import Reach
 from zones.view import View, access_rotation, turned, turned_samples
@@ -272,18 +272,18 @@ def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tupl
     return ()
 
 
-def tip_field(setup: Setup, part: Part, rotation: F64, obstacles: TriangleTree, bounds: F64,
+def tip_field(setup: Setup, part: Part, rotation: F64, standing: DiscHeights, bounds: F64,
               body: ToolBody) -> TipField:
     """Tip limits of a tool along an access, over the part, the room beside it and the blank.
 
     part                  : Part in the setup frame
     rotation              : (3, 3) from there into the access frame
-    obstacles, bounds     : TriangleTree of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
+    standing, bounds      : DiscHeights of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
     """
     box = stock_box(setup, part)
     box = None if box is None else turned_box(box, rotation)
-    return TipField(obstacles, body, clearances(setup), bounds, _room(body, bounds, box, setup), lattice_step(body),
-                    setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm)
+    return TipField(standing.tree, body, clearances(setup), bounds, _room(body, bounds, box, setup), lattice_step(body),
+                    setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm, standing)
 
 
 def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
@@ -298,7 +298,8 @@ def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, sample
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         obstacles = TriangleTree(obstacle_mesh(part, setup, leaning=leaning).transformed(matrix))
-    fields = {b.id: tip_field(setup, part, rotation, obstacles, here.bounds, b) for b in tool_bodies(setup)}
+    standing = DiscHeights(obstacles)
+    fields = {b.id: tip_field(setup, part, rotation, standing, here.bounds, b) for b in tool_bodies(setup)}
     seen = turned_samples(samples, rotation @ first.T)
     regioner = Regioner(here, decomposition, channels, first=is_first)
     there = None if is_first else (samples.points, samples.normals)

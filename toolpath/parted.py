@@ -26,6 +26,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.isoparametric import IsoSurface
+from toolpath.kernels.parted import price_rows
 from toolpath.matched import MOST_RUN_OUT, TURNS, Wanted, longest_lag
 from toolpath.matching import clear_tilt, mean_direction, strip_width
 
@@ -182,15 +183,10 @@ def price(feeds: tuple[Feed, Feed], across: bool, piece: Rectangle, ends: float,
     reach, length = feeds[across].reach, feeds[across].length
     if across:
         reach, length, (a, b, c, d) = reach.T, length.T, (c, d, a, b)
-    own = length[c:d, a:b]
-    lines = own.mean(axis=1) * (b - a) / (CELLS * FINE)
-    out = math.ceil(lag * CELLS * FINE / own.mean())  # of places: so far over the end it is the neighbour that is cut
-    least = reach[c:d, a:b + out].min(axis=1)
-    short = b - a < CELLS * FINE and lag > MOST_RUN_OUT * lines.min()
-    if short or least.min() <= 0.0:
+    passes, way, mean, shortest = price_rows(reach, length, a, b, c, d, lag)
+    if (b - a < CELLS * FINE and lag > MOST_RUN_OUT * shortest) or not math.isfinite(passes):
         return np.inf, np.inf
-    each = 1.0 / (CELLS * FINE * least)
-    return float(each.sum() + LAST), float((each * (lines + ends)).sum() + LAST * (lines.mean() + ends))
+    return passes + LAST, way + passes * ends + LAST * (mean + ends)
 
 
 def cheapest(feeds: tuple[Feed, Feed], ends: float, lag: float, cut: bool = True) -> list[tuple[bool, Rectangle]]:

@@ -12,7 +12,7 @@ from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from zones.machinable import SEEN
-from zones.reach import Clearances, TipField, lattice_step
+from zones.reach import Clearances, DiscHeights, TipField, lattice_step
 
 SKIN = 0.02  # mm off the surface where a ray upward starts
 AIR = 4.0  # mm beside the part, beyond the cutter's radius
@@ -40,5 +40,7 @@ def over_the_part(fields: Mapping[str, TipField], bare: TriangleTree, bounds: F6
 
     bare : TriangleTree of the part alone, access frame; bounds : (2, 3) float64 of the part, mm
     """
-    return {t: TipField(bare, f.tool, clear, bounds, f.tool.radius + AIR, lattice_step(f.tool), f.allowance, f.cusp)
+    standing = DiscHeights(bare)
+    return {t: TipField(bare, f.tool, clear, bounds, f.tool.radius + AIR, lattice_step(f.tool), f.allowance, f.cusp,
+                        standing)
             for t, f in fields.items()}

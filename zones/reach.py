@@ -79,6 +79,20 @@ class Lattice:
         ny = int(math.ceil((bounds[1, 1] + margin - y0) / step)) + 1
         return cls(float(x0), float(y0), float(step), nx, ny)
 
+    @classmethod
+    def on_multiples(cls, bounds: F64, margin: float, step: float) -> Lattice:
+        """``over``, with nodes at whole multiples of the step: two of these have the nodes of their overlap in common."""
+        lower = np.floor((bounds[0, :2] - margin) / step)
+        nx, ny = (np.ceil((bounds[1, :2] + margin) / step) - lower + 1).astype(int).tolist()
+        return cls(float(lower[0] * step), float(lower[1] * step), float(step), nx, ny)
+
+    def within(self, other: Lattice) -> tuple[slice, slice] | None:
+        """Rows and columns of this lattice in another one of the same multiples; None where they are not all there."""
+        j, i = (round((a - b) / self.step) for a, b in ((self.x0, other.x0), (self.y0, other.y0)))
+        if i < 0 or j < 0 or i + self.ny > other.ny or j + self.nx > other.nx:
+            return None
+        return slice(i, i + self.ny), slice(j, j + self.nx)
+
     def cells(self, xy: F64) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Row and column of the node nearest to each of xy (n, 2) mm, clipped to the lattice."""
         j = np.clip(np.rint((xy[:, 0] - self.x0) / self.step).astype(np.int64), 0, self.nx - 1)
@@ -130,6 +144,27 @@ def discs_of(tool: ToolBody, clear: Clearances) -> tuple[Disc, ...]:
     return tuple(d for d in out if d.radius > tool.radius + 1e-9)
 
 
+class DiscHeights:
+    """How low the underside of a disc gets over one set of obstacles, kept by radius: tools in one holder ask the same.
+
+    tree : TriangleTree of the obstacles in the access frame
+    """
+
+    def __init__(self, tree: TriangleTree) -> None:
+        self.tree = tree
+        self._kept: dict[float, tuple[Lattice, F64]] = {}
+
+    def over(self, lattice: Lattice, radius: float) -> F64:
+        """(ny, nx) float64, mm, over the nodes of a lattice of ``Lattice.on_multiples``; not to be written to."""
+        kept = self._kept.get(radius)
+        if kept is not None and (part := lattice.within(kept[0])) is not None:
+            return kept[1][part]
+        height = drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, 0.0)
+        if kept is None or kept[1].size < height.size:
+            self._kept[radius] = lattice, height
+        return height
+
+
 class TipField:
     """The tip limit of one tool over one set of obstacles.
 
@@ -140,26 +175,25 @@ class TipField:
     step   : mm, spacing of the planning lattice
     allowance : mm, material to leave on the part: the cutting part is grown by it all round
     cusp   : mm, what passes may leave standing above that: shank and holder stay as much higher
+    standing : DiscHeights of the same obstacles that other tools have asked
     """
 
     def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
-                 step: float, allowance: float = 0.0, cusp: float = 0.0) -> None:
+                 step: float, allowance: float = 0.0, cusp: float = 0.0, standing: DiscHeights | None = None) -> None:
         self.tree, self.tool, self.clear, self.allowance, self.cusp = tree, tool, clear, allowance, cusp
         self.lattice = Lattice.over(bounds, margin, step)
-        self.coarse = Lattice.over(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
+        self.coarse = Lattice.on_multiples(bounds, margin + 2 * LOOKUP_STEP, LOOKUP_STEP)
+        self.standing = standing or DiscHeights(tree)
         self.discs = discs_of(tool, clear)
         self.noncut = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
         self._off: tuple[float, F64 | None] = (math.nan, None)
 
-    def _grid(self, lattice: Lattice, radius: float, corner: float) -> F64:
-        return drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, corner)
-
     def _noncut(self, discs: tuple[Disc, ...]) -> F64:
         grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
         for d in (d for d in discs if self._can_meet(d)):
-            limit = self.disc_limit(d, self._grid(self.coarse, self.disc_radius(d, 0.5), 0.0))
+            limit = self.disc_limit(d, self.standing.over(self.coarse, self.disc_radius(d, 0.5)))
             grid = np.maximum(grid, limit)
         if discs:  # what stands beyond the grid is not known here, so the tool does not go there
             for edge in (grid[:1], grid[-1:], grid[:, :1], grid[:, -1:]):
@@ -206,7 +240,9 @@ class TipField:
     def cut_height(self) -> F64:
         """(ny, nx) float64, mm: tip limit of the cutting part alone at the lattice nodes."""
         if self._cut is None:
-            self._cut = self._grid(self.lattice, self.grown_radius, self.grown_corner) + self.allowance
+            lat = self.lattice
+            self._cut = drop_grid(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
+                                  self.grown_corner) + self.allowance
         return self._cut
 
     @property

@@ -10,7 +10,7 @@ import pytest
 from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
-from zones.reach import Clearances, Lattice, contact_tips, discs_of, lattice_step, touchable
+from zones.reach import Clearances, DiscHeights, Lattice, contact_tips, discs_of, lattice_step, touchable
 
 
 def test_a_lattice_covers_its_bounds_and_finds_its_nodes():
@@ -20,6 +20,26 @@ def test_a_lattice_covers_its_bounds_and_finds_its_nodes():
     i, j = lat.cells(np.array([[-0.5, 0.5], [0.1, 0.99], [99.0, -99.0]]))
     assert i.tolist() == [0, 2, 0] and j.tolist() == [0, 2, lat.nx - 1]
     assert lat.mask(np.array([[0.1, 0.99]])).sum() == 1 and not lat.mask(np.zeros((0, 2))).any()
+
+
+def test_lattices_of_whole_multiples_share_their_nodes():
+    bounds = np.array([[-3.13, 1.0], [3.0, 2.07]])
+    wide, narrow = Lattice.on_multiples(bounds, 2.0, 0.4), Lattice.on_multiples(bounds, 0.7, 0.4)
+    for lat, margin in ((wide, 2.0), (narrow, 0.7)):
+        assert -0.4 < lat.x0 - (bounds[0, 0] - margin) <= 1e-12 and -0.4 < lat.y0 - (bounds[0, 1] - margin) <= 1e-12
+        assert -1e-12 <= lat.x0 + (lat.nx - 1) * 0.4 - (bounds[1, 0] + margin) < 0.4
+    rows, columns = narrow.within(wide)
+    assert np.allclose(wide.x0 + 0.4 * np.arange(wide.nx)[columns], narrow.x0 + 0.4 * np.arange(narrow.nx))
+    assert np.allclose(wide.y0 + 0.4 * np.arange(wide.ny)[rows], narrow.y0 + 0.4 * np.arange(narrow.ny))
+    assert wide.within(narrow) is None
+
+
+def test_heights_under_discs_are_the_same_asked_before_or_not():
+    tree, bounds = TriangleTree(walls()), np.array([[-9.0, -7.0], [9.0, 7.0]])
+    shared, lattices = DiscHeights(tree), [Lattice.on_multiples(bounds, m, 0.4) for m in (1.0, 3.0, 2.0)]
+    for lat in lattices:
+        for radius in (2.03, 5.01):  # no node of these is right under the rim of a disc that touches a wall
+            np.testing.assert_allclose(shared.over(lat, radius), DiscHeights(tree).over(lat, radius), rtol=0, atol=1e-9)
 
 
 def test_lattice_steps_follow_the_tool_within_limits():

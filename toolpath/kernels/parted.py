@@ -1,0 +1,40 @@
+"""What a rectangle of a surface costs, fed along its rows (``toolpath.parted``, whose words these are)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from geometry.kernels.options import KERNEL
+
+
+@njit(**KERNEL)
+def price_rows(reach, length, a, b, c, d, lag):
+    """Passes and mm of line of the places of columns a to b and rows c to d, and mm of its mean and shortest line.
+
+    reach, length : (m, m) float64, as ``toolpath.parted.Feed``
+    lag           : mm, by which a pass goes on over its end, where it is the neighbour that is cut
+    """
+    m = len(reach)
+    total = 0.0
+    for i in range(c, d):
+        for j in range(a, b):
+            total += length[i, j]
+    share = (b - a) / m
+    mean = total / ((d - c) * (b - a))
+    stop = min(b + math.ceil(lag * m / mean), m)
+    passes, way, shortest = 0.0, 0.0, np.inf
+    for i in range(c, d):
+        line, least = 0.0, np.inf
+        for j in range(a, b):
+            line += length[i, j]
+        for j in range(a, stop):
+            least = min(least, reach[i, j])
+        line *= share / (b - a)
+        each = 1.0 / (m * least) if least > 0.0 else np.inf
+        passes += each
+        way += each * line
+        shortest = min(shortest, line)
+    return passes, way, mean * share, shortest
