@@ -196,6 +196,31 @@ def _even(samples: int, count: int, closed: bool) -> tuple[F64, F64]:
     return design, np.asarray(np.linalg.pinv(design), dtype=np.float64)
 
 
+@lru_cache(maxsize=64)
+def even_errors(samples: int, count: int, closed: bool, steps: int) -> F64:
+    """How noise on the points of ``fit_even`` moves the curve: a row for every ``u`` of ``steps`` equal steps in 0..1.
+
+    samples, count : points, control points
+    closed         : of a periodic curve
+    steps          : equal steps from 0 to 1, both with a row
+
+    Returns
+    -------
+    (steps + 1, count) float64, unitless. For independent noise of standard deviation 1 on every coordinate the length
+    of a row is the standard error of the curve there, along each axis; that of a sum of rows with weights is the
+    standard error of the same sum of places.
+
+    Notes
+    -----
+    The covariance of the control points is (D' D)^-1 with the design D = Q R, so that of the curve is B (R' R)^-1 B'
+    and the rows are B R^-1.
+    """
+    design, _ = _even(samples, count, closed)
+    _, triangle = np.linalg.qr(design)
+    rows = basis(np.linspace(0.0, 1.0, steps + 1), count, ORDER, closed)
+    return np.asarray(np.linalg.solve(triangle.T, rows.T).T)
+
+
 def _measured(points: ArrayLike, closed: bool) -> tuple[F64, F64]:
     """A polyline, its first point repeated when closed, and the length up to every point."""
     p = finite_points(points, 2, "points")

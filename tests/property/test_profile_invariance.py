@@ -77,6 +77,35 @@ def test_noise_of_one_percent(kind, seed, noise_seed, sigma):
     assert classify(p + noise, closed).type == kind
 
 
+def _arc(degrees: float, count: int) -> np.ndarray:
+    a = np.radians(degrees) * np.linspace(0.5, -0.5, count)
+    return np.column_stack([-np.sin(a), np.cos(a)])
+
+
+def _oval(length: float, count: int) -> np.ndarray:
+    a = np.linspace(2 * np.pi, 0, count, endpoint=False)
+    return np.column_stack([length * np.cos(a), np.sin(a)])
+
+
+PLAIN = {
+    "line": (lambda n: np.column_stack([np.linspace(0, 1, n), np.zeros(n)]), False, None),
+    "arc": (lambda n: _arc(60, n), False, "C1"), "hollow": (lambda n: _arc(60, n)[::-1], False, "C4"),
+    "half a turn": (lambda n: _arc(150, n), False, "C1"),
+    "circle": (lambda n: _oval(1, n), True, "C1"), "oval": (lambda n: _oval(3, n), True, "C1"),
+}
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.sampled_from(list(PLAIN)), st.sampled_from([400, 600, 1500]), st.sampled_from([0.005, 0.01, 0.02]),
+       st.integers(0, 2**32 - 1))
+def test_noise_alone_bends_nothing(name, count, sigma, noise_seed):
+    """Neither a line nor what bends one way gets a bend from noise, at its ends neither."""
+    plain, closed, kind = PLAIN[name]
+    p = plain(count)
+    noise = np.random.default_rng(noise_seed).normal(size=p.shape) * sigma * size_of(p, closed)
+    assert classify(p + noise, closed).type == kind
+
+
 @pytest.mark.parametrize(("kind", "sigma", "least"), [("C3", 0.005, 36), ("C3", 0.01, 36), ("C9", 0.005, 34),
                                                       ("C9", 0.01, 30)])
 def test_noise_on_triples_costs_at_most_their_roundness(kind, sigma, least):

@@ -12,7 +12,7 @@ from geometry.bspline import SplineCurve
 from geometry.errors import GeometryError
 from tests.profile_curves import DRAW, draw
 from tests.source_tree import ROOT
-from zones.bends import Way, _pivots, measure_bends
+from zones.bends import Way, _pivots, measure_bends, size_of
 from zones.profiles import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
 
 # Limits were chosen on seeds below 1000; scores are taken on these.
@@ -114,6 +114,31 @@ def test_a_dent_below_the_limit_belongs_to_the_bend_around_it() -> None:
     assert classify(_bumped(0.0)).type == classify(_bumped(0.004)).type == "C1"
     assert len(classify(_bumped(0.004)).bends) == 1
     assert classify(_bumped(0.08)).type == "C2"
+
+
+@pytest.mark.parametrize(("kind", "seed", "noise_seed", "sigma"), [
+    ("C6", 3600, 3600, 0.01), ("C6", 3094, 819169803, 0.01), ("C6", 1847, 641801295, 0.005),
+    ("C4", 6418, 3626198101, 0.005), ("C4", 7830, 74946420, 0.01), ("C1", 1354, 3339749106, 0.005),
+])
+def test_noise_neither_hides_a_waist_nor_bends_an_end(kind: str, seed: int, noise_seed: int, sigma: float) -> None:
+    """Draws that were taken for another type by margins of up to 0.35, and a random one of their kind."""
+    p, closed = draw(kind, seed)
+    noise = np.random.default_rng(noise_seed).normal(size=p.shape) * sigma * size_of(p, closed)
+    found = classify(p + noise, closed)
+    assert found.type == kind and found.margin > 0.2
+
+
+@pytest.mark.parametrize(("fillet", "sigma"), [(0.02, 0.0), (0.1, 0.002), (0.2, 0.01)])
+def test_the_sharpness_of_a_waist_does_not_make_it_low(fillet: float, sigma: float) -> None:
+    """Two discs joined by two fillets: low over its own chord, each of them is deep under the line over both discs."""
+    across = np.arccos(0.8 / (1 + fillet))
+    lobe, turn = np.linspace(np.pi - across, across - np.pi, 500), np.linspace(-across, across - np.pi, 100)[1:-1]
+    right = np.column_stack([0.8 + np.cos(lobe), np.sin(lobe)])
+    upper = fillet * np.column_stack([np.cos(turn), np.sin(turn)]) + [0, (1 + fillet) * np.sin(across)]
+    ring = np.vstack([right, upper * [1, -1], (right * [-1, 1])[::-1], upper[::-1]])
+    noise = np.random.default_rng(5).normal(size=ring.shape) * sigma * size_of(ring, True)
+    found = classify(ring + noise, True)
+    assert found.type == "C6" and found.margin > 0.6
 
 
 def _leaned(shift: float) -> np.ndarray:
