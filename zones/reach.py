@@ -81,7 +81,7 @@ class Lattice:
 
     @classmethod
     def on_multiples(cls, bounds: F64, margin: float, step: float) -> Lattice:
-        """``over``, with nodes at whole multiples of the step: two of these have the nodes of their overlap in common."""
+        """``over``, with nodes at whole multiples of the step: two of these share the nodes of their overlap."""
         lower = np.floor((bounds[0, :2] - margin) / step)
         nx, ny = (np.ceil((bounds[1, :2] + margin) / step) - lower + 1).astype(int).tolist()
         return cls(float(lower[0] * step), float(lower[1] * step), float(step), nx, ny)
@@ -387,9 +387,17 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
     tips       : (n, 3) float64, mm, the admissible tip; else one at which the cutting part alone gets there; else
                  the first tried
     """
-    tool = field.tool
-    tips = contact_tips(tool, points, normals, lift + field.allowance)
-    tips[:, 2] += LEVEL_TOLERANCE
+    tips = contact_tips(field.tool, points, normals, lift + field.allowance)
+    by_cutter, by_tool = np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)
+    seen = np.flatnonzero(normals[:, 2] > SEEN)  # the rest, half of a part, no tool is asked about
+    by_cutter[seen], by_tool[seen], tips[seen] = _touched(field, points[seen], normals[seen], tips[seen], play)
+    return by_cutter, by_tool, tips
+
+
+def _touched(field: TipField, points: F64, normals: F64, tips: F64,
+             play: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
+    """``touchable`` of samples in sight, with the tips to try first."""
+    tips = tips + [0.0, 0.0, LEVEL_TOLERANCE]
     cutter = ~field.blocked_by_cutter(tips)
     upright = np.flatnonzero(cutter & (np.abs(normals[:, 2]) < 0.5))
     aside = tips[upright]
@@ -397,7 +405,7 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
     aside[:, :2] += play * field.lattice.step * side
     cutter[upright] = ~field.blocked_by_cutter(aside)
     whole = cutter & ~field.blocked_by_body(tips)
-    flat = tool.radius - tool.corner_radius
+    flat = field.tool.radius - field.tool.corner_radius
     if flat > 0:
         level = normals[:, 2] > LEVEL
         for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)):
@@ -412,5 +420,4 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
                 left = np.flatnonzero(~whole[open_to])
                 _take(field, np.ascontiguousarray(trials[left]), open_to[left], cutter, whole, tips)
     tips[:, 2] -= LEVEL_TOLERANCE
-    seen = normals[:, 2] > SEEN
-    return cutter & seen, whole & seen, tips
+    return cutter, whole, tips
