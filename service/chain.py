@@ -32,7 +32,7 @@ from service.convert import (
     tool_bodies,
 )
 from service.delivery import Files, deliver, json_bytes
-from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data
+from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data, rates_of
 from service.prepare import Prepared, prepare, stock_box, table_height
 from service.preview import draw_preview
 from service.programs import (
@@ -49,7 +49,6 @@ from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_pa
 from service.sides import Look, Side, in_first_frame, in_setup_frame
 from service.trimmed import trimmed_faces
 from toolpath.family import Target
-from toolpath.motion import RAPID_MM_MIN
 from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
@@ -277,7 +276,8 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
-                        ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view))
+                        ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
+                        rates=rates_of(ready.setup))
 
 
 def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:
@@ -300,7 +300,8 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=s.machine.rapid_mm_min or RAPID_MM_MIN, work_offset=access_of(ready, view).work_offset,
+        rapid_feed=rates_of(s).rapid, acceleration=rates_of(s).acceleration,
+        work_offset=access_of(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
         gauge_length=gauge_lengths(s),
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,

@@ -1,4 +1,4 @@
-"""Spindle speed and feed of a tool in a material, with every default stated."""
+"""Spindle speed and feed of a tool in a material, and what a machine does, with every default stated."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+from geometry.timing import RATES, Rates
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
+from schemas.setup import Setup
 from schemas.tools import Tool
 
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
-DEFAULT_RAPID_MM_MIN = 10000.0
-DEFAULT_ACCELERATION_MM_S2 = 1000.0
 PLUNGE_FACTOR = 0.3
 
 
@@ -74,5 +74,12 @@ def cutting_data(material: Material, tool: Tool, machine: Machine) -> CuttingDat
                        feed / (tool.flutes * rpm), limited_by, material.source)
 
 
-__all__ = ["DEFAULT_ACCELERATION_MM_S2", "DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "DEFAULT_RAPID_MM_MIN",
-           "MATERIALS", "PLUNGE_FACTOR", "CuttingData", "cutting_data", "feed_per_tooth", "find_material"]
+def rates_of(setup: Setup) -> Rates:
+    """What the machine of a setup does; corners are rounded by what programs allow (``output.linuxcnc``)."""
+    machine = setup.machine
+    return Rates(machine.rapid_mm_min or RATES.rapid, machine.acceleration_mm_s2 or RATES.acceleration,
+                 min(RATES.rounding, 0.5 * setup.quality.chordal_tolerance_mm))
+
+
+__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "PLUNGE_FACTOR", "CuttingData", "cutting_data",
+           "feed_per_tooth", "find_material", "rates_of"]

@@ -16,10 +16,11 @@ from output.model import Clamping, Frame, StockBox, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import rotary_machine, tool_bodies
+from service.materials import rates_of
 from service.prepare import TABLE_SPARE, Prepared, stock_box, table_height, turned_box
 from service.sides import Look, Program, Side
 from service.version import VERSION
-from toolpath.motion import RAPID_MM_MIN, Workingstep
+from toolpath.motion import Workingstep
 from toolpath.settings import Turning
 from zones.view import View
 
@@ -118,7 +119,7 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
         return None
     longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
 
-    rate, fastest = setup.machine.rotary_rate_deg_min, setup.machine.rapid_mm_min or RAPID_MM_MIN
+    rate, fastest = setup.machine.rotary_rate_deg_min, rates_of(setup).rapid
 
     def along(tips: F64, axes: F64) -> tuple[F64, F64, F64] | None:
         try:

@@ -440,4 +440,4 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
     outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
                        settings.scallop_height, settings.chordal_tolerance, walked, outline,
-                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb)
+                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb, rates=settings.rates)

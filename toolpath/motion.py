@@ -6,15 +6,15 @@ guarantees it and nothing downstream reorders.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from geometry.mesh import F64
+from geometry.timing import RATES, Rates, move_seconds
 from geometry.toolbody import ToolBody
-
-RAPID_MM_MIN = 10000.0  # of a machine that does not say
 
 
 class Motion(StrEnum):
@@ -48,6 +48,18 @@ class Trajectory:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
+def seconds_of(trajectories: Sequence[Trajectory], rates: Rates) -> float:
+    """Seconds of trajectories run one behind the other; where rapids and feed moves meet the control stands still."""
+    if not trajectories:
+        return 0.0
+    count = [len(t.points) - 1 for t in trajectories]
+    rapid = np.repeat([t.motion is Motion.RAPID for t in trajectories], count)
+    feed = np.where(rapid, rates.rapid, np.repeat([t.feed for t in trajectories], count))
+    stop = np.concatenate([[False], rapid[1:] != rapid[:-1]])
+    way = np.concatenate([np.diff(t.points, axis=0) for t in trajectories])
+    return float(move_seconds(way, feed, rates, stop).sum())
+
+
 @dataclass(frozen=True, eq=False)
 class Workingstep:
     """One operation with one tool: one zone finished, or the layers above zones taken off.
@@ -61,6 +73,7 @@ class Workingstep:
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     access    : id of the access in whose frame all this is; '' where the plan has one frame
+    rates     : what the machine does, for times
     """
 
     id: str
@@ -81,8 +94,9 @@ class Workingstep:
     bottom: float
     climb: bool = True
     access: str = ""
+    rates: Rates = RATES
 
     @property
     def seconds(self) -> float:
-        """Time at its feeds, rapids at ``RAPID_MM_MIN``, without acceleration."""
-        return sum(60.0 * t.length / (RAPID_MM_MIN if t.motion is Motion.RAPID else t.feed) for t in self.trajectories)
+        """Time at its feeds and rapids, speeding up and slowing down counted, from standstill to standstill."""
+        return seconds_of(self.trajectories, self.rates)

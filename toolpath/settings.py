@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from geometry.timing import RATES, Rates
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.strategies.zigzag import Pattern
 
@@ -52,6 +53,7 @@ class PlanSettings:
     pattern         : of passes over shallow area
     turning         : what the rotary axes can do; None on a machine without
     found           : what a proof found wrong with the plans before, in the frame of this one
+    rates           : what the machine does, for times
     """
 
     scallop_height: float
@@ -68,3 +70,4 @@ class PlanSettings:
     pattern: Pattern = Pattern.AUTO
     turning: Turning | None = None
     found: Counterexamples = NONE
+    rates: Rates = RATES

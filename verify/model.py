@@ -47,6 +47,7 @@ class ProofSetup:
     ramp_angle    : rad, steepest descent into stock
     plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.stock``)
     rapid_feed    : mm/min
+    acceleration  : mm/s², for times
     travel        : (3,) float64 mm, what the moves of a program may span in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
     dogleg        : whether a rapid moves each axis at its own speed, so that its way is not a straight line
@@ -78,6 +79,7 @@ class ProofSetup:
     ramp_angle: float = 0.0523598775598
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
+    acceleration: float = 1000.0
     travel: F64 | None = None
     gauge_length: Mapping[int, float] = field(default_factory=dict)
     dogleg: bool = False

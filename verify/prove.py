@@ -16,6 +16,7 @@ from verify.arcs import CHORD
 from verify.blank import stock_on_normals
 from verify.clash import DIP
 from verify.dogleg import box_findings
+from verify.duration import minutes_of
 from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
     Source,
@@ -217,9 +218,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...]) -> Proof:
     read = [r.program for r in readings]
-    length = np.concatenate([np.linalg.norm(p.end - p.start, axis=1) for p in read]) if read else np.zeros(0)
-    fed = np.concatenate([p.minutes for p in read]) if read else length
-    took = np.where(np.isnan(fed), length / setup.rapid_feed, fed)
+    took = np.concatenate([minutes_of(p, setup) for p in read]) if read else np.zeros(0)
     seconds = float(took.sum() * 60.0) + sum(p.dwell for p in read)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
     known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, bool)

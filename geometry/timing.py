@@ -1,0 +1,65 @@
+"""How long a machine takes for straight moves: feeds, rapids, and speeding up and slowing down between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import GeometryError
+from geometry.kernels.timing import seconds_of_moves
+from geometry.mesh import F64
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What a machine does.
+
+    rapid        : mm/min
+    acceleration : mm/s², in every direction
+    rounding     : mm by which the control may pass a corner; 0 stops at each
+    """
+
+    rapid: float
+    acceleration: float
+    rounding: float
+
+
+RATES = Rates(10000.0, 1000.0, 0.001)
+"""Of a machine that does not say."""
+
+
+def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | None = None) -> F64:
+    """Seconds of moves run one behind the other, from standstill to standstill.
+
+    way   : (m, 3) float64, mm, of each straight move
+    feed  : (m,) float64, mm/min, > 0, at the rapid rate for rapids
+    rates : Rates
+    stop  : (m,) bool, moves before which the control stands still, as for a change of the tool; none when None
+
+    Returns
+    -------
+    (m,) float64. A move without length takes none and stops the control: what takes its time, a dwell or a rotary axis
+    alone, is for the caller to add.
+
+    Raises
+    ------
+    GeometryError
+        A feed or an acceleration that is not positive (code 'bad_rate').
+
+    Notes
+    -----
+    Corners are run on arcs (``geometry.kernels.timing``), speed changes at the full acceleration at once (no jerk), and
+    the control looks ahead as far as it has to. Theory, and figures against a controller: docs/theory/times.md.
+    """
+    ways, feeds = np.ascontiguousarray(way, dtype=np.float64), np.ascontiguousarray(feed, dtype=np.float64)
+    worst = min(float(feeds.min(initial=np.inf)), rates.acceleration)
+    if not worst > 0.0 or not np.isfinite(feeds).all():
+        raise GeometryError(f"feeds and the acceleration must be above 0, one is {worst:g}", code="bad_rate",
+                            subjects=("feed",), measured=worst, limit=0.0, remedy="give each move a feed")
+    stops = np.zeros(len(ways), np.bool_) if stop is None else np.ascontiguousarray(stop, dtype=np.bool_)
+    out = np.zeros(len(ways))
+    if len(ways):
+        seconds_of_moves(ways, feeds / 60.0, stops, rates.acceleration, rates.rounding, out)
+    return out

@@ -1,0 +1,34 @@
+"""How long a machine takes for each move of a program."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.timing import Rates, move_seconds
+from verify.cycles import RAPID
+from verify.model import ProofSetup
+from verify.program import Program
+
+RAPID_TURN = float(np.radians(7200.0))
+"""rad/min, of a rotary axis in a rapid, where nobody says: 20 turns."""
+
+
+def minutes_of(program: Program, setup: ProofSetup) -> F64:
+    """Minutes (m,) float64 of the moves of a program, speeding up and slowing down counted, dwells not.
+
+    The control stands still where the tool is changed and between rapids and feed moves, which no control blends, and
+    where a rotary axis alone moves.
+    """
+    way, rapid = program.end - program.start, program.kind == RAPID
+    length = np.linalg.norm(way, axis=1)
+    even = np.where(rapid, length / setup.rapid_feed, program.minutes)
+    if program.poses is not None:
+        turned = np.abs(program.poses.end_turn - program.poses.start_turn).max(axis=1)
+        even = np.where(rapid, np.maximum(even, turned / (setup.rotary_rate or RAPID_TURN)), even)
+    moving = (length > 0.0) & (even > 0.0)
+    feed = np.where(moving, length / np.where(moving, even, 1.0), 1.0)
+    stop = np.zeros(len(way), np.bool_)
+    stop[1:] = (program.tool[1:] != program.tool[:-1]) | (rapid[1:] != rapid[:-1])
+    rates = Rates(setup.rapid_feed, setup.acceleration, program.blend)
+    return np.where(moving, move_seconds(way, feed, rates, stop) / 60.0, even)
