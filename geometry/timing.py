@@ -30,13 +30,16 @@ RATES = Rates(10000.0, 1000.0, 0.001)
 """Of a machine that does not say."""
 
 
-def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | None = None) -> F64:
+def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | None = None,
+                 curve: NDArray[np.bool_] | None = None) -> F64:
     """Seconds of moves run one behind the other, from standstill to standstill.
 
     way   : (m, 3) float64, mm, of each straight move
     feed  : (m,) float64, mm/min, > 0, at the rapid rate for rapids
     rates : Rates
     stop  : (m,) bool, moves before which the control stands still, as for a change of the tool; none when None
+    curve : (m,) bool, moves that are chords of the same curve as the one before: there is no corner between; none when
+            None
 
     Returns
     -------
@@ -58,8 +61,9 @@ def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | No
     if not worst > 0.0 or not np.isfinite(feeds).all():
         raise GeometryError(f"feeds and the acceleration must be above 0, one is {worst:g}", code="bad_rate",
                             subjects=("feed",), measured=worst, limit=0.0, remedy="give each move a feed")
-    stops = np.zeros(len(ways), np.bool_) if stop is None else np.ascontiguousarray(stop, dtype=np.bool_)
+    stops, curves = (np.zeros(len(ways), np.bool_) if flag is None else np.ascontiguousarray(flag, dtype=np.bool_)
+                     for flag in (stop, curve))
     out = np.zeros(len(ways))
     if len(ways):
-        seconds_of_moves(ways, feeds / 60.0, stops, rates.acceleration, rates.rounding, out)
+        seconds_of_moves(ways, feeds / 60.0, stops, curves, rates.acceleration, rates.rounding, out)
     return out

@@ -50,8 +50,8 @@ class Machine(WireModel):
         description="The rotary axes move while the tool cuts. false: plans turn them between cuts only (3+2). No "
                     "effect on a 3-axis machine, nor on a program that is verified.")] = True
     rotary_rate_deg_min: Annotated[Number | None, Field(
-        ge=1, le=1e7, description="Fastest a rotary axis turns in a feed move, deg/min; null: not limited, and on a "
-                                  "3-axis machine.")] = None
+        ge=1, le=1e7, description="Fastest a rotary axis turns in a feed move, and in rapids for times, deg/min; null: "
+                                  "not limited, 7200 in rapids for times; and on a 3-axis machine.")] = None
     pivots_mm: Annotated[list[Triple] | None, Field(
         min_length=1, max_length=2,
         description="Where the rotary axes lie, mm, in the frame of the program while both stand at 0. table-table: a "

@@ -12,13 +12,16 @@ from verify.program import Program
 
 RAPID_TURN = float(np.radians(7200.0))
 """rad/min, of a rotary axis in a rapid, where nobody says: 20 turns."""
+PATH = 0.001
+"""mm, by which corners are passed where a program allows less, or says nothing: its coordinates are no finer."""
 
 
 def minutes_of(program: Program, setup: ProofSetup) -> F64:
     """Minutes (m,) float64 of the moves of a program, speeding up and slowing down counted, dwells not.
 
-    The control stands still where the tool is changed and between rapids and feed moves, which no control blends, and
-    where a rotary axis alone moves.
+    The control stands still where the tool is changed, where a rotary axis alone moves, and between rapids and feed
+    moves, which no control blends. Moves of one line are chords of its arc. A feed move whose minutes nobody knows, as
+    nobody knows where it starts, counts as a rapid.
     """
     way, rapid = program.end - program.start, program.kind == RAPID
     length = np.linalg.norm(way, axis=1)
@@ -26,9 +29,12 @@ def minutes_of(program: Program, setup: ProofSetup) -> F64:
     if program.poses is not None:
         turned = np.abs(program.poses.end_turn - program.poses.start_turn).max(axis=1)
         even = np.where(rapid, np.maximum(even, turned / (setup.rotary_rate or RAPID_TURN)), even)
+    even = np.where(np.isfinite(even), even, length / setup.rapid_feed)
     moving = (length > 0.0) & (even > 0.0)
     feed = np.where(moving, length / np.where(moving, even, 1.0), 1.0)
     stop = np.zeros(len(way), np.bool_)
     stop[1:] = (program.tool[1:] != program.tool[:-1]) | (rapid[1:] != rapid[:-1])
-    rates = Rates(setup.rapid_feed, setup.acceleration, program.blend)
-    return np.where(moving, move_seconds(way, feed, rates, stop) / 60.0, even)
+    curve = np.zeros(len(way), np.bool_)
+    curve[1:] = (program.line[1:] == program.line[:-1]) & ~stop[1:]
+    rates = Rates(setup.rapid_feed, setup.acceleration, max(program.blend, PATH))
+    return np.where(moving, move_seconds(way, feed, rates, stop, curve) / 60.0, even)

@@ -56,7 +56,8 @@ class TurnLog:
         feed   : (m,) float64, mm/min, nan for rapids; where an axis turns, the time noted counts instead
         """
         out = np.where(np.isnan(feed), np.nan, 0.0)
-        np.divide(length, feed, out=out, where=(length > 0) & (feed != 0))
+        with np.errstate(over="ignore"):  # a feed of next to none takes for ever
+            np.divide(length, feed, out=out, where=(length > 0) & (feed != 0))
         if self._minutes:
             noted = np.array(self._minutes)
             out[noted[:, 0].astype(np.int64)] = noted[:, 1]

@@ -44,10 +44,11 @@ def corner(before, behind, shorter, a, d):
 
 
 @njit(**KERNEL)
-def seconds_of_moves(way, speed, stop, a, d, out):
+def seconds_of_moves(way, speed, stop, curve, a, d, out):
     """Seconds (m,) of m moves run one behind the other from standstill to standstill, written to ``out``.
 
     way : (m, 3) mm; speed : (m,) mm/s; stop : (m,) bool, moves before which the control stands still
+    curve : (m,) bool, moves that are chords of the curve the one before is one of: only half of either bounds the arc
     An arc counts to the moves before and behind it by halves.
     """
     m = len(way)
@@ -60,7 +61,8 @@ def seconds_of_moves(way, speed, stop, a, d, out):
         change[k] = ARC_SHARE * a
         if stop[i + 1] or size[i] == 0.0 or size[i + 1] == 0.0:
             continue
-        v, taken, half = corner(way[i] / size[i], way[i + 1] / size[i + 1], min(size[i], size[i + 1]), a, d)
+        v, taken, half = corner(way[i] / size[i], way[i + 1] / size[i + 1], min(size[i], size[i + 1]), a,
+                                np.inf if curve[i + 1] else d)
         length[k], most[k] = 2.0 * half, min(v, min(speed[i], speed[i + 1]))
         length[k - 1] -= taken
         length[k + 1] -= taken

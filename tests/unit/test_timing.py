@@ -120,3 +120,13 @@ def test_a_rate_that_is_none(feed, acceleration):
 def test_nothing_takes_no_time():
     assert len(move_seconds(np.zeros((0, 3)), np.zeros(0), STOPPING)) == 0
     assert total(np.zeros((3, 3)), 100) == 0.0
+
+
+def test_chords_of_one_curve_have_no_corner():
+    at = np.linspace(0.0, 20.0 * math.pi, 2001)
+    way = np.diff(5.0 * np.column_stack([np.cos(at), np.sin(at), 0 * at]), axis=0)
+    curve = np.arange(len(way)) > 0
+    feed, rates = np.full(len(way), 3000.0), Rates(1e4, 20000.0, 0.0)
+    even = 100.0 * math.pi / 50.0 + 50.0 / 20000.0
+    assert move_seconds(way, feed, rates, curve=curve).sum() == pytest.approx(even, rel=2e-3)
+    assert move_seconds(way, feed, rates).sum() > 1.5 * even

@@ -24,14 +24,14 @@ def price_rows(reach, length, a, b, c, d, lag):
             total += length[i, j]
     share = (b - a) / m
     mean = total / ((d - c) * (b - a))
-    stop = min(b + math.ceil(lag * m / mean), m)
+    stop = b + math.ceil(lag * m / mean) if lag * m < (m - b) * mean else m
     passes, way, shortest = 0.0, 0.0, np.inf
     for i in range(c, d):
         line, least = 0.0, np.inf
         for j in range(a, b):
             line += length[i, j]
         for j in range(a, stop):
-            least = min(least, reach[i, j])
+            least = min(least, reach[i, j]) if reach[i, j] > 0.0 else 0.0
         line *= share / (b - a)
         each = 1.0 / (m * least) if least > 0.0 else np.inf
         passes += each
