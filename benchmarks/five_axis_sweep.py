@@ -6,7 +6,8 @@ Parts are of the recipe random with two or three walls, up to three connections 
 range, with their suggested tools; the machine is a table A/C (A -30 to 110 degrees). Each is planned and proved in a
 process of its own. What a part gave is kept as a line of ``rows.jsonl`` in the folder, so a broken run goes on where it
 stopped; a line holds a digest of the sources it was made with, and one made with others is told apart. A part that ends
-in an error or over the limit counts as not proved.
+in an error or over the limit counts as not proved. ``benchmarks/five_axis_rows`` has those made so far: go on there
+with ``--out``, see them with ``--score-only``.
 """
 
 from __future__ import annotations
