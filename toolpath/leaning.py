@@ -22,6 +22,7 @@ from toolpath.motion import Motion, Trajectory
 from toolpath.piece import LEAST_PIECE, Piece, places_along, raised_poses, thinned_poses
 from toolpath.posed import Blocked
 from toolpath.settings import CutData, PlanSettings, Turning
+from toolpath.shell import shells
 from toolpath.stock import SKIN, StockMap
 from zones.reach import Clearances, Disc
 
@@ -148,49 +149,19 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
 
     tips, axes : (n, 3) float64, mm and unit
 
-    Bodies are places on rings, two lattice steps apart; stock is what the nearest node shows, half a cell aside.
+    Bodies are places on their shells (``toolpath.shell``); stock is what the nearest node shows, half a cell aside.
     Less than 1.5 steps deep the cutting part is not asked: nodes in the wall are there. Where that is more than twice
     ``thick`` the lattice is too coarse to tell, and every pose counts as loaded.
     """
     step = stock.lattice.step
-    deep, spacing = max(thick, CELLS * step), 2.0 * step
+    deep = max(thick, CELLS * step)
     if not len(tips) or thick > 0.0 and deep > 2.0 * thick:
         return np.ones(len(tips), np.bool_)
-    over, across = stock.highest - float(tips[:, 2].min()), stock.lattice.step * math.hypot(*stock.top.shape)
+    over, across = stock.highest - float(tips[:, 2].min()), step * math.hypot(*stock.top.shape)
     room = max(min(over / max(float(axes[:, 2].min()), 1e-3), over + across), 0.0)  # along the axis, until out of it
-    corner, flat = tool.corner_radius, tool.radius - tool.corner_radius
-
-    def heights(begin: float, end: float) -> F64:
-        end = max(min(end, room + max(d.radius for d in discs) if discs else room + tool.radius), begin)
-        return np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)
-
-    under = min(thick, SKIN * tool.diameter) if under is None else under
-    flank, bottom = [np.zeros((0, 3))], max(under, CELLS * step)
-    for h in heights(min(bottom, tool.flute_length), tool.flute_length).tolist():
-        low = max(corner - h, 0.0)
-        if corner > bottom and low > corner - bottom:
-            continue
-        at = flat + math.sqrt((corner - bottom) ** 2 - low * low) if corner > bottom else tool.radius
-        # over the corner it is the side that counts: what may stand under the end may not stand beside it
-        low = max(corner - max(h - bottom, 0.0), 0.0)
-        beside = flat + math.sqrt(max(corner * corner - low * low, 0.0)) - deep
-        at = max(min(max(at, beside), tool.radius - deep), 0.0)
-        flank += [_ring(r, h, spacing) for r in np.linspace(0.0, at, int(np.ceil(at / spacing)) + 1)]
-    bodies = [np.zeros((0, 3))]
-    outer = [(0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
-             (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
-             *((d.radius, d.height, math.inf) for d in discs)]
-    for radius, begin, end in outer:
-        for h in heights(begin, end).tolist():
-            bodies += [_ring(r, h, spacing) for r in np.linspace(0.0, radius, int(np.ceil(radius / (4.0 * step))) + 1)]
-    return stock.stands_in(tips, axes, np.vstack(flank), np.vstack(bodies))
-
-
-def _ring(radius: float, height: float, spacing: float) -> F64:
-    """(k, 3) mm: places on a ring round the axis."""
-    count = max(int(np.ceil(2.0 * np.pi * radius / spacing)), 1)
-    at = 2.0 * np.pi * np.arange(count) / count
-    return np.column_stack([radius * np.cos(at), radius * np.sin(at), np.full(count, height)])
+    under = max(min(thick, SKIN * tool.diameter) if under is None else under, CELLS * step)
+    wide = max((tool.radius, *(d.radius for d in discs)))
+    return stock.stands_in(tips, axes, *shells(tool, discs, clear, deep, under, step, room + wide))
 
 
 def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:

@@ -17,8 +17,10 @@ from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.kernels.stock import HALF_DIAGONAL, loaded, meets, overlaps, sink, stamp, stamp_leaning, standing
+from toolpath.kernels.shell import highest_of_four, stands_in
+from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_leaning, standing
 from toolpath.piece import between, places_along
+from toolpath.shell import Shell
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
@@ -29,6 +31,10 @@ ON_EDGE = 1e-9  # mm
 APART, MOST_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
+
+
+Ceilings = tuple[F64, NDArray[np.int64]]
+"""Heights of a lattice and of ever larger squares of it, as ``toolpath.kernels.shell`` looks at them."""
 
 
 class StockMap:
@@ -46,6 +52,7 @@ class StockMap:
         self.cover = ndimage.maximum_filter(self.top, 3) if cover is None else np.ascontiguousarray(cover)
         self.part = np.full_like(self.top, -np.inf) if part is None else np.ascontiguousarray(part)
         self._pooled = _pooled(self.top)  # never too low: lowered as it is looked at
+        self._ceilings: tuple[Ceilings, Ceilings] | None = None  # of stock, and of stock that is not part
 
     @classmethod
     def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float) -> StockMap:
@@ -100,7 +107,7 @@ class StockMap:
 
     def become(self, other: StockMap) -> None:
         """Take over what a copy of this has come to."""
-        self.top, self.cover, self._pooled = other.top, other.cover, other._pooled
+        self.top, self.cover, self._pooled, self._ceilings = other.top, other.cover, other._pooled, other._ceilings
 
     def left_by(self, others: Sequence[tuple[StockMap, F64]]) -> None:
         """Lower the stock to what other maps of it, seen along other axes, have left.
@@ -123,11 +130,11 @@ class StockMap:
         for heights, theirs, rise in ((self.cover, wide, reach), (self.top, [m.top for m, _ in others], 0.0)):
             sink(heights.copy(), lat.x0, lat.y0, lat.step, floor, turns, _stacked(theirs), frames, rise, heights)
         np.minimum(self.top, self.cover, out=self.top)
-        self._pooled = _pooled(self.top)
+        self._pooled, self._ceilings = _pooled(self.top), None
 
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
-        lat = self.lattice
+        lat, self._ceilings = self.lattice, None
         stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
               tool.corner_radius)
 
@@ -136,7 +143,7 @@ class StockMap:
 
         Of its cutting part cylinders that lie inside, at poses a few lattice steps apart: neither map falls too low.
         """
-        lat = self.lattice
+        lat, self._ceilings = self.lattice, None
         spacing = max(APART * lat.step, MOST_POSED * tool.radius)
         tips, axes = between(tips, axes, places_along(tips, axes, tool.flute_length, spacing))
         r, high = tool.corner_radius, tool.flute_length
@@ -147,18 +154,21 @@ class StockMap:
                 stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
                               np.ascontiguousarray(axes), sides, radius, low, high, shrink)
 
-    def stands_in(self, tips: F64, axes: F64, flank: F64, bodies: F64) -> NDArray[np.bool_]:
+    def stands_in(self, tips: F64, axes: F64, flank: Shell, bodies: Shell) -> NDArray[np.bool_]:
         """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.
 
-        flank  : (m, 3) float64, mm, places in its cutting part, z along the axis: in stock where that is higher at the
-                 nearest node, the part counted
-        bodies : (l, 3) float64, mm, places on neck, shank and holder: in stock where it is also higher than the part
+        flank  : of its cutting part: in stock where that is higher at the nearest node, the part counted
+        bodies : of neck, shank and holder: in stock where it is also higher than the part
         """
         out, lat = np.zeros(len(tips), np.bool_), self.lattice
         first = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        loaded(self.top, self.part, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
-               np.ascontiguousarray(axes), first, np.cross(axes, first), flank, bodies, out)
+        pose = np.ascontiguousarray(tips), np.ascontiguousarray(axes), first, np.cross(axes, first)
+        if self._ceilings is None:
+            self._ceilings = (_ceilings(self.top), _ceilings(np.where(self.top > self.part, self.top, -np.inf)))
+        for shell, (heights, begins) in zip((flank, bodies), self._ceilings, strict=True):
+            stands_in(heights, begins, lat.ny, lat.nx, lat.x0, lat.y0, lat.step, *pose, shell.places, shell.boxes,
+                      shell.levels, out)
         return out
 
     def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
@@ -242,6 +252,18 @@ def _stacked(heights: Sequence[F64]) -> F64:
     for k, h in enumerate(heights):
         out[k, :h.shape[0], :h.shape[1]] = h
     return out
+
+
+def _ceilings(top: F64) -> Ceilings:
+    """Heights of the nodes, then the highest of squares of 2, 4, 8, ... nodes a side, and where each begins."""
+    levels = [np.ascontiguousarray(top)]
+    while max(levels[-1].shape) > 1:
+        ny, nx = levels[-1].shape
+        coarse = np.empty(((ny + 1) // 2, (nx + 1) // 2))
+        highest_of_four(levels[-1], coarse)
+        levels.append(coarse)
+    begins = np.concatenate([[0], np.cumsum([level.size for level in levels])])[:-1]
+    return np.concatenate([level.ravel() for level in levels]), begins.astype(np.int64)
 
 
 def _pooled(top: F64) -> F64:

@@ -230,27 +230,3 @@ def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, s
                     continue
                 if under < z <= over:
                     heights[i, j] = tz + under
-
-
-@njit(cache=True, nogil=True)
-def loaded(top, part, x0, y0, step, tips, axes, first, second, flank, bodies, out):
-    """Set out[k] where stock stands at one of the places of a tool at pose k.
-
-    first, second : (n, 3) unit, square to the axes
-    flank  : (m, 3) mm, places in the tool: along first, second and axis; in stock where under the nearest node
-    bodies : (l, 3) mm, places of neck, shank and holder; in stock where under a node above the part of its cell
-    """
-    ny, nx = top.shape
-    for k in range(len(tips)):
-        for q in range(len(flank) + len(bodies)):
-            body = q >= len(flank)
-            u, v, h = bodies[q - len(flank)] if body else flank[q]
-            x = tips[k, 0] + u * first[k, 0] + v * second[k, 0] + h * axes[k, 0]
-            y = tips[k, 1] + u * first[k, 1] + v * second[k, 1] + h * axes[k, 1]
-            j, i = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
-            if i < 0 or j < 0 or i >= ny or j >= nx:
-                continue
-            z = tips[k, 2] + u * first[k, 2] + v * second[k, 2] + h * axes[k, 2]
-            if top[i, j] > z and (not body or top[i, j] > part[i, j]):
-                out[k] = True
-                break

@@ -1,0 +1,120 @@
+"""The shell of a tool: places on its outside, by which it is held against stock that is a height over the plan.
+
+Stock stands under its height without a gap, and no tool axis points down. So stock that is anywhere in a tool is also
+where the vertical line there leaves the tool below: on its shell. Places inside need not be asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.kernels.shell import BRANCH, LEAF
+from zones.reach import Clearances, Disc
+
+BITS = 8  # of each coordinate on the curve along which places are put in boxes
+KEPT = 48  # shells: of a tool as it is and a bit wider, for what may stand at its flank and under its end
+BODY_STEPS = 2.0  # lattice steps between places of neck, shank and holder; of the cutting part one
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """Places on a tool, in boxes, in boxes of boxes.
+
+    places : (n, 3) float64, mm, along two directions square to the tool axis and along it, from the tip
+    boxes  : (b, 6) float64, mm, middle and half the sides; those of ``LEAF`` places first, then of ``BRANCH`` of these
+    levels : (l + 1,) int64, where boxes of each level begin, and their number
+    """
+
+    places: F64
+    boxes: F64
+    levels: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, places: F64) -> Shell:
+        """Places (n, 3), mm, put in boxes along a curve that fills space."""
+        if not len(places):
+            return cls(places, np.zeros((0, 6)), np.zeros(2, np.int64))
+        low = places.min(axis=0)
+        size = max(float((places.max(axis=0) - low).max()), 1e-9)
+        cell = ((places - low) * ((1 << BITS) / size)).astype(np.int64).clip(max=(1 << BITS) - 1)
+        key = sum(((cell[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in range(BITS) for axis in range(3))
+        places = np.ascontiguousarray(places[np.argsort(key, kind="stable")])
+        lower, upper, many, boxes = places, places, LEAF, []
+        while True:
+            begins = np.arange(0, len(lower), many)
+            lower, upper = np.minimum.reduceat(lower, begins), np.maximum.reduceat(upper, begins)
+            boxes.append(np.hstack([0.5 * (lower + upper), 0.5 * (upper - lower)]))
+            if len(lower) <= BRANCH:
+                break
+            many = BRANCH
+        levels = np.concatenate([[0], np.cumsum([len(b) for b in boxes])]).astype(np.int64)
+        return cls(places, np.vstack(boxes), levels)
+
+
+def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, beside: float, under: float, step: float,
+           high: float) -> tuple[Shell, Shell]:
+    """The cutting part made smaller, and neck, shank and holder with their clearance.
+
+    beside, under : mm taken off its flank and off its end
+    step          : mm of the lattice of the stock
+    high          : mm from the tip, up to where stock may be; more is given than that
+    """
+    outer = ((0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
+             (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
+             *((d.radius, d.height, math.inf) for d in discs))
+    # by powers of two, so that a few serve all passes
+    high = step * 2.0 ** math.ceil(math.log2(max(high, step) / step))
+    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, beside, under, step, high)
+
+
+@lru_cache(maxsize=KEPT)
+def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], beside: float,
+            under: float, step: float, high: float) -> tuple[Shell, Shell]:
+    flank: list[F64] = [np.zeros((0, 3))]
+    inner = 0.0
+    for h in _heights(min(under, flute), min(flute, high), step):
+        # what of the cutting part is off its outside by ``under``: a rounded end, and a flank it goes over into
+        low = max(corner - h, 0.0)
+        if corner > under and low > corner - under:
+            continue
+        at = radius - corner + math.sqrt((corner - under) ** 2 - low * low) if corner > under else radius
+        # over the corner it is the side that counts: what may stand under the end may not stand beside it
+        low = max(corner - max(h - under, 0.0), 0.0)
+        side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - beside
+        at = max(min(max(at, side), radius - beside), 0.0)
+        begin = 0.0 if len(flank) == 1 else min(inner + step, at)
+        flank += [_ring(r, h, step) for r in _between(begin, at, step)]
+        inner = at
+    spacing = BODY_STEPS * step
+    bodies: list[F64] = [np.zeros((0, 3))]
+    for k, (wide, begin, end) in enumerate(outer):
+        over = [(b, e) for j, (w, b, e) in enumerate(outer) if w > wide or (w == wide and j < k)]
+        bodies += [_ring(r, begin, spacing) for r in _between(0.0, wide, spacing)]
+        bodies += [_ring(wide, h, spacing) for h in _heights(begin, min(end, high), spacing)[1:]
+                   if not any(b <= h <= e for b, e in over)]
+    return Shell.of(np.vstack(flank)), Shell.of(np.vstack(bodies))
+
+
+def _heights(begin: float, end: float, spacing: float) -> list[float]:
+    """From begin to end, mm, evenly; begin alone where the end is below it."""
+    end = max(begin, end)
+    return [float(h) for h in np.linspace(begin, end, int(np.ceil((end - begin) / spacing)) + 1)]
+
+
+def _between(begin: float, end: float, spacing: float) -> list[float]:
+    return [float(r) for r in np.linspace(end, begin, int(np.ceil((end - begin) / spacing)) + 1)]
+
+
+def _ring(radius: float, height: float, spacing: float) -> F64:
+    """(k, 3) mm: places on a ring round the axis."""
+    count = max(int(np.ceil(2.0 * np.pi * radius / spacing)), 1)
+    at = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([radius * np.cos(at), radius * np.sin(at), np.full(count, height)])
