@@ -103,6 +103,16 @@ class ReportFile(ReportModel):
     sha256: str
 
 
+class TimeSpent(ReportModel):
+    """Where the machining time goes, as simulated."""
+
+    in_cut_s: Annotated[float, Field(description="Of moves that take stock.")]
+    in_air_s: Annotated[float, Field(description="The rest: rapids, ways in, across and out, dwells.")]
+    rapid_s: Annotated[float, Field(description="Of rapids, part of in_air_s.")]
+    retracts: Annotated[int, Field(description="Times a rapid follows on a feed move.")]
+    tool_changes: Annotated[int, Field(description="Within programs.")]
+
+
 class Report(Zones):
     """report.json."""
 
@@ -116,6 +126,7 @@ class Report(Zones):
     coverage: Annotated[Share | None, Field(description="Area proved within the budget / machinable area.")] = None
     reach_coverage: Annotated[Share | None, Field(description="The same / the area some tool can reach.")] = None
     machining_time_s: float | None = None
+    time: TimeSpent | None = None
     tools: list[ToolUse]
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number, as all programs "
                                                                 "leave it.")] = []

@@ -59,6 +59,7 @@ from verify.prove import prove
 from zones.view import View
 
 Progress = Callable[[str, float], None]
+Planner = Callable[..., Plan]
 RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
 STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
@@ -69,10 +70,12 @@ PREPARED, PROVED = 0.28, 0.96  # shares of the work done
 FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
 
 
-def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None) -> dict[str, Any]:
+def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
+         planner: Planner = plan_job) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
     mesh : also write the machined part as a mesh, in the frame of the proof (``service.programs.proof_frame``)
+    planner : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
 
     Returns
     -------
@@ -107,7 +110,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
         sides: list[Side] = []
         for k, view in enumerate(ready.views):
-            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told))
+            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told,
+                               planner))
         made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
         zone, given_up = scored.without(made, ready.zones)
         written = programs_of(ready, sides)
@@ -163,7 +167,7 @@ class _Span:
 
 
 def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
-          before: Sequence[Side], tell: Callable[[float], None], told: Learned) -> Side:
+          before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner) -> Side:
     """Plan the zones of one access.
 
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
@@ -176,8 +180,8 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
         stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before])
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
-    made = plan_job(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                    lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
+    made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
+                   lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
     if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
     return Side(view, made, settings.clearance, stock)

@@ -195,7 +195,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "proposal": offers.as_dict(ready.setup, offers.offers(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
-        "machining_time_s": r(proof.machining_time, 1),
+        "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
@@ -279,6 +279,12 @@ def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
     return out
 
 
+def _time(proof: Proof) -> dict[str, Any]:
+    t = proof.spent
+    return {"in_cut_s": r(t.in_cut, 1), "in_air_s": r(t.seconds - t.in_cut, 1), "rapid_s": r(t.rapid, 1),
+            "retracts": t.retracts, "tool_changes": t.tool_changes}
+
+
 def deviation(proof: Proof) -> list[dict[str, Any]]:
     """The figures of a proof by face, in the order of the faces."""
     return [{"face": f"F{n}", "area_mm2": r(f.area, 3),
@@ -300,7 +306,8 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
             "finding_counts": _counted(proof, unmet),
             "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
             "coverage": r(coverage, 6), "gouge_max_mm": r(proof.gouge_max, 5),
-            "machining_time_s": r(proof.machining_time, 1), "cutting_length_mm": r(proof.cutting_length, 1),
+            "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
+            "cutting_length_mm": r(proof.cutting_length, 1),
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
                       "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes)},
             "deviation": deviation(proof), "machined": None, "files": [],

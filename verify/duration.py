@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.timing import Rates, move_seconds
 from verify.cycles import RAPID
-from verify.model import ProofSetup
+from verify.model import ProofSetup, Spent
 from verify.program import Program
 
 RAPID_TURN = float(np.radians(7200.0))
@@ -38,3 +41,20 @@ def minutes_of(program: Program, setup: ProofSetup) -> F64:
     curve[1:] = (program.line[1:] == program.line[:-1]) & ~stop[1:]
     rates = Rates(setup.rapid_feed, setup.acceleration, max(program.blend, PATH))
     return np.where(moving, move_seconds(way, feed, rates, stop, curve) / 60.0, even)
+
+
+def spent(read: Sequence[Program], took: F64, known: NDArray[np.bool_], cut: NDArray[np.bool_]) -> Spent:
+    """Where the time of programs goes.
+
+    took  : (m,) float64, minutes of all moves, program after program
+    known : (m,) bool, moves with a tool; cut : of those, whether they take stock
+    """
+    if not read:
+        return Spent(0.0, 0.0, 0.0, 0, 0)
+    rapid = np.concatenate([p.kind == RAPID for p in read])
+    inside = np.zeros(len(took), np.bool_)
+    inside[known] = cut
+    retracts = sum(int((~r[:-1] & r[1:]).sum()) for r in (p.kind == RAPID for p in read))
+    changes = sum(int((p.tool[1:] != p.tool[:-1]).sum()) for p in read)
+    return Spent(60.0 * float(took.sum()) + sum(p.dwell for p in read), 60.0 * float(took[inside].sum()),
+                 60.0 * float(took[rapid].sum()), retracts, changes)

@@ -163,6 +163,20 @@ class Engagement:
 
 
 @dataclass(frozen=True)
+class Spent:
+    """Where the time of programs goes: s in all, s of moves that take stock, s of rapids.
+
+    retracts : times a rapid follows on a feed move; tool_changes : within programs
+    """
+
+    seconds: float
+    in_cut: float
+    rapid: float
+    retracts: int
+    tool_changes: int
+
+
+@dataclass(frozen=True)
 class ZoneProof:
     """The proof of one zone: scallops of its claimed samples in mm, areas in mm², coverage 0..1."""
 
@@ -206,7 +220,7 @@ class Proof:
     line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
     proved   : (n,) bool, inside the budget
     zones    : by zone id; faces : by face number, of every face with scored samples
-    machining_time : s, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
+    spent    : where the time goes, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
     minutes  : minutes in cut by tool number; engaged : how much of each cutter was in stock, by tool number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
     """
@@ -220,7 +234,7 @@ class Proof:
     zones: Mapping[str, ZoneProof]
     faces: Mapping[int, FaceProof]
     gouge_max: float
-    machining_time: float
+    spent: Spent
     cutting_length: float
     minutes: Mapping[int, float]
     engaged: Mapping[int, Engagement]
@@ -240,7 +254,8 @@ class Proof:
             "findings": [f.as_dict() for f in self.findings], "finding_counts": dict(self.counts),
             "zones": {k: asdict(v) for k, v in self.zones.items()},
             "faces": {f"F{k}": asdict(v) for k, v in self.faces.items()}, "gouge_max_mm": self.gouge_max,
-            "machining_time_s": self.machining_time, "cutting_length_mm": self.cutting_length,
+            "machining_time_s": self.spent.seconds, "spent": asdict(self.spent),
+            "cutting_length_mm": self.cutting_length,
             "tools": {str(k): v for k, v in self.minutes.items()},
             "engaged_rad": {str(k): asdict(v) for k, v in self.engaged.items()}, "error_bound_mm": self.error_bound,
             "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),

@@ -16,7 +16,7 @@ from verify.arcs import CHORD
 from verify.blank import stock_on_normals
 from verify.clash import DIP
 from verify.dogleg import box_findings
-from verify.duration import minutes_of
+from verify.duration import minutes_of, spent
 from verify.engagement import engaged_angles, engagement_findings, engagements
 from verify.findings import (
     Source,
@@ -219,9 +219,8 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...]) -> Proof:
     read = [r.program for r in readings]
     took = np.concatenate([minutes_of(p, setup) for p in read]) if read else np.zeros(0)
-    seconds = float(took.sum() * 60.0) + sum(p.dwell for p in read)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
-    known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, bool)
+    known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, np.bool_)
     minutes = took[known][run.cut]
     used = source.tool[run.cut]
     proved = proved_samples(cuts.residual, setup)
@@ -232,9 +231,10 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
     line[has], program[has] = source.line[mover[has]], source.program[mover[has]]
     return Proof(top, counts, cuts.residual, line, program, proved,
                  zone_proofs(scored, cuts.residual, proved, setup, zone_ids),
-                 face_proofs(scored.samples, cuts.residual, has, proved, setup), cuts.gouge_max, seconds,
-                 float(cut_length.sum()), {int(t): float(minutes[used == t].sum()) for t in np.unique(used)},
-                 engaged, error_bound(read), cuts.reach, spacing, notes)
+                 face_proofs(scored.samples, cuts.residual, has, proved, setup), cuts.gouge_max,
+                 spent(read, took, known, run.cut), float(cut_length.sum()),
+                 {int(t): float(minutes[used == t].sum()) for t in np.unique(used)}, engaged, error_bound(read),
+                 cuts.reach, spacing, notes)
 
 
 def error_bound(read: Sequence[Program]) -> float:

@@ -33,10 +33,12 @@ class LevelPlaces:
 
     plan   : PlanMap of what stands above it
     number : (cells,) int64, place of each cell, ``OPEN``, 1, 2 ... from left to right, or ``MATERIAL``
+    sides  : of places asked for by ``nearest``, the lines round them and whose they are
     """
 
     plan: PlanMap
     number: NDArray[np.int64]
+    sides: dict[tuple[int, ...], tuple[shapely.STRtree, NDArray[np.int64]]] = field(default_factory=dict)
 
     @staticmethod
     def of(border: F64, spans: shapely.Geometry = NOTHING) -> LevelPlaces:
@@ -65,8 +67,17 @@ class LevelPlaces:
 
     def nearest(self, xy: F64, of: tuple[int, ...]) -> NDArray[np.int64]:
         """(n,) which of the places named is nearest to each of xy (n, 2) mm."""
-        away = shapely.STRtree([self.outlines[k] for k in of])
-        return np.array(of, dtype=np.int64)[away.nearest(shapely.points(xy))]
+        if of not in self.sides:
+            rings = [shapely.get_parts(self.outlines[k].boundary) for k in of]
+            owner = np.repeat(of, [len(own) for own in rings])
+            corners, ring = shapely.get_coordinates(np.concatenate(rings), return_index=True)
+            on = ring[1:] == ring[:-1]
+            lines = shapely.linestrings(np.stack([corners[:-1][on], corners[1:][on]], axis=1))
+            self.sides[of] = shapely.STRtree(lines), owner[ring[:-1][on]]
+        tree, owner = self.sides[of]
+        inside = self.at(xy)
+        out = owner[tree.nearest(shapely.points(xy))]
+        return np.where(np.isin(inside, of), inside, out)
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,7 +51,7 @@ def test_another_side_up_is_the_same_proof(turn):
     assert a.kind == b.kind and abs(a.line - b.line) <= 1 and a.depth == pytest.approx(b.depth, abs=1e-6)
     x, y, z = np.array(a.point) @ turn.T
     assert abs(x) < 10 and abs(y) < 6 and z == pytest.approx(-5.0, abs=1e-5)
-    assert proof.machining_time == pytest.approx(plain.machining_time, rel=1e-9)
+    assert proof.spent.seconds == pytest.approx(plain.spent.seconds, rel=1e-9)
 
 
 def test_limits_and_ways_are_told_in_the_frame_of_the_proof():

@@ -1,0 +1,144 @@
+"""Whole jobs from a box, ours beside a plan nobody optimised: proof, time, air, retracts, tool changes, engagement.
+
+    python benchmarks/whole_job.py [PART/AXES ...] [--plan ours|baseline] [--out out/whole_job] [--table]
+
+Parts: the demo, a gap of 0.8 mm, a closed pocket, a strut impeller; axes 3 (upright) and 5 (table A/C, A -30 to 110
+degrees). Each is planned and proved in a process of its own, with the feeds of its setup; what it gave is a line of
+``rows.jsonl`` in the folder, with a digest of the sources it was made with. ``baseline`` is the plan of
+``baseline_plan.py``: its lines in ``benchmarks/whole_job_rows`` were made when it was committed and stay as they are.
+``--table`` prints the newest line of each. Times and moves are those the proof simulated; air is all time but that of
+moves which take stock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.family_score import digest_of  # noqa: E402
+from benchmarks.five_axis_gain import MACHINE  # noqa: E402
+from benchmarks.five_axis_sweep import SOURCES  # noqa: E402
+from benchmarks.parts_table import Stages  # noqa: E402
+
+ROWS = ROOT / "benchmarks" / "whole_job_rows"
+PARTS: dict[str, dict[str, Any]] = {
+    "demo:0": {}, "narrow:1": {}, "mixed_linear:0": {"walls": 2, "connections": 1}, "impeller:4": {}}
+AXES = {"3": None, "5": MACHINE}
+STOCK = {"kind": "box", "margin_mm": 1.0, "uncertainty_mm": 0.5}
+HEAD = ("part", "axes", "plan", "state", "left mm²", "min", "air min", "air", "retracts", "changes", "cut m",
+        "engaged max / p99 deg", "gouge mm", "s by stage")
+
+
+def planned(part: str, axes: str, plan: str, folder: Path) -> dict[str, Any]:
+    """Make, plan and prove one part: plain data."""
+    from benchmarks import baseline_plan
+    from examples.demo import demo_setup
+    from examples.family import make_part
+    from geometry.errors import CamError
+    from schemas.setup import Setup
+    from service import chain
+    from toolpath.plan import plan_job
+
+    recipe, seed = part.split(":")
+    made = make_part(int(seed), recipe, **PARTS[part])
+    step, _, _ = made.write(folder)
+    setup = {**(demo_setup() if recipe == "demo" else made.setup), "stock": STOCK}
+    if AXES[axes] is not None:
+        setup["machine"] = AXES[axes]
+    stages, facts = Stages(), {"part": part, "axes": axes, "plan": plan}
+    try:
+        report = chain.plan(step, Setup.model_validate(setup), folder / "job", stages,
+                            planner=baseline_plan.plan_job if plan == "baseline" else plan_job)
+    except CamError as refusal:
+        return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
+    engaged = [t["engagement_deg"] for t in report["tools"] if t["engagement_deg"]]
+    return facts | {
+        "state": report["state"], "findings": dict(report["finding_counts"]), "reach": report["reach_coverage"],
+        "coverage": report["coverage"], "left": sum(x["area_mm2"] for x in report["remainder"]),
+        "gouge": report["gouge_max_mm"], "faces": report["part"]["faces"], "zones": len(report["zones"]),
+        "seconds": report["machining_time_s"], "time": report["time"],
+        "cut_mm": report["proof"]["cutting_length_mm"],
+        "engaged": [max((e[k] for e in engaged), default=0.0) for k in ("max", "p99")],
+        "steps": len(report["steps"]), "stages": {k: round(v, 1) for k, v in stages.seconds.items()}}
+
+
+def run(part: str, axes: str, plan: str, limit: float | None) -> dict[str, Any]:
+    """One part in a process of its own."""
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            done = subprocess.run([sys.executable, __file__, "--one", part, axes, plan, scratch], capture_output=True,
+                                  text=True, timeout=limit)
+            lines = done.stdout.splitlines()
+            row = json.loads(lines[-1]) if done.returncode == 0 and lines else {
+                "part": part, "axes": axes, "plan": plan, "state": "error", "message": done.stderr[-400:]}
+        except subprocess.TimeoutExpired:
+            row = {"part": part, "axes": axes, "plan": plan, "state": "error", "message": f"over {limit:g} s"}
+    return row | {"wall": round(time.perf_counter() - begun, 1)}
+
+
+def cells(row: dict[str, Any]) -> list[str]:
+    """One line of the table."""
+    if row["state"] == "error":
+        return [row["part"], row["axes"], row["plan"], f"error: {row.get('message', '')[:80]}",
+                *["-"] * (len(HEAD) - 4)]
+    kinds, t = ", ".join(f"{n} {k}" for k, n in sorted(row["findings"].items())), row["time"]
+    return [row["part"], row["axes"], row["plan"], row["state"] + (f": {kinds}" if kinds else ""), f"{row['left']:.0f}",
+            f"{row['seconds'] / 60:.1f}", f"{t['in_air_s'] / 60:.1f}", f"{100 * t['in_air_s'] / row['seconds']:.1f} %",
+            str(t["retracts"]), str(t["tool_changes"]), f"{1e-3 * row['cut_mm']:.2f}",
+            " / ".join(f"{x:.0f}" for x in row["engaged"]), f"{row['gouge']:.4f}",
+            " ".join(f"{k} {v:.0f}" for k, v in row["stages"].items())]
+
+
+def table(rows: list[dict[str, Any]]) -> None:
+    """The newest line of each part, axes and plan; after ours what is saved against the baseline."""
+    print("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
+    newest = {(r["part"], r["axes"], r["plan"]): r for r in rows}
+    for part, axes in [(p, a) for p in PARTS for a in AXES]:
+        pair = [newest.get((part, axes, plan)) for plan in ("baseline", "ours")]
+        for row in pair:
+            if row is not None:
+                print("| " + " | ".join(cells(row)) + " |")
+        if all(r is not None and r["state"] != "error" for r in pair):
+            was, now = pair
+            assert was is not None and now is not None
+            print(f"\n{part} {axes} axes: total time {1 - now['seconds'] / was['seconds']:+.1%} saved, air "
+                  f"{1 - now['time']['in_air_s'] / was['time']['in_air_s']:+.1%} saved\n")
+
+
+def main() -> None:
+    """Run what is asked for and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("jobs", nargs="*", help="such as demo:0/3; all where none is given")
+    parser.add_argument("--plan", choices=("ours", "baseline"), default="ours")
+    parser.add_argument("--out", type=Path, default=ROWS)
+    parser.add_argument("--limit", type=float)
+    parser.add_argument("--table", action="store_true")
+    parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.one:
+        print(json.dumps(planned(*args.one[:3], Path(args.one[3]))))
+        return
+    args.out.mkdir(parents=True, exist_ok=True)
+    kept = args.out / "rows.jsonl"
+    jobs = args.jobs or [f"{p}/{a}" for p in PARTS for a in AXES]
+    for part, axes in [job.split("/") for job in jobs] if not args.table else ():
+        row = {"sources": digest_of(SOURCES)} | run(part, axes, args.plan, args.limit)
+        with kept.open("a") as out:
+            out.write(json.dumps(row) + "\n")
+        print(f"{part}/{axes} {args.plan}: {row['state']} {row['wall']} s", flush=True)
+    if kept.exists():
+        table([json.loads(line) for line in kept.read_text().splitlines()])
+
+
+if __name__ == "__main__":
+    main()
