@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -104,14 +106,13 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     first, look = ready.views[0], proof_frame(ready)
     dense = look.into(scored.samples, first)
     told, begun = Learned(), PREPARED
+    sides: list[Side] = []
     for attempt in range(PLANS):
         # how many there will be is not known: each takes most of what is left
         ended = begun + FIRST_SHARE * (PROVED - begun)
         span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
-        sides: list[Side] = []
-        for k, view in enumerate(ready.views):
-            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told,
-                               planner))
+        for k, view in list(enumerate(ready.views))[len(sides):]:
+            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner))
         made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
         zone, given_up = scored.without(made, ready.zones)
         written = programs_of(ready, sides)
@@ -121,7 +122,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
         if more is None or attempt + 1 == PLANS:
             break
-        told, begun = more, ended
+        # an access is planned from what those before it leave: those up to the first that is told something stay
+        sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     ready = replace(ready, warnings=(*ready.warnings, *told.notes))
     report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
                                         given_up)
@@ -145,6 +147,11 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     deliver(out, report, files)
     progress("done", 1.0)
     return report
+
+
+def _untold(told: Learned, more: Learned, side: Side) -> bool:
+    """Whether a proof had nothing to say of an access."""
+    return more.along(side.view.id) is told.along(side.view.id)
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from examples.demo import write_small
+from schemas.setup import Setup
+from service import chain
 from service.again import MOST, Attempt, Learned, learned
 from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, STRICTER, Counterexamples
 from toolpath.levels import Line
+from toolpath.plan import plan_job
 from verify.model import Finding, FindingKind
 
 TOOL = SHORT_TOOLS["flat"]
@@ -90,3 +95,26 @@ def test_care_and_bars_are_round_the_place_and_of_the_tool():
     assert (told.bars(TOOL, line.points) == (away <= BARRED * r)).all()
     other = replace(TOOL, id="T77")
     assert told.care(other, np.zeros((1, 3))) == 1.0 and not told.bars(other, line.points).any()
+
+
+def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_path, monkeypatch):
+    """Two sides of a small part; of a proof that has something to say of the second only that is planned again."""
+    part, setup_file = write_small(tmp_path)
+    given = json.loads(setup_file.read_text())
+    given["access"] = [{"id": "A1"}, {"id": "A2", "direction": [1.0, 0.0, 0.0], "work_offset": "G55"}]
+    along, asked = [], []
+
+    def planner(zones, *args, **kwargs):
+        along.append(zones[0].access if zones else "")
+        return plan_job(zones, *args, **kwargs)
+
+    def once(told, attempt):
+        asked.append([s.view.id for s in attempt.sides])
+        return Learned({"A2": Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})}) if len(asked) == 1 else None
+
+    monkeypatch.setattr(chain, "learned", once)
+    report = chain.plan(part, Setup.model_validate(given), tmp_path / "out", lambda *_: None, planner=planner)
+    assert along == ["A1", "A2", "A2"] and asked == [["A1", "A2"]] * 2
+    assert report["state"] == "proved" and {z["access"] for z in report["zones"]} == {"A1", "A2"}
+    assert report["time"]["in_cut_s"] + report["time"]["in_air_s"] == pytest.approx(report["machining_time_s"], abs=0.2)
+    assert report["time"]["retracts"] > 0 and report["time"]["tool_changes"] > 0
