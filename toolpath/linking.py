@@ -84,17 +84,29 @@ class Linker:
         """Append one line as a cutting pass; False where no safe way in was found.
 
         Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
-        stands in the way of shank or holder, and where the tool is barred, the line is left out.
+        stands in the way of shank or holder, and where the tool is barred, the line is left out; what is higher than
+        rapids go, or was walked as it stands, is not walked.
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
             return True
         before = len(self.skipped)
-        for piece in self._unbarred(Line(points, line.closed)):
+        for piece in [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]:
+            if self.depths.known(piece.points) == len(piece.points) - 1:
+                continue  # what of a line was walked as it stands, while the rest was and is in the way
             if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
                 self.skipped.append(piece)
                 self.refused += 1
         return len(self.skipped) == before
+
+    def _under_rapids(self, line: Line) -> list[Line]:
+        """The pieces of a line below the height of rapids: higher up there is no stock, only what a tool is kept over,
+        as a table that rises over the clearance plane where the tool leans."""
+        if line.points[:, 2].max() <= self.motions.rapid_floor:
+            return [line]
+        way = Line(dense(line.points, LOOK_EVERY * self.field.tool.radius), line.closed)
+        low = pieces_where(way, way.points[:, 2] <= self.motions.rapid_floor, 0.0, 0.0)
+        return [Line(thinned(p.points, self.motions.tolerance), p.closed) for p in low if p.length > 1e-6]
 
     def _unbarred(self, line: Line) -> list[Line]:
         """The pieces of a line along which nothing is in the way; the rest is skipped."""

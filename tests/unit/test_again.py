@@ -110,7 +110,8 @@ def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_p
 
     def once(told, attempt):
         asked.append([s.view.id for s in attempt.sides])
-        return Learned({"A2": Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})}) if len(asked) == 1 else None
+        far = Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})
+        return Learned({"A2": far}) if len(asked) == 1 else None
 
     monkeypatch.setattr(chain, "learned", once)
     report = chain.plan(part, Setup.model_validate(given), tmp_path / "out", lambda *_: None, planner=planner)

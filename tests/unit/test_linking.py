@@ -336,3 +336,29 @@ def test_straight_on_no_way_down_is_gone_again(known):
     assert joined and len(ramp) > len(points) + 9 and ramp[0, 2] == pytest.approx(2.6)
     link.depths.cut(ramp[:known + 1])
     assert (link._straight_on(points, False) is None) == (known > 3)
+
+
+def test_what_a_line_has_above_the_rapids_is_not_walked():
+    """A pass that runs out over a table higher than the clearance plane: no way leads across there."""
+    link = linker()
+    up = Line(np.array([[5.0, 10.0, 1.0], [15.0, 10.0, 1.0], [25.0, 10.0, 11.0], [28.0, 10.0, 11.0]]), False)
+    assert link.add(up) and link.add(straight(5, 20, 14, 1.0))
+    cut = np.vstack([t.points for t in link.trajectories if t.motion is Motion.CUT])
+    floor = link.motions.rapid_floor
+    assert cut[:, 2].max() <= floor and cut[cut[:, 1] == 10.0][:, 2].max() > floor - 0.5
+    assert max(t.points[:, 2].max() for t in link.trajectories) <= link.motions.clearance
+    assert not link.skipped
+
+
+def test_what_was_walked_as_it_stands_is_not_walked_again_while_the_rest_is_in_the_way():
+    """Stock stands in the way of the shank over half of a line that is asked for round after round."""
+    body = replace(ball(2.0, neck=3.0), shank_diameter=6.0)
+    link = linker(body, top=-1.0)
+    x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
+    link.stock.top[:, x > 18.0] = link.stock.cover[:, x > 18.0] = 8.0
+    link.stock._pooled[:] = 8.0
+    assert not link.add(straight(5, 25, 10, 1.0))
+    passes, skipped = link.passes, len(link.skipped)
+    assert passes == 1 and skipped
+    assert not link.add(straight(5, 25, 10, 1.0))
+    assert link.passes == passes and len(link.skipped) > skipped
