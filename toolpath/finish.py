@@ -33,7 +33,7 @@ from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
-from toolpath.walked import Depths, Walked
+from toolpath.walked import OVERLAP, Depths, Walked
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -45,7 +45,6 @@ PASS_SHARE = 0.85  # a sample is done when the measured residual is within this 
 REFINEMENTS = 4
 LEAST_AGAIN = 4  # moves of a line that it walks a second time, to be left out
 AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
-OVERLAP = 3  # known moves of a line walked once more on each side, less than the proof takes for a stretch run twice
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
 WORTH_A_TRY = 1.5  # of the way of the usual passes: iso-parametric ones that are more are not walked
 

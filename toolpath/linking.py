@@ -18,14 +18,15 @@ from dataclasses import dataclass
 from dataclasses import field as fresh
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.ramp import ease
-from toolpath.levels import Line, dense, pieces_where, thinned
+from toolpath.levels import Line, dense, pieces_where, thinned, true_runs
 from toolpath.motion import Motion, Trajectory
 from toolpath.stock import SKIN, SURE_RIM, StockMap
-from toolpath.walked import Depths
+from toolpath.walked import OVERLAP, Depths
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
@@ -91,9 +92,8 @@ class Linker:
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
             return True
         before = len(self.skipped)
-        for piece in [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]:
-            if self.depths.known(piece.points) == len(piece.points) - 1:
-                continue  # what of a line was walked as it stands, while the rest was and is in the way
+        free = [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]
+        for piece in [q for p in free for q in self._unwalked(p)]:
             if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
                 self.skipped.append(piece)
                 self.refused += 1
@@ -107,6 +107,19 @@ class Linker:
         way = Line(dense(line.points, LOOK_EVERY * self.field.tool.radius), line.closed)
         low = pieces_where(way, way.points[:, 2] <= self.motions.rapid_floor, 0.0, 0.0)
         return [Line(thinned(p.points, self.motions.tolerance), p.closed) for p in low if p.length > 1e-6]
+
+    def _unwalked(self, line: Line) -> list[Line]:
+        """What of a line was not walked before as it stands, with a few moves of the rest on each side.
+
+        A line that is in the way in part is asked for again, round after round, until that is gone.
+        """
+        known = self.depths.were_cut(line.points)
+        if not known.any():
+            return [line]
+        near = binary_dilation(~known, iterations=OVERLAP) if not known.all() else ~known
+        if near.all():
+            return [line]
+        return [Line(line.points[a:b + 1], False) for a, b in true_runs(near)]
 
     def _unbarred(self, line: Line) -> list[Line]:
         """The pieces of a line along which nothing is in the way; the rest is skipped."""

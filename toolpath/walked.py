@@ -14,6 +14,7 @@ from toolpath.levels import Line, dense, place_keys
 from zones.reach import Lattice
 
 WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is the same
+OVERLAP = 3  # known moves of a line walked once more on each side, less than the proof takes for a stretch run twice
 ON = 2.0 * WRITTEN  # off a move, and still on it
 CELL = 10.0 * WRITTEN  # in which places that may be one are looked for
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -47,6 +48,11 @@ class Depths:
         keys = _written(points)
         return next((k for k, move in enumerate(zip(keys[:-1], keys[1:], strict=True)) if move not in self._moves),
                     len(points) - 1)
+
+    def were_cut(self, points: F64) -> NDArray[np.bool_]:
+        """(n - 1,) which moves of a line (n, 3), mm, were cut before, each as it stands."""
+        keys = _written(points)
+        return np.array([move in self._moves for move in zip(keys[:-1], keys[1:], strict=True)], np.bool_)
 
     def above(self, points: F64) -> F64:
         """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
