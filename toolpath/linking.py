@@ -213,7 +213,7 @@ class Linker:
         if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return np.vstack([entry, start]), points, True
         ramp = self._ramp(points, closed, over)
-        if ramp is None or self.depths.known(ramp) > MOST_AGAIN:
+        if ramp is None or self.depths.last_known(ramp) > MOST_AGAIN:
             return None  # what is known of a way down can be left out only where it is come to from above
         return entry, ramp, True
 
@@ -260,8 +260,8 @@ class Linker:
         for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
                      highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
-            if ramp is not None:  # a line that begins as another did has the same way down, as far as that came
-                ramp = ramp[min(self.depths.known(ramp), len(ramp) - len(points)):]
+            if ramp is not None:  # over a move it made before a tool stands free, so it begins after the last of these
+                ramp = ramp[self.depths.last_known(ramp[:len(ramp) - len(points) + 1]):]
             entry = self._beside(ramp[0]) if ramp is not None else None
             if ramp is not None and entry is not None:
                 return entry, ramp, False

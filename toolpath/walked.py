@@ -43,11 +43,10 @@ class Depths:
         """Z of the lowest cut at the very place of a tip (3,), mm; inf where there was none."""
         return self._places.get(place_keys(place[None, :2])[0], math.inf)
 
-    def known(self, points: F64) -> int:
-        """How many moves at the beginning of a way (n, 3), mm, were cut before, each as it stands."""
-        keys = _written(points)
-        return next((k for k, move in enumerate(zip(keys[:-1], keys[1:], strict=True)) if move not in self._moves),
-                    len(points) - 1)
+    def last_known(self, points: F64) -> int:
+        """Moves from the beginning of a way (n, 3), mm, to the last that was cut before as it stands; 0 for none."""
+        known = np.flatnonzero(self.were_cut(points))
+        return int(known[-1]) + 1 if len(known) else 0
 
     def were_cut(self, points: F64) -> NDArray[np.bool_]:
         """(n - 1,) which moves of a line (n, 3), mm, were cut before, each as it stands."""

@@ -362,3 +362,16 @@ def test_what_was_walked_as_it_stands_is_not_walked_again_while_the_rest_is_in_t
     assert passes == 1 and skipped
     assert not link.add(straight(5, 25, 10, 1.0))
     assert link.passes == passes and len(link.skipped) > skipped
+
+
+def test_a_way_down_begins_after_the_last_move_that_was_made_before():
+    """Two passes one below the other, whose ways down to and fro fall together in the middle: seed 69 of the sweep."""
+    link = linker(ball(1.5), top=3.0)
+    points = np.column_stack([np.linspace(10.0, 11.0, 5), np.full(5, 10.0), np.full(5, 1.0)])
+    whole = link._ramped(points, False)
+    assert whole is not None and len(whole[1]) > 40
+    first, last = 20, 22  # not all of the line, or it would be known how deep the tool has been
+    link.depths.cut(whole[1][first:last + 1])
+    entry, ramp, _ = link._ramped(points, False)
+    np.testing.assert_allclose(ramp, whole[1][last:])
+    np.testing.assert_allclose(entry[-1], whole[1][last])
