@@ -12,11 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.family import Target
-from toolpath.finish import PASS_SHARE, REFINEMENTS, Finish, motions_of, step_of, turned
+from toolpath.finish import Finish, motions_of, step_of, turned
 from toolpath.levels import dilated
 from toolpath.linking import Linker, nearest_order
 from toolpath.motion import Workingstep
@@ -41,24 +40,9 @@ class Retracting(Linker):
 class Plain(Finish):
     """The finish of one zone by the usual passes alone."""
 
-    def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
-        linker = Retracting(self.field, self.stock, motions_of(self.cut, self.settings), self.depths,
-                            self.settings.found)
-        budget = self._aims(PASS_SHARE * self.settings.scallop_height)
-        failing = np.flatnonzero(wanted & (self.residual.residual > budget))
-        for k in range(REFINEMENTS + 2):
-            if not len(failing):
-                break
-            for lines in self._groups(k, failing):
-                self._add(linker, lines, k)
-            failing = np.flatnonzero(wanted & (self.residual.residual > budget))
-        self.met[failing] = self.stock.meets_bodies(self.checks.tips[failing], self.field.discs)
-        if not linker.passes:
-            return []
-        self.step, self.passes = self.step or step_id, self.passes + linker.passes
-        return [step_of(step_id, f"{step_id} {self.zone.id} {self.strategy.name}", self.zone.id, [self.zone],
-                        "finishing", self.strategy.name, self.field.tool, self.cut, self.strategy.side_step,
-                        linker.finish(), self.settings)]
+    def _linker(self) -> Linker:
+        return Retracting(self.field, self.stock, motions_of(self.cut, self.settings), self.depths,
+                          self.settings.found)
 
 
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],

@@ -23,17 +23,18 @@ from toolpath.border import beyond
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
-from toolpath.levels import Line, pieces_where, serving, thinned, true_runs
-from toolpath.linking import RAMP_SHARE, Linker, Motions, nearest_order
+from toolpath.levels import Line, serving, thinned, true_runs
+from toolpath.linking import Linker, Motions, nearest_order
 from toolpath.motion import Motion, Trajectory, Workingstep
 from toolpath.posed import enters
+from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
-from toolpath.walked import OVERLAP, Depths, Walked
+from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -238,7 +239,7 @@ class Finish:
 
     def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
         """All rounds for the samples ``wanted``, as one workingstep."""
-        linker = Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found)
+        linker = self._linker()
         budget = self._aims(PASS_SHARE * self.settings.scallop_height)
         failing = np.flatnonzero(wanted & (self.residual.residual > budget))
         for k in range(REFINEMENTS + 2):
@@ -255,6 +256,9 @@ class Finish:
         faces = " ".join(f"F{f}" for f in zone.faces[:12])
         return [step_of(step_id, f"{step_id} {zone.id} {name} {zone.tool.id} {faces}", zone.id, [zone], "finishing",
                       name, self.field.tool, self.cut, self.strategy.side_step, linker.finish(), self.settings)]
+
+    def _linker(self) -> Linker:
+        return Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found)
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
@@ -324,14 +328,7 @@ class Finish:
         for a, b in true_runs(again):
             again[a:b] &= b - a >= LEAST_AGAIN  # places where a line crosses or touches itself
         fresh &= ~again  # that is measured where it is walked first
-        if fresh.all():
-            return [line]
-        wanted = np.concatenate([fresh, [False]]) | np.concatenate([[False], fresh])
-        grown = wanted.copy()
-        for k in range(1, OVERLAP + 1):
-            grown[k:] |= wanted[:-k]
-            grown[:-k] |= wanted[k:]
-        return pieces_where(line, grown, 0.0, 0.0)
+        return still_to_walk(line, fresh)
 
 
 def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:

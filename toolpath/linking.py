@@ -18,25 +18,20 @@ from dataclasses import dataclass
 from dataclasses import field as fresh
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.kernels.ramp import ease
-from toolpath.levels import Line, dense, pieces_where, thinned, true_runs
+from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
-from toolpath.stock import SKIN, SURE_RIM, StockMap
-from toolpath.walked import OVERLAP, Depths
+from toolpath.ramps import RAMP_SHARE, head_of, way_down
+from toolpath.stock import SURE_RIM, StockMap
+from toolpath.walked import Depths, still_to_walk
 from zones.reach import LEVEL_TOLERANCE, TipField
 
-RAMP_SHARE = 0.9  # of the steepest ramp allowed
-EASE_SHARE = 0.98  # of the same, for one move that catches up
-ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
-LEAST_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
-MOST_LEGS = 400
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
@@ -113,13 +108,7 @@ class Linker:
 
         A line that is in the way in part is asked for again, round after round, until that is gone.
         """
-        known = self.depths.were_cut(line.points)
-        if not known.any():
-            return [line]
-        near = binary_dilation(~known, iterations=OVERLAP) if not known.all() else ~known
-        if near.all():
-            return [line]
-        return [Line(line.points[a:b + 1], False) for a, b in true_runs(near)]
+        return still_to_walk(line, ~self.depths.were_cut(line.points))
 
     def _unbarred(self, line: Line) -> list[Line]:
         """The pieces of a line along which nothing is in the way; the rest is skipped."""
@@ -213,7 +202,7 @@ class Linker:
         if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return np.vstack([entry, start]), points, True
         ramp = self._ramp(points, closed, over)
-        if ramp is None or self.depths.last_known(ramp) > MOST_AGAIN:
+        if ramp is None or int(self._known_down(ramp, points).sum()) > MOST_AGAIN:
             return None  # what is known of a way down can be left out only where it is come to from above
         return entry, ramp, True
 
@@ -255,13 +244,14 @@ class Linker:
                       float(self.stock.under_end(points[:1], tool)[0]))
         # where the tool has been before nothing is left that it could take; an open line is gone down along its head
         slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
-        head = points if closed else _head(points, 0.5 * (seen + 0.1) / slope)
+        head = points if closed else head_of(points, 0.5 * (seen + 0.1) / slope)
         above = max(float(self.depths.above(head).max()), 0.0)
         for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
                      highest + 0.1):
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
             if ramp is not None:  # over a move it made before a tool stands free, so it begins after the last of these
-                ramp = ramp[self.depths.last_known(ramp[:len(ramp) - len(points) + 1]):]
+                known = np.flatnonzero(self._known_down(ramp, points))
+                ramp = ramp[int(known[-1]) + 1 if len(known) else 0:]
             entry = self._beside(ramp[0]) if ramp is not None else None
             if ramp is not None and entry is not None:
                 return entry, ramp, False
@@ -283,58 +273,12 @@ class Linker:
         return None
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
-        """The pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning.
-
-        What a pass itself goes up or down the ramp has less to go down by. One that leans more than half of the ramp is
-        dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
-        between, and no more than the way that goes level or up works off: to and fro half of what there is.
-        """
         tool = self.field.tool
-        care = self.found.care(tool, points)
-        slope, skin = care * math.tan(self.motions.ramp_angle) * RAMP_SHARE, care * SKIN * tool.diameter
-        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
-        total = float(s[-1])
-        if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
-            return None  # to and fro on the spot is drilling
-        lean = _steepest(points if closed else _head(points, 0.5 * over / slope))
-        digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
-        if closed and digs:
-            rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), skin / total)
-        if rest <= 0.0:
-            return None
-        need = over / rest
-        if closed:
-            laps = math.ceil(need / total)
-            if laps > MOST_LEGS:
-                return None
-            walked = np.concatenate([points] + [points[1:]] * laps)
-            t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
-            down = _with_knot(walked, t, need)
-            lift = np.maximum(over * (1.0 - down[1] / need), 0.0)
-            path = self._eased(down[0], lift, 0.0 if digs else lean)
-            last = int(np.searchsorted(down[1], need + total - 1e-9))
-            return np.ascontiguousarray(path[: last + 1])
-        leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
-        legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
-        if legs > MOST_LEGS:
-            return None
-        head, hs = _with_knot(points, s, leg)
-        head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
-        ways, lifts = [points[:1]], [np.array([over])]
-        for k in range(legs):
-            xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
-            ways.append(xy[1:])
-            lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
-        lifts.append(np.zeros(len(points) - 1))
-        return self._eased(np.vstack([*ways, points[1:]]), np.concatenate(lifts), 0.0 if digs else lean)
+        return way_down(points, closed, over, tool, self.motions.ramp_angle, self.found.care(tool, points))
 
-    def _eased(self, points: F64, lift: F64, lean: float) -> F64:
-        """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep.
-
-        lean : mm per mm in plan, what the points may go down themselves
-        """
-        ease(points, lift, math.tan(self.motions.ramp_angle) * EASE_SHARE - lean, ROUNDING)
-        return np.ascontiguousarray(points + np.column_stack([np.zeros((len(points), 2)), lift]))
+    def _known_down(self, ramp: F64, points: F64) -> NDArray[np.bool_]:
+        """Which moves of a ramp's way down, without the pass (n, 3) after it, the tool has cut before."""
+        return self.depths.were_cut(ramp[:len(ramp) - len(points) + 1])
 
     # -- moves ------------------------------------------------------------------------------------------------
 
@@ -392,39 +336,6 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
-
-
-def _steepest(points: F64) -> float:
-    """The most a polyline (n, 3), mm, goes up or down, mm per mm in plan."""
-    move = np.diff(points, axis=0)
-    rise = np.maximum(np.abs(move[:, 2]) - ROUNDING, 0.0)
-    return float((rise / np.maximum(np.hypot(move[:, 0], move[:, 1]), 1e-12)).max(initial=0.0))
-
-
-def _not_down(points: F64, slope: float) -> float:
-    """Share in plan of a polyline (n, 3), mm, that does not go down steeper than ``slope``, mm per mm."""
-    move = np.diff(points, axis=0)
-    run = np.hypot(move[:, 0], move[:, 1])
-    return float(run[-move[:, 2] <= slope * run].sum() / run.sum())
-
-
-def _head(points: F64, length: float) -> F64:
-    """The beginning of a polyline (n, 3), mm, as long as ``length`` in plan, two points at least."""
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
-    head, at = _with_knot(points, s, length)
-    return head[:max(2, int(np.searchsorted(at, length, side="right")))]
-
-
-def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:
-    """A polyline and its arc lengths with one more point at arc length ``at`` where it lies inside."""
-    if at <= s[0] or at >= s[-1]:
-        return points, s
-    k = int(np.searchsorted(s, at))
-    if abs(s[k] - at) < 1e-12:
-        return points, s
-    t = (at - s[k - 1]) / (s[k] - s[k - 1])
-    new = points[k - 1] + t * (points[k] - points[k - 1])
-    return np.insert(points, k, new, axis=0), np.insert(s, k, at)
 
 
 def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from toolpath.levels import Line, dense, place_keys
+from toolpath.levels import Line, dense, pieces_where, place_keys
 from zones.reach import Lattice
 
 WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is the same
@@ -42,11 +42,6 @@ class Depths:
     def lowest(self, place: F64) -> float:
         """Z of the lowest cut at the very place of a tip (3,), mm; inf where there was none."""
         return self._places.get(place_keys(place[None, :2])[0], math.inf)
-
-    def last_known(self, points: F64) -> int:
-        """Moves from the beginning of a way (n, 3), mm, to the last that was cut before as it stands; 0 for none."""
-        known = np.flatnonzero(self.were_cut(points))
-        return int(known[-1]) + 1 if len(known) else 0
 
     def were_cut(self, points: F64) -> NDArray[np.bool_]:
         """(n - 1,) which moves of a line (n, 3), mm, were cut before, each as it stands."""
@@ -131,6 +126,21 @@ class Walked:
     def become(self, other: Walked) -> None:
         """Take over what a copy of this has come to."""
         self._moves = other._moves
+
+
+def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:
+    """The pieces of a line, mm, that its ``fresh`` moves (n - 1,) make up, with ``OVERLAP`` known moves on each side.
+
+    The line itself comes back where every move is fresh.
+    """
+    if fresh.all():
+        return [line]
+    wanted = np.concatenate([fresh, [False]]) | np.concatenate([[False], fresh])
+    grown = wanted.copy()
+    for k in range(1, OVERLAP + 1):
+        grown[k:] |= wanted[:-k]
+        grown[:-k] |= wanted[k:]
+    return pieces_where(line, grown, 0.0, 0.0)
 
 
 def _written(points: F64) -> list[bytes]:

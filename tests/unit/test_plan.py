@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.family import Target
-from toolpath.finish import OVERLAP, Finish
+from toolpath.finish import Finish
 from toolpath.levels import Line
 from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.zigzag import Pattern
-from toolpath.walked import Depths, Walked
+from toolpath.walked import OVERLAP, Depths, Walked
 from zones.machinable import Form
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from verify.duration import minutes_of
+from verify.duration import minutes_of, spent
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup
 from verify.reader import read_program
@@ -53,3 +53,26 @@ def test_a_rotary_axis_in_a_rapid_takes_its_turn():
     took = {rate: float(minutes_of(program, ProofSetup(rapid_feed=1e6, acceleration=1e7, kinematics=machine,
                                                        rotary_rate=rate)).sum()) for rate in (None, 1.0)}
     assert took[1.0] - took[None] == pytest.approx(0.5 * math.pi * (1.0 - 1.0 / math.radians(7200.0)), rel=1e-3)
+
+
+def test_time_is_told_apart():
+    """A square in which one side takes stock, two tools: rapids, retracts and changes are counted by hand."""
+    text = ("%\nG21 G17 G90 G94 G40 G49 G80 G61\nG54\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z10\nG1 Z0 F6000\n"
+            "G1 X100\nG1 Y50\nG0 Z10\nT2 M6\nS1000 M3\nG43 H2\nG0 X0 Y0\nG1 Z0 F6000\nG1 X100\nG0 Z10\n"
+            "G4 P2\nM2\n%\n")
+    program = read_program(text)
+    took = minutes_of(program, SETUP)
+    known = np.ones(len(took), np.bool_)
+    cut = np.abs(program.start[:, 1] - program.end[:, 1]) == 50.0
+    cut &= program.kind != 0
+    told = spent([program], took, known, cut)
+    assert told.retracts == 2 and told.tool_changes == 1
+    assert told.in_cut == pytest.approx(0.5, rel=0.01)  # 50 mm at 100 mm/s
+    assert told.seconds == pytest.approx(60.0 * took.sum() + 2.0)
+    assert told.rapid == pytest.approx(60.0 * took[program.kind == 0].sum())
+    twice = spent([program, program], np.concatenate([took, took]), np.concatenate([known, ~known]), cut)
+    assert twice.in_cut == pytest.approx(0.5, rel=0.01) and twice.retracts == 4 and twice.tool_changes == 2
+
+
+def test_no_program_takes_no_time():
+    assert spent([], np.zeros(0), np.zeros(0, np.bool_), np.zeros(0, np.bool_)).seconds == 0.0

@@ -10,11 +10,11 @@ import pytest
 from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
 from toolpath import finish
 from toolpath.counterexamples import NONE
-from toolpath.finish import OVERLAP, Finish, _Strategy
+from toolpath.finish import Finish, _Strategy
 from toolpath.levels import Line, true_runs
 from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
-from toolpath.walked import Depths, Walked
+from toolpath.walked import OVERLAP, Depths, Walked, still_to_walk
 from verify.repeats import WINDOW
 from zones.reach import Lattice
 
@@ -219,3 +219,20 @@ def test_depths_know_the_lowest_cut_by_place_and_by_cell():
     assert depths.lowest(np.array([1.0, 2.0, 0.0])) == 3.0
     depths.become(other)
     assert depths.lowest(np.array([1.0, 2.0, 0.0])) == 0.0
+
+
+def test_a_closed_line_is_not_cut_at_its_beginning():
+    """What is fresh on both sides of it is one piece, with known moves on each side."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 41)
+    ring = Line(np.column_stack([np.cos(turn), np.sin(turn), np.zeros(41)]), True)
+    fresh = np.zeros(40, np.bool_)
+    fresh[[0, 1, 38, 39]] = True
+    (piece,) = still_to_walk(ring, fresh)
+    assert not piece.closed and len(piece.points) == 5 + 2 * OVERLAP
+    np.testing.assert_allclose(piece.points[len(piece.points) // 2], ring.points[0], atol=1e-12)
+
+
+def test_nothing_fresh_is_nothing_to_walk():
+    line = Line(np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)]), False)
+    assert still_to_walk(line, np.zeros(8, np.bool_)) == []
+    assert still_to_walk(line, np.ones(8, np.bool_)) == [line]

@@ -1,0 +1,118 @@
+"""Ways down onto a pass: ramps along the pass itself, never steeper than the tool may go down.
+
+A closed pass is gone round, an open one to and fro along its beginning, losing height at an even rate until the pass is
+reached; where a pass leans itself, it has less of the angle left.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.kernels.ramp import ease
+from toolpath.stock import SKIN
+
+RAMP_SHARE = 0.9  # of the steepest ramp allowed
+EASE_SHARE = 0.98  # of the same, for one move that catches up
+ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
+LEAST_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
+MOST_LEGS = 400
+
+
+def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: float, care: float) -> F64 | None:
+    """A pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning.
+
+    What a pass itself goes up or down the ramp has less to go down by. One that leans more than half of the ramp is
+    dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
+    between, and no more than the way that goes level or up works off: to and fro half of what there is.
+
+    points : (n, 3) float64, mm, the pass; closed : whether it ends where it begins
+    over   : mm, how far above its beginning the way begins
+    angle  : rad, steepest the tool may go down; care : share of that and of a skin that is used
+
+    Returns
+    -------
+    (m, 3) float64, mm, or None
+        The way and after it the pass, whole; None where the pass is too short to go down along.
+    """
+    slope, skin = care * math.tan(angle) * RAMP_SHARE, care * SKIN * tool.diameter
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
+    total = float(s[-1])
+    if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
+        return None  # to and fro on the spot is drilling
+    lean = _steepest(points if closed else head_of(points, 0.5 * over / slope))
+    digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
+    if closed and digs:
+        rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), skin / total)
+    if rest <= 0.0:
+        return None
+    need, most = over / rest, math.tan(angle) * EASE_SHARE - (0.0 if digs else lean)
+    if closed:
+        laps = math.ceil(need / total)
+        if laps > MOST_LEGS:
+            return None
+        walked = np.concatenate([points] + [points[1:]] * laps)
+        t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
+        down = _with_knot(walked, t, need)
+        lift = np.maximum(over * (1.0 - down[1] / need), 0.0)
+        path = _eased(down[0], lift, most)
+        last = int(np.searchsorted(down[1], need + total - 1e-9))
+        return np.ascontiguousarray(path[: last + 1])
+    leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
+    legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
+    if legs > MOST_LEGS:
+        return None
+    head, hs = _with_knot(points, s, leg)
+    head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
+    ways, lifts = [points[:1]], [np.array([over])]
+    for k in range(legs):
+        xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
+        ways.append(xy[1:])
+        lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
+    lifts.append(np.zeros(len(points) - 1))
+    return _eased(np.vstack([*ways, points[1:]]), np.concatenate(lifts), most)
+
+
+def head_of(points: F64, length: float) -> F64:
+    """The beginning of a polyline (n, 3), mm, as long as ``length`` in plan, two points at least."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
+    head, at = _with_knot(points, s, length)
+    return head[:max(2, int(np.searchsorted(at, length, side="right")))]
+
+
+def _eased(points: F64, lift: F64, most: float) -> F64:
+    """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep.
+
+    most : mm per mm in plan, what of the lift one move may lose
+    """
+    ease(points, lift, most, ROUNDING)
+    return np.ascontiguousarray(points + np.column_stack([np.zeros((len(points), 2)), lift]))
+
+
+def _steepest(points: F64) -> float:
+    """The most a polyline (n, 3), mm, goes up or down, mm per mm in plan."""
+    move = np.diff(points, axis=0)
+    rise = np.maximum(np.abs(move[:, 2]) - ROUNDING, 0.0)
+    return float((rise / np.maximum(np.hypot(move[:, 0], move[:, 1]), 1e-12)).max(initial=0.0))
+
+
+def _not_down(points: F64, slope: float) -> float:
+    """Share in plan of a polyline (n, 3), mm, that does not go down steeper than ``slope``, mm per mm."""
+    move = np.diff(points, axis=0)
+    run = np.hypot(move[:, 0], move[:, 1])
+    return float(run[-move[:, 2] <= slope * run].sum() / run.sum())
+
+
+def _with_knot(points: F64, s: F64, at: float) -> tuple[F64, F64]:
+    """A polyline and its arc lengths with one more point at arc length ``at`` where it lies inside."""
+    if at <= s[0] or at >= s[-1]:
+        return points, s
+    k = int(np.searchsorted(s, at))
+    if abs(s[k] - at) < 1e-12:
+        return points, s
+    t = (at - s[k - 1]) / (s[k] - s[k - 1])
+    new = points[k - 1] + t * (points[k] - points[k - 1])
+    return np.insert(points, k, new, axis=0), np.insert(s, k, at)
