@@ -338,6 +338,17 @@ def test_straight_on_no_way_down_is_gone_again(known):
     assert (link._straight_on(points, False) is None) == (known > 3)
 
 
+def test_straight_on_a_pass_may_end_on_what_is_known():
+    """What overlaps there is no way down: for it the tool need not go up to the clearance plane."""
+    x = np.linspace(8.0, 22.0, 29)
+    points = np.column_stack([x, np.full(29, 10.0), np.full(29, 2.0)])
+    link = linker(top=3.0)
+    link.at = np.array([7.0, 10.0, 2.6])
+    link.stock.cut(np.array([[3.0, 10.0, 2.6], [7.0, 10.0, 2.6]]), link.field.tool)
+    link.depths.cut(points[-4:])
+    assert link._straight_on(points, False) is not None
+
+
 def test_what_a_line_has_above_the_rapids_is_not_walked():
     """A pass that runs out over a table higher than the clearance plane: no way leads across there."""
     link = linker()
