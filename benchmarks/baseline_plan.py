@@ -36,6 +36,9 @@ class Retracting(Linker):
     def _straight_on(self, points: F64, closed: bool) -> Linker.Way | None:
         return None
 
+    def _across(self, start: F64) -> F64 | None:
+        return None
+
 
 class Plain(Finish):
     """The finish of one zone by the usual passes alone."""

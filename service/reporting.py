@@ -240,6 +240,8 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
     if plan is not None:
         out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes,
                    rejected=[*out["rejected"], *plan.rejected])
+        if plan.step is not None and not mine:  # what it has is done by the layers over it and others
+            out.update(step=plan.step, steps=[plan.step])
     if mine:
         out.update(cutting_length_mm=r(sum(map(cutting_length, mine)), 1), step=mine[0].id,
                    machining_time_s=r(sum(s.seconds for s in mine), 1), steps=[s.id for s in mine])

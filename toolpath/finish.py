@@ -98,6 +98,19 @@ class Finish:
         self.walked = Walked() if walked is None else walked
         self.depths = Depths(stock.lattice) if depths is None else depths
 
+    def measure(self, layers: Workingstep) -> None:
+        """Count what layers have cut: where they leave no more than the scallop, as along slots, no pass follows."""
+        for t in layers.trajectories:
+            if t.motion is Motion.CUT:
+                self.residual.cut(t.points, layers.tool)
+        if len(self.given_residual) and bool((self.given_residual <= PASS_SHARE * self.settings.scallop_height).all()):
+            self.step, self.begun_with = layers.id, layers.strategy
+
+    @property
+    def given_residual(self) -> F64:
+        """(k,) float64, mm, what is left at the samples of the zone itself."""
+        return self.residual.residual[:self.given]
+
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingsteps of the zone; none where no pass is walked.
 
@@ -122,7 +135,7 @@ class Finish:
             made.append(tries[-1]._led(step_id, name, runs, every))
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
-        left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
+        left = [int((t.given_residual > most).sum()) for t in tries]
         best = min(range(len(tries)), key=lambda k: (not made[k], left[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]
         for k, lost in enumerate(tries):
@@ -262,7 +275,7 @@ class Finish:
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
-        left = np.flatnonzero((self.residual.residual > self._aims(self.settings.scallop_height))[:self.given])
+        left = np.flatnonzero(self.given_residual > self._aims(self.settings.scallop_height)[:self.given])
         name = self.begun_with or self.strategy.name
         return ZonePlan(self.zone, self.step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
 
@@ -422,8 +435,8 @@ def turned(line: Line, settings: PlanSettings) -> Line:
 
 def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
     """Feeds and heights of a step, as the linker wants them."""
-    return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.clearance, settings.rapid_floor,
-                   settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance)
+    return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.rates.rapid, settings.clearance,
+                   settings.rapid_floor, settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance)
 
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,

@@ -6,16 +6,18 @@ Stock that stands higher over a pass than the flutes reach is first walked off a
 2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
 3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
    top is in air, or a free place close beside it is.
-A pass with none of these is left out. Ways 2 and 3 begin at the clearance plane. Rapids move Z alone between that
-plane and a height clear of the stock, or XY alone at the plane; below that height every move is a feed move,
-because no rapid keeps its clearance beside a wall.
+A pass with none of these is left out. To where ways 2 and 3 begin the tool goes straight over what is between, or by
+the clearance plane where that is sooner. Rapids move Z alone between that plane and a height clear of the stock, or XY
+alone at the plane; below that height every move is a feed move, as no rapid keeps its clearance beside a wall.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from dataclasses import field as fresh
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +27,16 @@ from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.walked import Depths, still_to_walk
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
-IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
+IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
+MOST_IN_FRONT = 0.5  # mm
+GUARD = 0.1  # of the diameter, before and after stock: as slow as in it
+OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
@@ -45,6 +50,7 @@ class Motions:
     feed: float
     plunge_feed: float
     link_feed: float
+    rapid_feed: float
     clearance: float
     rapid_floor: float
     ramp_angle: float
@@ -63,6 +69,7 @@ class Linker:
     refused : how many of them found no safe way in
     depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
     found   : what a proof found wrong with an earlier plan
+    hurries : what of a pass is in air is gone as fast as a link
     """
 
     field: TipField
@@ -70,6 +77,7 @@ class Linker:
     motions: Motions
     depths: Depths
     found: Counterexamples = NONE
+    hurries: bool = False
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
@@ -161,12 +169,63 @@ class Linker:
         else:
             self._come_down(entry[0])
             if len(entry) > 1:
-                self._feed(Motion.APPROACH, entry, self.motions.plunge_feed)
+                self._feed(Motion.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self._here() - cut[0]) > 1e-9:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
-        self._feed(Motion.CUT, cut, self.motions.feed)
+        for motion, points, feed in self._hurried(cut):
+            self._feed(motion, points, feed)
         self.passes += 1
         return True
+
+    def _hurried(self, cut: F64) -> list[tuple[Motion, F64, float]]:
+        """A pass (n, 3), mm, in stretches; those in air, ``GUARD`` from what stands, go as fast as links do.
+
+        Only where the tool takes stock off: a finish is not left to what the stock's lattice shows.
+        """
+        whole = [(Motion.CUT, cut, self.motions.feed)]
+        if not self.hurries or self.motions.link_feed <= self.motions.feed:
+            return whole
+        guard = max(GUARD * self.field.tool.diameter, 2.0 * self.stock.lattice.step)
+        points = dense(cut, 0.25 * guard)
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        busy = self.stock.overlap(points, self.field.tool, SURE_RIM) > AIR_TOLERANCE
+        at = s[busy]
+        if not len(at):
+            return whole
+        knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(cut, axis=0), axis=1))])
+        ends = [0.0]
+        for a, b in zip([-math.inf, *at], [*at, math.inf], strict=True):  # gaps between places in stock
+            low, high = max(a + guard, 0.0), min(b - guard, float(s[-1]))
+            if high - low > guard:
+                ends += [low, high]
+        ends.append(float(s[-1]))
+        out: list[tuple[Motion, F64, float]] = []
+        for k, (low, high) in enumerate(pairwise(ends)):
+            if high - low <= 1e-9:
+                continue
+            inner = cut[(knots > low + 1e-9) & (knots < high - 1e-9)]
+            two = np.array([[np.interp(t, knots, cut[:, c]) for c in range(3)] for t in (low, high)])
+            air = k % 2 == 1
+            out.append((Motion.CONNECT if air else Motion.CUT, np.vstack([two[:1], inner, two[1:]]),
+                        self.motions.link_feed if air else self.motions.feed))
+        return out
+
+    def keep_down(self, ways: Iterable[F64]) -> bool:
+        """Whether the tool could go along one of some ways (n, 3), mm, from where it is, in air; the first is gone."""
+        for way in ways:
+            points = dense(way, 0.5 * self.stock.lattice.step)
+            steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
+            if not len(steps):
+                return True
+            if (float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
+                    and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
+                self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+                return True
+        return False
+
+    def lift(self) -> None:
+        """Go up to the clearance plane."""
+        self._lift()
 
     def finish(self) -> tuple[Trajectory, ...]:
         """Lift to the clearance plane and return all trajectories."""
@@ -282,6 +341,10 @@ class Linker:
 
     # -- moves ------------------------------------------------------------------------------------------------
 
+    @property
+    def _in_front(self) -> float:
+        return min(IN_FRONT * self.field.tool.diameter, MOST_IN_FRONT)
+
     def _here(self) -> F64:
         assert self.at is not None
         return self.at
@@ -318,8 +381,44 @@ class Linker:
         if self.motions.clearance > free + 1e-9:
             self._rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
+    def _across(self, start: F64) -> F64 | None:
+        """A way (n, 3) in air from where the tool is to just over a place to come down at, no higher than it has to be.
+
+        Up over the stock and whatever else is between, straight across, and down: a feed way, taken where that is
+        sooner than by the clearance plane. None where it is not, or where the tool is not free on it.
+        """
+        tool, m = self.field.tool, self.motions
+        if self.at is None or self.at[2] >= m.rapid_floor:
+            return None
+        here, low = self.at, start[2] + self._in_front
+        run = float(np.hypot(*(start - here)[:2]))
+        level = max(float(here[2]), low)
+        by_plane = ((2.0 * m.rapid_floor - here[2] - low) / m.link_feed
+                    + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
+        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane:
+            return None
+        n = max(2, int(run / (0.5 * self.stock.lattice.step)) + 1)
+        t = np.linspace(0.0, 1.0, n)[:, None]
+        lane = np.column_stack([here[:2] + t * (start - here)[:2], np.full(n, level)])
+        level = max(level, float(self.field.tips(lane[:, :2]).max()))
+        lane[:, 2] = level
+        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM), self.stock.under_end(lane, tool))
+        level += max(float(stands.max()), 0.0) + OVER
+        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane or level >= m.rapid_floor:
+            return None
+        lane[:, 2] = level
+        if not (self._free_move(here[:2], start[:2], level) and bool(self.stock.in_air(lane, tool).all())):
+            return None
+        way = np.array([here, [*here[:2], level], [*start[:2], level], [*start[:2], low]])
+        return np.ascontiguousarray(way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]])
+
     def _come_down(self, start: F64) -> None:
         x, y, z = start
+        way = self._across(start)
+        if way is not None:
+            self._feed(Motion.CONNECT, way, self.motions.link_feed)
+            self._feed(Motion.APPROACH, np.array([way[-1], start]), self.motions.plunge_feed)
+            return
         top = self.motions.clearance
         if self.at is None:
             self.at = np.array([x, y, top])
@@ -331,7 +430,7 @@ class Linker:
         free = min(max(z, self.motions.rapid_floor), top)
         if top > free + 1e-9:
             self._rapid(np.array([[x, y, top], [x, y, free]]))
-        slow = min(z + IN_FRONT, free)
+        slow = min(z + self._in_front, free)
         if free > slow + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:

@@ -74,15 +74,16 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
         mine = [z for z in zones if z.tool.id == tid]
         field, cut = fields[tid], cut_data[tid]
         walked, depths = Walked(), Depths(stock.lattice)
-        if settings.roughing:
-            step = _layers(mine, field, cut, stock, settings, depths, following())
-            steps.extend([] if step is None else [step])
+        layered = _layers(mine, field, cut, stock, settings, depths, following()) if settings.roughing else None
+        steps.extend([] if layered is None else [layered])
         own: list[Finish] = []
         for zone in mine:
             if settings.finishing:
                 faces = (trimmed or {}).get(zone.id, ())
                 own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces, walked,
                                   depths))
+                if layered is not None:
+                    own[-1].measure(layered)
                 steps.extend(own[-1].walk(following()))
             done += 1
             if progress is not None:
@@ -103,7 +104,7 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found)
+    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, hurries=True)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bottom = float(tips[:, 2].min()) + allowance

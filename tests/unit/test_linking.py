@@ -11,8 +11,8 @@ import pytest
 from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
-from toolpath.levels import Line
-from toolpath.linking import Linker, Motions, nearest_order
+from toolpath.levels import Line, dense
+from toolpath.linking import GUARD, OVER, Linker, Motions, nearest_order
 from toolpath.motion import Motion
 from toolpath.stock import SKIN, StockMap
 from toolpath.walked import Depths
@@ -27,7 +27,7 @@ def linker(body=None, top=TOP, post=False, step_down=1.0):
         mesh = joined(mesh, box_mesh([13, 13, 0], [17, 17, 3]))
     field = field_of(mesh, body or ball(4.0))
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
-    return Linker(field, stock, Motions(800, 200, 3000, 8.0, 6.0, RAMP, step_down, 0.001), Depths(stock.lattice))
+    return Linker(field, stock, Motions(800, 200, 3000, 10000, 8.0, 6.0, RAMP, step_down, 0.001), Depths(stock.lattice))
 
 
 def straight(x0, x1, y, z):
@@ -118,7 +118,7 @@ def test_stock_that_stays_beside_a_wall_is_not_gone_over_layer_after_layer():
         np.maximum(stock.cover, stays, out=stock.cover)
 
     stock.cut = leaves
-    link = Linker(field, stock, Motions(800, 200, 3000, 14.0, 12.0, RAMP, 0.5, 0.001), Depths(stock.lattice))
+    link = Linker(field, stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 0.5, 0.001), Depths(stock.lattice))
     passes = []
     for z in (7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0):
         before = link.passes
@@ -256,20 +256,74 @@ def test_a_deeper_level_is_reached_down_a_ramp_along_the_pass():
 
 
 def test_no_link_goes_through_a_wall():
+    """It goes over it, no higher than it has to, and does not go up to the rapids."""
     link = linker(tool(2.0, 0.0), top=-1.0, post=True)
     link.add(straight(5, 11.5, 15, 1.0))
     link.add(straight(18.5, 25, 15, 1.0))
-    assert motions(link).count(Motion.CONNECT) == 0
+    assert motions(link).count(Motion.RAPID) == 2  # only to where the first pass begins
+    over = next(t for t in link.trajectories if t.motion is Motion.CONNECT)
+    assert over.feed == 3000 and 3.0 + OVER <= over.points[:, 2].max() < 3.5
     for t in link.trajectories:
-        inside = (np.abs(t.points[:, :2] - 15) < 2.9).all(axis=1)
-        assert (t.points[inside, 2] >= 3.0).all()
+        way = dense(t.points, 0.05)
+        inside = (np.abs(way[:, :2] - 15) < 2.9).all(axis=1)
+        assert (way[inside, 2] >= 3.0).all()
 
 
-def test_a_link_takes_no_more_than_a_layer():
+def test_over_what_stands_as_high_as_rapids_go_the_clearance_plane_is_the_way():
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([13, 13, 0], [17, 17, 5.95]))
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, -1.0]), 0.15)
+    link = Linker(field_of(mesh, tool(2.0, 0.0)), stock, Motions(800, 200, 3000, 10000, 8.0, 6.0, RAMP, 1.0, 0.001),
+                  Depths(stock.lattice))
+    link.add(straight(5, 11.5, 15, 1.0))
+    link.add(straight(18.5, 25, 15, 1.0))
+    assert Motion.CONNECT not in motions(link) and motions(link).count(Motion.RAPID) == 5
+
+
+def test_what_stands_between_two_passes_is_gone_over_and_not_through():
+    """The way across takes no stock, and is sooner than by the clearance plane."""
     link = linker(tool(2.0, 0.0), step_down=0.5)
     link.add(straight(-2, 6, 10, 1.0))
+    before, stock = len(link.trajectories), link.stock.copied()
     link.add(straight(9.5, 20, 10, 1.0))
-    assert Motion.CONNECT not in motions(link)
+    over = link.trajectories[before]
+    assert over.motion is Motion.CONNECT and not stock.above(1.0).size == 0
+    assert stock.overlap(dense(over.points, 0.05), link.field.tool).max() <= 0.01
+    assert stock.in_air(dense(over.points[1:3], 0.05), link.field.tool).all()
+    assert TOP < over.points[:, 2].max() < link.motions.rapid_floor
+    lift = link.motions.clearance - 1.0
+    assert np.linalg.norm(np.diff(over.points, axis=0), axis=1).sum() / 3000 < 2.0 * lift / 3000 + 3.5 / 10000
+
+
+def test_a_shank_is_not_led_into_what_stands_beside_the_way_across():
+    """Between two trenches 10 mm apart a rib of stock stands that the cutter gets over, and the shank does not."""
+    body = replace(tool(2.0, 0.0, neck=3.0), shank_diameter=8.0)
+    link = linker(body, top=0.5)
+    link.stock.top[:] = link.stock.cover[:] = -1.0
+    x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
+    link.stock.top[:, (x > 12.0) & (x < 13.0)] = link.stock.cover[:, (x > 12.0) & (x < 13.0)] = 5.0
+    link.stock._pooled[:] = 5.0
+    assert link.add(straight(2, 7, 10, 0.5)) and link.add(straight(18, 23, 10, 0.5))
+    for t in link.trajectories:
+        if t.motion is not Motion.RAPID:
+            assert not link.stock.meets_bodies(dense(t.points, 0.05), link.field.discs).any()
+
+
+def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
+    """Stock over the right half: the way is the same, cut where it stands and a little before."""
+    slow, fast = linker(top=-1.0), linker(top=-1.0)
+    fast.hurries = True
+    for link in (slow, fast):
+        x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
+        link.stock.top[:, x > 15.0] = link.stock.cover[:, x > 15.0] = 1.5
+        assert link.add(straight(3, 27, 10, 1.0))
+    ways = [[t for t in link.trajectories if t.motion in (Motion.CUT, Motion.CONNECT)] for link in (slow, fast)]
+    assert [t.motion for t in ways[1]] == [Motion.CONNECT, Motion.CUT]
+    assert [t.feed for t in ways[1]] == [3000, 800]
+    np.testing.assert_allclose(np.vstack([ways[1][0].points, ways[1][1].points[1:]])[[0, -1]], ways[0][0].points)
+    begin = ways[1][1].points[0, 0]
+    rim = math.sqrt(4.0 - 1.5**2)  # of the ball where stock 0.5 above its tip meets it
+    first = x[x > 15.0][0]
+    assert first - rim - 2.0 * GUARD * 4.0 < begin <= first - rim - 0.75 * GUARD * 4.0
 
 
 def test_finish_ends_at_the_clearance_plane_with_feed_below_the_rapid_floor():
