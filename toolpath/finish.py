@@ -135,7 +135,7 @@ class Finish:
             made.append(tries[-1]._led(step_id, name, runs, every))
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
-        left = [int((t.given_residual > most).sum()) for t in tries]
+        left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
         best = min(range(len(tries)), key=lambda k: (not made[k], left[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]
         for k, lost in enumerate(tries):
