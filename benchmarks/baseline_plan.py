@@ -17,8 +17,9 @@ from geometry.mesh import F64
 from toolpath.family import Target
 from toolpath.finish import Finish, motions_of, step_of, turned
 from toolpath.levels import dilated
-from toolpath.linking import Linker, nearest_order
+from toolpath.linking import Linker
 from toolpath.motion import Workingstep
+from toolpath.order import nearest_order
 from toolpath.plan import Plan
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap

@@ -24,8 +24,9 @@ from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
 from toolpath.levels import Line, serving, thinned, true_runs
-from toolpath.linking import Linker, Motions, nearest_order
+from toolpath.linking import Linker, Motions
 from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.order import nearest_order
 from toolpath.posed import enters
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
@@ -54,7 +55,8 @@ WORTH_A_TRY = 1.5  # of the way of the usual passes: iso-parametric ones that ar
 class ZonePlan:
     """What was planned for a zone.
 
-    step     : id of its first finishing workingstep, None where nothing could be planned
+    step     : id of its first finishing workingstep, of the layers where these leave nothing to finish; None where
+               nothing could be planned
     side_step: mm between passes as laid out
     passes   : cutting passes between links, of all its workingsteps
     left     : (k,) indices into the zone's checks that the planner's own measure finds above the budget
@@ -91,6 +93,7 @@ class Finish:
                                     margin=1.5 * settings.scallop_height)
         self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points))
         self.faces = faces
+        self.layers: Workingstep | None = None  # those that were measured
         self.step: str | None = None
         self.begun_with = ""  # name of the strategy that went before the usual one
         self.passes = 0
@@ -100,16 +103,10 @@ class Finish:
 
     def measure(self, layers: Workingstep) -> None:
         """Count what layers have cut: where they leave no more than the scallop, as along slots, no pass follows."""
+        self.layers = layers
         for t in layers.trajectories:
             if t.motion is Motion.CUT:
                 self.residual.cut(t.points, layers.tool)
-        if len(self.given_residual) and bool((self.given_residual <= PASS_SHARE * self.settings.scallop_height).all()):
-            self.step, self.begun_with = layers.id, layers.strategy
-
-    @property
-    def given_residual(self) -> F64:
-        """(k,) float64, mm, what is left at the samples of the zone itself."""
-        return self.residual.residual[:self.given]
 
     def walk(self, step_id: str) -> list[Workingstep]:
         """The workingsteps of the zone; none where no pass is walked.
@@ -119,6 +116,8 @@ class Finish:
         each until no more than the scallop is left. What leaves the fewest samples above it stays, of those that leave
         as many the fastest.
         """
+        if not bool((self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height)).any()):
+            return []
         every = np.ones(len(self.checks.points), np.bool_)
         other, refused = self._along_borders()
         leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0
@@ -275,9 +274,11 @@ class Finish:
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
-        left = np.flatnonzero(self.given_residual > self._aims(self.settings.scallop_height)[:self.given])
-        name = self.begun_with or self.strategy.name
-        return ZonePlan(self.zone, self.step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
+        left = np.flatnonzero((self.residual.residual > self._aims(self.settings.scallop_height))[:self.given])
+        name, step = self.begun_with or self.strategy.name, self.step
+        if step is None and self.layers is not None and self.given and not len(left):
+            name, step = self.layers.strategy, self.layers.id
+        return ZonePlan(self.zone, step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
 
     def _aims(self, aim: float) -> F64:
         return self.settings.found.aims(self.zone.id, aim, len(self.checks.points))

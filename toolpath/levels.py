@@ -267,10 +267,11 @@ def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: flo
             spans.append([lo, hi])
     if line.closed and len(spans) == 1 and spans[0][1] - spans[0][0] >= s[-1] - join:
         return [line]
-    return [Line(_between(points, s, max(lo, 0.0), min(hi, s[-1])), False) for lo, hi in spans]
+    return [Line(stretch(points, s, max(lo, 0.0), min(hi, s[-1])), False) for lo, hi in spans]
 
 
-def _between(points: F64, s: F64, lo: float, hi: float) -> F64:
-    inner = points[(s > lo) & (s < hi)]
-    ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (lo, hi)])
+def stretch(points: F64, s: F64, low: float, high: float) -> F64:
+    """A polyline (n, 3), mm, from ``low`` to ``high`` mm along it; s : (n,) mm, how far along its points are."""
+    inner = points[(s > low) & (s < high)]
+    ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (low, high)])
     return np.vstack([ends[:1], inner, ends[1:]])

@@ -14,7 +14,6 @@ alone at the plane; below that height every move is a feed move, as no rapid kee
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from dataclasses import field as fresh
 from itertools import pairwise
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.levels import Line, dense, pieces_where, thinned
+from toolpath.levels import Line, dense, pieces_where, stretch, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
@@ -174,6 +173,7 @@ class Linker:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
         for motion, points, feed in self._hurried(cut):
             self._feed(motion, points, feed)
+        self.depths.cut(cut)
         self.passes += 1
         return True
 
@@ -203,29 +203,10 @@ class Linker:
         for k, (low, high) in enumerate(pairwise(ends)):
             if high - low <= 1e-9:
                 continue
-            inner = cut[(knots > low + 1e-9) & (knots < high - 1e-9)]
-            two = np.array([[np.interp(t, knots, cut[:, c]) for c in range(3)] for t in (low, high)])
             air = k % 2 == 1
-            out.append((Motion.CONNECT if air else Motion.CUT, np.vstack([two[:1], inner, two[1:]]),
+            out.append((Motion.CONNECT if air else Motion.CUT, stretch(cut, knots, low, high),
                         self.motions.link_feed if air else self.motions.feed))
         return out
-
-    def keep_down(self, ways: Iterable[F64]) -> bool:
-        """Whether the tool could go along one of some ways (n, 3), mm, from where it is, in air; the first is gone."""
-        for way in ways:
-            points = dense(way, 0.5 * self.stock.lattice.step)
-            steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
-            if not len(steps):
-                return True
-            if (float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
-                    and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
-                self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
-                return True
-        return False
-
-    def lift(self) -> None:
-        """Go up to the clearance plane."""
-        self._lift()
 
     def finish(self) -> tuple[Trajectory, ...]:
         """Lift to the clearance plane and return all trajectories."""
@@ -364,8 +345,6 @@ class Linker:
         self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
-        if motion is Motion.CUT:
-            self.depths.cut(points)
 
     def _rapid(self, points: F64) -> None:
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
@@ -435,39 +414,3 @@ class Linker:
             self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
             self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)
-
-
-def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:
-    """Lines in the order a tool meets them going each time to the nearest start.
-
-    at     : (2,) or (3,) float64, mm, where the tool is; None lets the first line begin
-    either : open lines may be walked both ways; closed ones begin at their nearest point in any case
-    """
-    left = list(lines)
-    out: list[Line] = []
-    here = at
-    while left:
-        if here is None:
-            best, flip, start = 0, False, 0
-        else:
-            best, flip, start, least = 0, False, 0, math.inf
-            for k, line in enumerate(left):
-                if line.closed:
-                    d2 = ((line.points[:, :2] - here[:2]) ** 2).sum(axis=1)
-                    j = int(np.argmin(d2))
-                    if d2[j] < least:
-                        best, flip, start, least = k, False, j, float(d2[j])
-                    continue
-                for back in (False, True) if either else (False,):
-                    d = float(((line.points[-1 if back else 0, :2] - here[:2]) ** 2).sum())
-                    if d < least:
-                        best, flip, start, least = k, back, 0, d
-        line = left.pop(best)
-        if flip:
-            line = line.reversed()
-        if line.closed and start:
-            loop = line.points[:-1]
-            line = Line(np.vstack([loop[start:], loop[:start + 1]]), True)
-        out.append(line)
-        here = line.points[-1]
-    return out

@@ -16,8 +16,9 @@ from geometry.mesh import F64
 from toolpath.family import Target
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.levels import dilated
-from toolpath.linking import FLUTE_SHARE, Linker, nearest_order
+from toolpath.linking import FLUTE_SHARE, Linker
 from toolpath.motion import Workingstep
+from toolpath.order import nearest_order
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers

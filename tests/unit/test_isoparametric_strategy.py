@@ -157,6 +157,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             self.checks, self.given, self.walked = SimpleNamespace(points=np.zeros((4, 3))), 4, Walked()
             self.settings = SimpleNamespace(scallop_height=0.02, found=NONE, turning=None)
             self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
+            self.residual = SimpleNamespace(residual=np.ones(4))
             self.strategy, self.depths = _Strategy("zlevel", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
 
         def _along_borders(self):

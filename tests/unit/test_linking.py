@@ -12,8 +12,9 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.levels import Line, dense
-from toolpath.linking import GUARD, OVER, Linker, Motions, nearest_order
+from toolpath.linking import GUARD, OVER, Linker, Motions
 from toolpath.motion import Motion
+from toolpath.order import nearest_order
 from toolpath.stock import SKIN, StockMap
 from toolpath.walked import Depths
 
@@ -322,6 +323,7 @@ def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     np.testing.assert_allclose(np.vstack([ways[1][0].points, ways[1][1].points[1:]])[[0, -1]], ways[0][0].points)
     begin = ways[1][1].points[0, 0]
     rim = math.sqrt(4.0 - 1.5**2)  # of the ball where stock 0.5 above its tip meets it
+    assert fast.depths.were_cut(ways[0][0].points).all()  # it is known as it was asked for
     first = x[x > 15.0][0]
     assert first - rim - 2.0 * GUARD * 4.0 < begin <= first - rim - 0.75 * GUARD * 4.0
 

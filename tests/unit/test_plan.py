@@ -87,6 +87,31 @@ def test_a_later_round_walks_only_what_no_earlier_one_has():
     assert np.linalg.norm(second[-1] - points[-1]) < 1e-6
 
 
+def test_what_layers_have_finished_gets_no_pass_and_says_so():
+    """What a finish has cut is measured as if layers had: once nothing is left, not even another way is tried."""
+    c = case("walls")
+    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    cut = CutData(10_000, 800, 200, 3000, 0.75)
+
+    def fresh():
+        stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
+        return Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings)
+
+    first = fresh()
+    (step,) = first.walk("S05")
+    assert not len(first.plan().left) and first.plan().step == "S05"
+    part = replace(step, id="S02", strategy="layers", trajectories=step.trajectories[:len(step.trajectories) // 2])
+    half, whole = fresh(), fresh()
+    half.measure(part)
+    assert half.walk("S06") and half.plan().strategy == "zlevel" and half.plan().step == "S06"
+    whole.measure(replace(part, trajectories=step.trajectories))
+    whole._along_borders = None  # not even asked
+    assert whole.walk("S06") == []
+    made = whole.plan()
+    assert (made.step, made.strategy, made.passes, len(made.left)) == ("S02", "layers", 0, 0)
+
+
 def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
     """The second of two zones asks for the line of the first and for one more; both count for it as walked."""
     c = case("walls")
