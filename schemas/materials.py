@@ -1,8 +1,8 @@
 """Workpiece materials and their stated default cutting data.
 
-The figures are stated defaults, deliberately conservative: coated solid carbide, side and ball milling of
-slender tools at small engagement with coolant. A shop with its own figures writes a material into the
-library (``/v1/materials``) or inline into the setup.
+The figures are shop practice, deliberately low: coated solid carbide, slender tools, with coolant. What could be held
+against a source, and what could not, is in docs/theory/feeds.md. A shop with its own figures writes a material into the
+library (``/v1/materials``) or inline into the setup, or speed and feed to a tool.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema
 
 from schemas.base import Number, WireModel, library_entry
 
-SOURCE = "stated default, conservative"
+SOURCE = "shop practice, deliberately low"
 
 
 class FeedPoint(WireModel):

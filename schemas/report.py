@@ -113,6 +113,18 @@ class TimeSpent(ReportModel):
     tool_changes: Annotated[int, Field(description="Within programs.")]
 
 
+class Caution(ReportModel):
+    """What a machinist is to be told although it is no finding."""
+
+    kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows.")]
+    subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
+    message: str
+    measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None
+    limit: float | None = None
+    remedy: str
+    at_mm: Annotated[list[float] | None, Field(description="Where, setup frame.")] = None
+
+
 class Report(Zones):
     """report.json."""
 
@@ -127,6 +139,7 @@ class Report(Zones):
     reach_coverage: Annotated[Share | None, Field(description="The same / the area some tool can reach.")] = None
     machining_time_s: float | None = None
     time: TimeSpent | None = None
+    warnings: Annotated[list[Caution], Field(description="Also as sentences in part.warnings.")] = []
     tools: list[ToolUse]
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face, by face number, as all programs "
                                                                 "leave it.")] = []

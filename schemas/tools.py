@@ -75,6 +75,15 @@ class Tool(WireModel):
         gt=0, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
                                   "deeper than a twentieth of its radius; 180 is a slot. null: not limited.")] = None
     life_min: Annotated[Number | None, Field(gt=0, le=1e6, description="Life in cut, min; null: not given.")] = None
+    spindle_rpm: Annotated[Number | None, Field(
+        ge=1, le=1e6, description="Spindle speed, 1/min, of all its steps; null: from the material. No more than "
+                                  "max_rpm and machine.max_rpm allow.")] = None
+    feed_mm_min: Annotated[Number | None, Field(
+        ge=0.1, le=1e6, description="Feed in cut, mm/min, of all its steps; null: from material, flutes and speed. No "
+                                    "more than machine.max_feed_mm_min allows.")] = None
+    plunge_feed_mm_min: Annotated[Number | None, Field(
+        ge=0.1, le=1e6, description="Feed of ways down into the stock, mm/min; null: 0.3 of the feed in cut. No more "
+                                    "than machine.max_feed_mm_min allows.")] = None
     holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
                                                                             "no holder is checked.")] = []
 

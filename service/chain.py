@@ -26,6 +26,7 @@ from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
 from service.blank import stock_cylinder
+from service.cautions import limited, sentences
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -34,7 +35,7 @@ from service.convert import (
     tool_bodies,
 )
 from service.delivery import Files, deliver, json_bytes
-from service.materials import DEFAULT_MAX_FEED_MM_MIN, cutting_data, rates_of
+from service.materials import STEP_DOWN, cutting_data, rates_of
 from service.prepare import Prepared, prepare, stock_box, table_height
 from service.preview import draw_preview
 from service.programs import (
@@ -64,7 +65,6 @@ Progress = Callable[[str, float], None]
 Planner = Callable[..., Plan]
 RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
-STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}  # of the diameter
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
@@ -94,6 +94,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress)
+    cautions = limited(setup)
+    ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     trimmed: Mapping[str, Sequence[Faces]] = {}
     if setup.operations.finishing:
         try:
@@ -126,7 +128,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     ready = replace(ready, warnings=(*ready.warnings, *told.notes))
     report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
-                                        given_up)
+                                        given_up, cautions)
     progress("report", PROVED)
     files: Files = {}
     if report["state"] == "proved":
@@ -261,9 +263,12 @@ def cut_table(setup: Setup) -> dict[str, CutData]:
     """Speeds, feeds and layer depths by tool id."""
     out = {}
     for tool in setup.tools:
-        c = cutting_data(setup.material, tool, setup.machine)
-        link = min(LINK_FEED, setup.machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN)
-        out[tool.id] = CutData(c.spindle_rpm, c.feed, c.plunge_feed, link, STEP_DOWN[tool.kind] * tool.diameter_mm)
+        depth = STEP_DOWN[tool.kind] * tool.diameter_mm
+        link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
+        engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
+        rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
+        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged)
+        out[tool.id] = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish)
     return out
 
 

@@ -1,4 +1,7 @@
-"""Spindle speed and feed of a tool in a material, and what a machine does, with every default stated."""
+"""Spindle speed and feed of a tool in a material, and what a machine does, with every default stated.
+
+Formulas and where each figure is from: docs/theory/feeds.md.
+"""
 
 from __future__ import annotations
 
@@ -15,19 +18,25 @@ from schemas.tools import Tool
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
 PLUNGE_FACTOR = 0.3
+STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}
+"""Deepest layer by the kind of a tool, of its diameter."""
+MOST_THINNING = 1.5
+"""The most that a thin chip raises the feed per tooth: where a cutter runs head on into a rib the chip is not thin."""
+LEAST_FEED_MM_MIN = 0.1
 
 
 @dataclass(frozen=True)
 class CuttingData:
-    """Cutting data of one tool in one material.
+    """Cutting data of one tool in one material, in one kind of work.
 
     spindle_rpm    : 1/min, whole
     feed           : mm/min, cutting
     plunge_feed    : mm/min, moves that descend in or near material; ``PLUNGE_FACTOR`` of the feed
-    cutting_speed  : m/min at the full diameter, after the speed limits
+    cutting_speed  : m/min at the widest place in cut, after the speed limits
     feed_per_tooth : mm, after the feed limit
-    limited_by     : 'material', 'tool', 'machine' or 'default', what set the speed
+    limited_by     : 'material', 'tool', 'machine', 'default' or 'setup', what set the speed
     source         : where the material's figures come from
+    cut_back       : what the setup asks of this tool and is not given: field, asked, limit
     """
 
     spindle_rpm: float
@@ -37,6 +46,7 @@ class CuttingData:
     feed_per_tooth: float
     limited_by: str
     source: str
+    cut_back: tuple[tuple[str, float, float], ...] = ()
 
 
 def feed_per_tooth(points: list[FeedPoint], diameter: float) -> float:
@@ -55,23 +65,81 @@ def feed_per_tooth(points: list[FeedPoint], diameter: float) -> float:
     return last.feed_per_tooth_mm * diameter / last.diameter_mm
 
 
-def cutting_data(material: Material, tool: Tool, machine: Machine) -> CuttingData:
+def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
+    """Diameter of a cutter at the height ``depth`` above its tip, all mm: D - 2 r + 2 sqrt(a (2 r - a)) in the corner.
+
+    >>> round(effective_diameter(10.0, 5.0, 1.0), 9), effective_diameter(10.0, 0.0, 1.0)
+    (6.0, 10.0)
+    """
+    if depth >= corner_radius:
+        return diameter
+    return diameter - 2.0 * corner_radius + 2.0 * math.sqrt(depth * (2.0 * corner_radius - depth))
+
+
+def chip_thinning(corner_radius: float, depth: float | None, engaged: float = math.pi) -> float:
+    """Feed per tooth over the thickness of the thickest chip, no more than ``MOST_THINNING``.
+
+    corner_radius, depth : mm; None: any depth, so that the full radius may cut
+    engaged              : rad, of the front half of the cutter; in a side cut cos(engaged) = 1 - 2 ae / D
+
+    1 / (sin(kappa) sin(engaged)): the edge of a round corner stands at kappa to the axis at the depth,
+    cos(kappa) = 1 - depth / r, and from ae >= D / 2 on the chip gets its full thickness.
+
+    >>> chip_thinning(0.0, 1.0), round(chip_thinning(0.0, 1.0, math.radians(60.0)), 4)
+    (1.0, 1.1547)
+    >>> round(chip_thinning(5.0, 3.0), 4), chip_thinning(5.0, 0.1)
+    (1.0911, 1.5)
+    """
+    axial = 1.0
+    if depth is not None and depth < corner_radius:
+        axial = math.sqrt(depth * (2.0 * corner_radius - depth)) / corner_radius
+    radial = math.sin(engaged) if engaged < 0.5 * math.pi else 1.0
+    return 1.0 / max(axial * radial, 1.0 / MOST_THINNING)
+
+
+def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float | None = None) -> CuttingData:
     """Spindle speed and feed of a tool in a material on a machine.
 
-    The speed is n = 1000 vc / (pi d), held to the tool's and the machine's limit; a machine that states none
-    gets ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN``.
+    depth : mm, of layers in roughing; None: finishing, where a wall may meet all of the cutter
+
+    The speed is n = 1000 vc / (pi d) at the widest place in cut, the feed n z fz with the thinning of the chip counted
+    in where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says of the tool
+    stands instead. Both are held to the tool's and the machine's limits; where a machine states none and the tool has
+    no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
+    ``LEAST_FEED_MM_MIN``.
     """
-    wanted = 1000.0 * material.cutting_speed_m_min / (math.pi * tool.diameter_mm)
-    limits = [("material", wanted)]
-    if tool.max_rpm is not None:
-        limits.append(("tool", tool.max_rpm))
-    limits.append(("default", DEFAULT_MAX_RPM) if machine.max_rpm is None else ("machine", machine.max_rpm))
-    limited_by, rpm = min(limits, key=lambda pair: pair[1])
+    deep = tool.corner_radius_mm if depth is None else depth
+    wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
+    cut_back: list[tuple[str, float, float]] = []
+
+    def given(field: str, asked: float, *limits: float | None) -> float:
+        limit = min([x for x in limits if x is not None], default=math.inf)
+        if asked > limit:
+            cut_back.append((field, asked, limit))
+        return min(asked, limit)
+
+    if tool.spindle_rpm is not None:
+        limited_by, rpm = "setup", given("spindle_rpm", tool.spindle_rpm, tool.max_rpm, machine.max_rpm)
+    else:
+        limits = [("material", 1000.0 * material.cutting_speed_m_min / (math.pi * wide))]
+        if tool.max_rpm is not None:
+            limits.append(("tool", tool.max_rpm))
+        limits.append(("default", DEFAULT_MAX_RPM) if machine.max_rpm is None else ("machine", machine.max_rpm))
+        limited_by, rpm = min(limits, key=lambda pair: pair[1])
     rpm = max(1.0, math.floor(rpm))
-    per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm)
-    feed = min(per_tooth * tool.flutes * rpm, machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN)
-    return CuttingData(rpm, feed, PLUNGE_FACTOR * feed, rpm * math.pi * tool.diameter_mm / 1000.0,
-                       feed / (tool.flutes * rpm), limited_by, material.source)
+    if tool.feed_mm_min is not None:
+        feed = given("feed_mm_min", tool.feed_mm_min, machine.max_feed_mm_min)
+    else:
+        engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
+        per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm) * chip_thinning(
+            tool.corner_radius_mm, depth, engaged)
+        feed = min(max(per_tooth * tool.flutes * rpm, LEAST_FEED_MM_MIN),
+                   machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN)
+    plunge = max(PLUNGE_FACTOR * feed, LEAST_FEED_MM_MIN)
+    if tool.plunge_feed_mm_min is not None:
+        plunge = given("plunge_feed_mm_min", tool.plunge_feed_mm_min, machine.max_feed_mm_min)
+    return CuttingData(rpm, feed, plunge, rpm * math.pi * wide / 1000.0, feed / (tool.flutes * rpm), limited_by,
+                       material.source, tuple(cut_back))
 
 
 def rates_of(setup: Setup) -> Rates:
@@ -81,5 +149,6 @@ def rates_of(setup: Setup) -> Rates:
                  min(RATES.rounding, 0.5 * setup.quality.chordal_tolerance_mm))
 
 
-__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "PLUNGE_FACTOR", "CuttingData", "cutting_data",
+__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "LEAST_FEED_MM_MIN", "MATERIALS", "MOST_THINNING",
+           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "chip_thinning", "cutting_data", "effective_diameter",
            "feed_per_tooth", "find_material", "rates_of"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from schemas.setup import Setup, setup_sha256
 from service import advice, offers
+from service.cautions import Caution
 from service.convert import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
@@ -159,7 +161,8 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
-               zone: NDArray[np.int32], given_up: NDArray[np.bool_]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+               zone: NDArray[np.int32], given_up: NDArray[np.bool_],
+               cautions: Sequence[Caution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """report.json without its files, and which proof samples stay uncut.
 
     A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
@@ -167,6 +170,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     dense    : SurfaceSamples of the proof, n of them, frame of the first view; labels : their regions
     zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
     given_up : (n,) bool, the plan's own measure says that no pass touches the sample though a tool could
+    cautions : what a machinist is to be told
 
     Returns
     -------
@@ -199,6 +203,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
+        "warnings": [c.as_dict() for c in cautions],
         "tools": _tools(ready, proof), "deviation": deviation(proof), "machined": None, "files": [], "version": VERSION,
     }
     return report, rest

@@ -82,6 +82,7 @@ class Finish:
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
                  settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
                  depths: Depths | None = None) -> None:
+        cut = cut.finish or cut
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,13 +17,16 @@ from toolpath.strategies.zigzag import Pattern
 
 @dataclass(frozen=True)
 class CutData:
-    """How fast one tool cuts: 1/min and mm/min; step_down in mm, the deepest layer it takes."""
+    """How fast one tool cuts: 1/min and mm/min; step_down in mm, the deepest layer it takes; engaged in rad, most of
+    the front of the cutter that may be in stock; finish: the same in finishing, None where it is no other."""
 
     spindle_rpm: float
     feed: float
     plunge_feed: float
     link_feed: float
     step_down: float
+    engaged: float = math.pi
+    finish: CutData | None = None
 
 
 @dataclass(frozen=True)

@@ -215,4 +215,4 @@ def test_speeds_and_feeds_come_from_the_material_within_the_limits():
     assert feed_per_tooth(points, 0.5) == pytest.approx(0.004) and feed_per_tooth(points, 40) == pytest.approx(0.2)
     assert feed_per_tooth(points, 4.5) == pytest.approx(0.029)
     assert find_material("EN AW-6082").name == "AlMgSi1 6082"
-    assert {m.source for m in MATERIALS.values()} == {"stated default, conservative"}
+    assert {m.source for m in MATERIALS.values()} == {"shop practice, deliberately low"}

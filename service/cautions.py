@@ -1,0 +1,72 @@
+"""What a machinist is to be told of a job although it is no fault of the program: figures that were cut back.
+
+A caution has the form of an error (``geometry.errors.CamError``): what, where, measured, limit, remedy. It stands in
+the report under ``warnings``, as a sentence in ``part.warnings``, and those known before the paths in the header of
+the program too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from schemas.setup import Setup
+from service.materials import cutting_data
+
+
+@dataclass(frozen=True)
+class Caution:
+    """One of them.
+
+    kind      : 'limited'
+    subjects  : ids of tools, steps, walls
+    measured, limit : in the unit the message says
+    at        : mm, setup frame, where it is of a place
+    """
+
+    kind: str
+    subjects: tuple[str, ...]
+    message: str
+    measured: float
+    limit: float
+    remedy: str
+    at: tuple[float, float, float] | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Message and remedy in one."""
+        return f"{self.message}; {self.remedy}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for the report."""
+        return {"kind": self.kind, "subjects": list(self.subjects), "message": self.message,
+                "measured": _rounded(self.measured), "limit": _rounded(self.limit), "remedy": self.remedy,
+                "at_mm": None if self.at is None else [_rounded(v) for v in self.at]}
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 5) + 0.0 if math.isfinite(value) else None
+
+
+def limited(setup: Setup) -> list[Caution]:
+    """Speeds and feeds of tools that tool or machine do not allow, in the order of the tools."""
+    out = []
+    for tool in setup.tools:
+        for field, asked, limit in cutting_data(setup.material, tool, setup.machine).cut_back:
+            whose = "machine.max_feed_mm_min"
+            if field == "spindle_rpm":
+                whose = "its max_rpm" if limit == tool.max_rpm else "machine.max_rpm"
+            message = f"tool {tool.id}: {field} {asked:g} is more than {whose} {limit:g}"
+            out.append(Caution("limited", (tool.id,), message, asked, limit,
+                               f"it runs at {limit:g}; ask for no more, or correct the limit"))
+    return out
+
+
+def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
+    """The sentences of cautions."""
+    return tuple(c.sentence for c in cautions)
+
+
+__all__ = ["Caution", "limited", "sentences"]

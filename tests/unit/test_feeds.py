@@ -1,0 +1,109 @@
+"""Speeds and feeds: effective diameter, thin chips, what a setup says of a tool, limits and what is told of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from benchmarks import feeds_sweep
+from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
+from examples.demo import demo_setup
+from schemas.materials import MATERIALS
+from service.cautions import limited
+from service.chain import cut_table
+from service.convert import parse_setup
+from service.materials import MOST_THINNING, chip_thinning, cutting_data, effective_diameter
+
+BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
+FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}
+
+
+def setup(*tools, **changes):
+    return parse_setup(json.dumps({"tools": list(tools), "material": "C45", **changes}))
+
+
+@pytest.mark.parametrize("depth", [0.01, 0.2, 0.9, 1.4999])
+def test_the_effective_diameter_is_that_of_the_circle_at_the_depth(depth):
+    half = 0.5 * effective_diameter(3.0, 1.5, depth)
+    assert half**2 + (1.5 - depth) ** 2 == pytest.approx(1.5**2)
+    assert effective_diameter(8.0, 1.5, depth) == pytest.approx(5.0 + 2.0 * half)
+    assert effective_diameter(3.0, 1.5, 1.5) == effective_diameter(3.0, 1.5, 9.0) == 3.0
+
+
+def test_a_thin_chip_is_measured_on_the_path_of_a_tooth():
+    """Side cut ae deep: the thickest chip is fz sin(phi) with cos(phi) = 1 - 2 ae / D, counted here on two circles."""
+    radius, ae, fz = 5.0, 4.0, 1e-4
+    phi = math.acos(1.0 - ae / radius)
+    # along the radius at phi, from the circle that the tooth before has cut, fz behind, to that of this one
+    before = math.sqrt(radius**2 - (fz * math.cos(phi)) ** 2) - fz * math.sin(phi)
+    assert (radius - before) / fz == pytest.approx(math.sin(phi), rel=1e-4)
+    assert chip_thinning(0.0, 1.0, phi) == pytest.approx(1.0 / math.sin(phi))
+    assert chip_thinning(0.0, None, 0.5 * math.pi) == chip_thinning(0.0, None, math.pi) == 1.0
+    assert chip_thinning(0.0, None, 0.01) == chip_thinning(2.0, 1e-6) == chip_thinning(2.0, 0.0) == MOST_THINNING
+
+
+def test_finishing_keeps_the_figures_of_the_table_and_layers_of_a_ball_count_their_depth():
+    found = setup(BALL)
+    fine = cutting_data(found.material, found.tools[0], found.machine)
+    assert (fine.spindle_rpm, fine.limited_by) == (13793, "material")
+    assert fine.feed == pytest.approx(13793 * 2 * 0.020) and fine.plunge_feed == pytest.approx(0.3 * fine.feed)
+    rough = cutting_data(found.material, found.tools[0], found.machine, 0.9)
+    wide = 3.0 * 2.0 * math.sqrt(0.3 * 0.7)
+    assert rough.spindle_rpm == math.floor(130e3 / (math.pi * wide))
+    assert rough.feed_per_tooth == pytest.approx(0.020 * 3.0 / wide)
+    flat = setup(FLAT)
+    same = [cutting_data(flat.material, flat.tools[0], flat.machine, d) for d in (None, 2.0)]
+    assert same[0] == same[1]
+
+
+def test_a_bound_on_the_engaged_angle_feeds_faster():
+    slot, side = (setup({**FLAT, "max_engagement_deg": a}) for a in (90, 60))
+    feeds = [cutting_data(s.material, s.tools[0], s.machine).feed for s in (setup(FLAT), slot, side)]
+    assert feeds[0] == feeds[1] and feeds[2] == pytest.approx(feeds[0] / math.sin(math.radians(60)))
+
+
+def test_what_the_setup_says_of_a_tool_stands_and_is_held_to_the_limits():
+    own = {"spindle_rpm": 9000, "feed_mm_min": 321, "plunge_feed_mm_min": 55}
+    cut = cut_table(setup({**BALL, **own}))["T1"]
+    assert (cut.spindle_rpm, cut.feed, cut.plunge_feed) == (9000, 321, 55)
+    assert (cut.finish.spindle_rpm, cut.finish.feed, cut.finish.plunge_feed) == (9000, 321, 55)
+    assert limited(setup({**BALL, **own})) == []
+    slow = setup({**BALL, **own}, {**FLAT, "spindle_rpm": 7000, "max_rpm": 5000},
+                 machine={"max_rpm": 8000, "max_feed_mm_min": 200})
+    told = limited(slow)
+    assert [(c.subjects, c.measured, c.limit) for c in told] == [
+        (("T1",), 9000, 8000), (("T1",), 321, 200), (("T2",), 7000, 5000)]
+    assert told[0].sentence == ("tool T1: spindle_rpm 9000 is more than machine.max_rpm 8000; it runs at 8000; ask for "
+                                "no more, or correct the limit")
+    assert "its max_rpm 5000" in told[2].message
+    cut = cut_table(slow)["T1"]
+    assert (cut.spindle_rpm, cut.feed, cut.plunge_feed, cut.link_feed) == (8000, 200, 55, 200)
+    only = cutting_data(slow.material, setup({**BALL, "spindle_rpm": 1000}).tools[0], slow.machine)
+    assert only.feed == pytest.approx(1000 * 2 * 0.020)  # the feed follows the speed
+
+
+def test_an_own_figure_may_pass_the_caution_for_machines_that_state_no_limit():
+    fast = setup({**BALL, "spindle_rpm": 40000, "feed_mm_min": 9000})
+    cut = cut_table(fast)["T1"]
+    assert (cut.spindle_rpm, cut.feed) == (40000, 9000) and limited(fast) == []
+
+
+@pytest.mark.parametrize("seed", range(len(OVERRIDES)))
+def test_no_figure_of_the_demo_tools_is_zero_or_above_a_limit(seed):
+    jobs = list(varied(seed, demo_setup()))
+    assert len(jobs) == len(MACHINES) * len(MATERIALS)
+    assert not [f for job in jobs for f in faults(job)]
+
+
+def test_the_sweep_notices_what_it_should(monkeypatch):
+    """A check that cannot fail is none."""
+    job = setup(BALL, machine={"max_rpm": 5000, "max_feed_mm_min": 100})
+    cut = cut_table(job)["T1"]
+    for wrong in ({"feed": math.nan}, {"feed": 0.0}, {"plunge_feed": 100.2}, {"spindle_rpm": 5001}, {"spindle_rpm": 0}):
+        monkeypatch.setattr(feeds_sweep, "cut_table", lambda _setup, wrong=wrong: {"T1": replace(cut, **wrong)})
+        assert faults(job), wrong
+    monkeypatch.setattr(feeds_sweep, "cut_table", lambda _setup: {"T1": replace(cut, finish=replace(cut, feed=101.0))})
+    assert faults(job) == ["T1 finishing: feed F101 of 100"]
