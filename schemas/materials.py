@@ -35,7 +35,19 @@ class Material(WireModel):
                                                                               "m/min.")]
     feed_per_tooth: Annotated[list[FeedPoint], Field(
         min_length=1, description="Feed per tooth by diameter, ascending; beyond the ends it scales with diameter.")]
+    specific_cutting_force_n_mm2: Annotated[Number | None, Field(
+        ge=1, le=100000, description="kc1.1: force of a chip of 1 mm by 1 mm, N/mm2, from which the bending of tools "
+                                     "is estimated; null: it is not.")] = None
+    chip_thickness_exponent: Annotated[Number | None, Field(
+        ge=0, le=0.9, description="mc: the specific cutting force of a chip h mm thick is kc1.1 / h^mc. Both or none.")
+    ] = None
     source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"
+
+    @model_validator(mode="after")
+    def _both_or_none(self) -> Material:
+        if (self.specific_cutting_force_n_mm2 is None) != (self.chip_thickness_exponent is None):
+            raise ValueError("specific_cutting_force_n_mm2 and chip_thickness_exponent are given both or not at all")
+        return self
 
     @model_validator(mode="after")
     def _ascending(self) -> Material:
@@ -45,21 +57,22 @@ class Material(WireModel):
         return self
 
 
-def _material(name: str, speed: float, *feeds: float) -> Material:
-    """A built-in material; ``feeds`` in mm per tooth at 1, 3, 6, 12 and 20 mm."""
+def _material(name: str, speed: float, force: float, exponent: float, *feeds: float) -> Material:
+    """A built-in material; ``feeds`` in mm per tooth at 1, 3, 6, 12 and 20 mm; kc1.1, N/mm2, and mc."""
     points = [FeedPoint(diameter_mm=d, feed_per_tooth_mm=f)
               for d, f in zip((1.0, 3.0, 6.0, 12.0, 20.0), feeds, strict=True)]
-    return Material(name=name, cutting_speed_m_min=speed, feed_per_tooth=points, source=SOURCE)
+    return Material(name=name, cutting_speed_m_min=speed, feed_per_tooth=points, specific_cutting_force_n_mm2=force,
+                    chip_thickness_exponent=exponent, source=SOURCE)
 
 
 MATERIALS: dict[str, Material] = {m.name: m for m in (
-    _material("Ti-6Al-4V", 60.0, 0.006, 0.016, 0.030, 0.055, 0.080),
-    _material("Inconel 718", 25.0, 0.004, 0.011, 0.020, 0.038, 0.055),
-    _material("AlMgSi1 6082", 250.0, 0.010, 0.030, 0.055, 0.100, 0.150),
-    _material("AlZnMgCu1.5 7075", 250.0, 0.010, 0.030, 0.055, 0.100, 0.150),
-    _material("1.4301", 80.0, 0.006, 0.016, 0.030, 0.055, 0.080),
-    _material("316L", 75.0, 0.006, 0.016, 0.030, 0.055, 0.080),
-    _material("C45", 130.0, 0.008, 0.020, 0.038, 0.070, 0.100),
+    _material("Ti-6Al-4V", 60.0, 1700.0, 0.23, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("Inconel 718", 25.0, 3300.0, 0.25, 0.004, 0.011, 0.020, 0.038, 0.055),
+    _material("AlMgSi1 6082", 250.0, 564.0, 0.27, 0.010, 0.030, 0.055, 0.100, 0.150),
+    _material("AlZnMgCu1.5 7075", 250.0, 705.0, 0.27, 0.010, 0.030, 0.055, 0.100, 0.150),
+    _material("1.4301", 80.0, 2400.0, 0.20, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("316L", 75.0, 2400.0, 0.20, 0.006, 0.016, 0.030, 0.055, 0.080),
+    _material("C45", 130.0, 2640.0, 0.24, 0.008, 0.020, 0.038, 0.070, 0.100),
 )}
 """The built-in materials by name."""
 

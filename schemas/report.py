@@ -53,8 +53,11 @@ class ToolUse(ReportModel):
 
     id: str
     minutes_in_cut: float | None = None
-    slenderness: float | None = None
-    deflection_mm: float | None = None
+    slenderness: Annotated[float | None, Field(description="Neck length over neck diameter, of a tool without a neck "
+                                                           "stickout over diameter.")] = None
+    deflection_mm: Annotated[float | None, Field(
+        description="Of the tip, the most of its steps, at their feeds, as estimated; null: it has none, or the "
+                    "material has no specific cutting force.")] = None
     engagement_deg: Engaged | None = None
 
 
@@ -116,7 +119,8 @@ class TimeSpent(ReportModel):
 class Caution(ReportModel):
     """What a machinist is to be told although it is no finding."""
 
-    kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows.")]
+    kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows. "
+                                           "deflection: a tool bends too far at its full feed.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str
     measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None

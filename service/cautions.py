@@ -14,13 +14,15 @@ from typing import Any
 
 from schemas.setup import Setup
 from service.materials import cutting_data
+from toolpath.deflection import Bend
+from toolpath.motion import Workingstep
 
 
 @dataclass(frozen=True)
 class Caution:
     """One of them.
 
-    kind      : 'limited'
+    kind      : 'limited' or 'deflection'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -64,9 +66,30 @@ def limited(setup: Setup) -> list[Caution]:
     return out
 
 
+def bent(steps: Sequence[Workingstep]) -> list[Caution]:
+    """Tools that would bend too far, in layers and in finishing, each with the worst of its steps."""
+    groups: dict[tuple[str, str], list[tuple[Workingstep, Bend]]] = {}
+    for s in steps:
+        if s.bend is not None and s.bend.full > s.bend.limit:
+            groups.setdefault((s.tool.id, s.operation), []).append((s, s.bend))
+    out = []
+    for (tool, operation), group in groups.items():
+        worst, bend = max(group, key=lambda pair: pair[1].full / pair[1].limit)
+        more = f" and {len(group) - 1} other steps" if len(group) > 1 else ""
+        message = (f"tool {tool} in {worst.id} {worst.strategy}{more}, {operation}: its tip would bend "
+                   f"{bend.full:.3f} mm (limit {bend.limit:.3f} mm)")
+        if bend.fixed:
+            remedy = "its feed is the setup's own and stays; take a shorter or thicker tool"
+        else:
+            remedy = f"its feed is eased to {100.0 * bend.share:.0f} %, with {bend.deflection:.3f} mm; a shorter or " \
+                     "thicker tool needs no easing"
+        out.append(Caution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
+    return out
+
+
 def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
     """The sentences of cautions."""
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "limited", "sentences"]
+__all__ = ["Caution", "bent", "limited", "sentences"]

@@ -26,7 +26,7 @@ from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
 from service.blank import stock_cylinder
-from service.cautions import limited, sentences
+from service.cautions import bent, limited, sentences
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -35,7 +35,7 @@ from service.convert import (
     tool_bodies,
 )
 from service.delivery import Files, deliver, json_bytes
-from service.materials import STEP_DOWN, cutting_data, rates_of
+from service.materials import STEP_DOWN, bending, cutting_data, rates_of
 from service.prepare import Prepared, prepare, stock_box, table_height
 from service.preview import draw_preview
 from service.programs import (
@@ -51,6 +51,7 @@ from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Look, Side, in_first_frame, in_setup_frame
 from service.trimmed import trimmed_faces
+from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData, PlanSettings
@@ -126,7 +127,9 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             break
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
-    ready = replace(ready, warnings=(*ready.warnings, *told.notes))
+    late = bent(made.steps)
+    cautions = [*cautions, *late]
+    ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
                                         given_up, cautions)
     progress("report", PROVED)
@@ -260,15 +263,19 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
 
 
 def cut_table(setup: Setup) -> dict[str, CutData]:
-    """Speeds, feeds and layer depths by tool id."""
+    """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
     out = {}
-    for tool in setup.tools:
+    for tool, body in zip(setup.tools, tool_bodies(setup), strict=True):
         depth = STEP_DOWN[tool.kind] * tool.diameter_mm
         link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
         engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
         rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
-        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged)
-        out[tool.id] = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish)
+        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
+                         bending=bending(setup, tool, body, fine, None))
+        layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,
+                         bending(setup, tool, body, rough, depth))
+        slot = effective_diameter(body.diameter, body.corner_radius, depth)
+        out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
     return out
 
 

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from geometry.timing import RATES, Rates
+from geometry.toolbody import ToolBody
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup
 from schemas.tools import Tool
+from toolpath.deflection import LAYER_LIMIT, LEAST_FEED, Bending, compliance, effective_diameter, left_by_layers
+from zones.reach import lattice_step
 
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
@@ -22,7 +25,6 @@ STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}
 """Deepest layer by the kind of a tool, of its diameter."""
 MOST_THINNING = 1.5
 """The most that a thin chip raises the feed per tooth: where a cutter runs head on into a rib the chip is not thin."""
-LEAST_FEED_MM_MIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -65,17 +67,6 @@ def feed_per_tooth(points: list[FeedPoint], diameter: float) -> float:
     return last.feed_per_tooth_mm * diameter / last.diameter_mm
 
 
-def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
-    """Diameter of a cutter at the height ``depth`` above its tip, all mm: D - 2 r + 2 sqrt(a (2 r - a)) in the corner.
-
-    >>> round(effective_diameter(10.0, 5.0, 1.0), 9), effective_diameter(10.0, 0.0, 1.0)
-    (6.0, 10.0)
-    """
-    if depth >= corner_radius:
-        return diameter
-    return diameter - 2.0 * corner_radius + 2.0 * math.sqrt(depth * (2.0 * corner_radius - depth))
-
-
 def chip_thinning(corner_radius: float, depth: float | None, engaged: float = math.pi) -> float:
     """Feed per tooth over the thickness of the thickest chip, no more than ``MOST_THINNING``.
 
@@ -106,7 +97,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     in where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says of the tool
     stands instead. Both are held to the tool's and the machine's limits; where a machine states none and the tool has
     no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
-    ``LEAST_FEED_MM_MIN``.
+    ``LEAST_FEED``.
     """
     deep = tool.corner_radius_mm if depth is None else depth
     wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
@@ -133,13 +124,33 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
         engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
         per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm) * chip_thinning(
             tool.corner_radius_mm, depth, engaged)
-        feed = min(max(per_tooth * tool.flutes * rpm, LEAST_FEED_MM_MIN),
+        feed = min(max(per_tooth * tool.flutes * rpm, LEAST_FEED),
                    machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN)
-    plunge = max(PLUNGE_FACTOR * feed, LEAST_FEED_MM_MIN)
+    plunge = max(PLUNGE_FACTOR * feed, LEAST_FEED)
     if tool.plunge_feed_mm_min is not None:
         plunge = given("plunge_feed_mm_min", tool.plunge_feed_mm_min, machine.max_feed_mm_min)
     return CuttingData(rpm, feed, plunge, rpm * math.pi * wide / 1000.0, feed / (tool.flutes * rpm), limited_by,
                        material.source, tuple(cut_back))
+
+
+def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> Bending | None:
+    """What the cuts of a tool bend it by; None where the material has no specific cutting force.
+
+    body  : the shape of the tool; data : its speeds in this kind of work
+    depth : mm, of layers; None: finishing
+
+    Layers may bend it by half of what they leave for the finish, ``LAYER_LIMIT`` at most, the finish by half of the
+    gouge tolerance.
+    """
+    material = setup.material
+    if material.specific_cutting_force_n_mm2 is None or material.chip_thickness_exponent is None:
+        return None
+    limit = 0.5 * setup.quality.gouge_tolerance_mm
+    if depth is not None:
+        limit = min(LAYER_LIMIT, 0.5 * left_by_layers(depth, lattice_step(body)))
+    return Bending(body, compliance(body), material.specific_cutting_force_n_mm2, material.chip_thickness_exponent,
+                   limit, tool.flutes, data.spindle_rpm, depth is None, tool.feed_mm_min is not None,
+                   tool.plunge_feed_mm_min is not None)
 
 
 def rates_of(setup: Setup) -> Rates:
@@ -149,6 +160,6 @@ def rates_of(setup: Setup) -> Rates:
                  min(RATES.rounding, 0.5 * setup.quality.chordal_tolerance_mm))
 
 
-__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "LEAST_FEED_MM_MIN", "MATERIALS", "MOST_THINNING",
-           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "chip_thinning", "cutting_data", "effective_diameter",
-           "feed_per_tooth", "find_material", "rates_of"]
+__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MOST_THINNING",
+           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "feed_per_tooth",
+           "find_material", "rates_of"]

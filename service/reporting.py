@@ -17,6 +17,7 @@ from service.cautions import Caution
 from service.convert import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
+from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan
 from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan
@@ -204,7 +205,8 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
         "warnings": [c.as_dict() for c in cautions],
-        "tools": _tools(ready, proof), "deviation": deviation(proof), "machined": None, "files": [], "version": VERSION,
+        "tools": _tools(ready, proof, made.steps), "deviation": deviation(proof), "machined": None, "files": [],
+        "version": VERSION,
     }
     return report, rest
 
@@ -269,17 +271,26 @@ def _step(step: Workingstep) -> dict[str, Any]:
             "strategy": step.strategy, "faces": faces(step.faces), "spindle_rpm": r(step.spindle_rpm, 1),
             "feed_mm_min": r(step.feed, 1), "side_step_mm": r(step.side_step),
             "cutting_length_mm": r(cutting_length(step), 1), "machining_time_s": r(step.seconds, 1),
-            "points": int(sum(len(t.points) for t in step.trajectories))}
+            "points": int(sum(len(t.points) for t in step.trajectories)), **_bend(step.bend)}
 
 
-def _tools(ready: Prepared, proof: Proof) -> list[dict[str, Any]]:
+def _bend(bend: Bend | None) -> dict[str, Any]:
+    """How far a tool bends in a step, and the share of its feed at which it goes for that."""
+    if bend is None:
+        return {"deflection_mm": None, "deflection_limit_mm": None, "feed_share": None}
+    return {"deflection_mm": r(bend.deflection, 5), "deflection_limit_mm": r(bend.limit, 5),
+            "feed_share": r(bend.share)}
+
+
+def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[dict[str, Any]]:
     out = []
     for f in ready.views[0].fields.values():
         t = f.tool
+        bent = [s.bend.deflection for s in steps if s.tool.id == t.id and s.bend is not None]
         engaged = proof.engaged.get(t.number)
         slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
         out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),
-                    "slenderness": r(slender, 2), "deflection_mm": None,
+                    "slenderness": r(slender, 2), "deflection_mm": r(max(bent), 5) if bent else None,
                     "engagement_deg": None if engaged is None else
                     {"max": r(math.degrees(engaged.most), 2), "p99": r(math.degrees(engaged.p99), 2)},
                     "neck_clearance_mm": r(t.neck_clearance(ready.setup.clearance_mm.neck))})

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
+from toolpath.deflection import left_by_layers
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
@@ -82,7 +83,7 @@ class Finish:
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
                  settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
                  depths: Depths | None = None) -> None:
-        cut = cut.finish or cut
+        self.full = cut = cut.finish or cut
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
         if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
@@ -93,6 +94,7 @@ class Finish:
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
                                     margin=1.5 * settings.scallop_height)
         self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points))
+        self.cut = self._eased(cut, self.strategy)
         self.faces = faces
         self.layers: Workingstep | None = None  # those that were measured
         self.step: str | None = None
@@ -235,9 +237,17 @@ class Finish:
         tool, above = self.field.tool, self.field.tool.flute_length - self.field.tool.corner_radius
         return Flank(tool.radius + self.field.allowance, min(self.cut.step_down, above))
 
+    def _eased(self, cut: CutData, strategy: _Strategy) -> CutData:
+        """Feeds at which the passes of a strategy do not bend the tool too far, what layers leave in front of them."""
+        left = left_by_layers(cut.step_down, self.field.lattice.step)
+        if self.zone.form is Form.STEEP:
+            return cut.under(strategy.side_step, left)
+        return cut.under(left, strategy.side_step)
+
     def _copied(self, strategy: _Strategy) -> Finish:
         """This finish with another strategy, to be walked on its own."""
         out = copy.copy(self)
+        out.cut = self._eased(self.full, strategy)
         out.residual, out.stock = self.residual.copied(), self.stock.copied()
         out.met, out.strategy = self.met.copy(), strategy
         out.walked, out.depths = self.walked.copied(), self.depths.copied()
@@ -451,4 +461,5 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
     outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
                        settings.scallop_height, settings.chordal_tolerance, walked, outline,
-                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb, rates=settings.rates)
+                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb, rates=settings.rates,
+                       bend=cut.bend)

@@ -15,6 +15,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.timing import RATES, Rates, move_seconds
 from geometry.toolbody import ToolBody
+from toolpath.deflection import Bend
 
 
 class Motion(StrEnum):
@@ -74,6 +75,7 @@ class Workingstep:
     top, bottom : mm, z of the feature
     access    : id of the access in whose frame all this is; '' where the plan has one frame
     rates     : what the machine does, for times
+    bend      : what its cuts bend the tool by, as estimated; None where nobody knows
     """
 
     id: str
@@ -95,6 +97,7 @@ class Workingstep:
     climb: bool = True
     access: str = ""
     rates: Rates = RATES
+    bend: Bend | None = None
 
     @property
     def seconds(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.timing import RATES, Rates
 from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.deflection import LEAST_FEED, Bend, Bending
 from toolpath.strategies.zigzag import Pattern
 
 
 @dataclass(frozen=True)
 class CutData:
     """How fast one tool cuts: 1/min and mm/min; step_down in mm, the deepest layer it takes; engaged in rad, most of
-    the front of the cutter that may be in stock; finish: the same in finishing, None where it is no other."""
+    the front of the cutter that may be in stock; finish: the same in finishing, None where it is no other; bending:
+    what it bends by under a cut, None where nobody knows; bend: what that is at this feed, None before it is asked."""
 
     spindle_rpm: float
     feed: float
@@ -27,6 +29,17 @@ class CutData:
     step_down: float
     engaged: float = math.pi
     finish: CutData | None = None
+    bending: Bending | None = None
+    bend: Bend | None = None
+
+    def under(self, depth: float, width: float) -> CutData:
+        """The same with feeds eased to where a cut of a depth and a width, mm, bends the tool no more than it may."""
+        if self.bending is None:
+            return self
+        bend = self.bending.under(self.feed, depth, width)
+        down = 1.0 if self.bending.ways_fixed else bend.share
+        return replace(self, feed=max(LEAST_FEED, bend.share * self.feed),
+                       plunge_feed=max(LEAST_FEED, down * self.plunge_feed), bend=bend)
 
 
 @dataclass(frozen=True)

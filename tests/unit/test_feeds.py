@@ -12,10 +12,14 @@ from benchmarks import feeds_sweep
 from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
-from service.cautions import limited
+from service.cautions import bent, limited
 from service.chain import cut_table
 from service.convert import parse_setup
-from service.materials import MOST_THINNING, chip_thinning, cutting_data, effective_diameter
+from service.materials import MOST_THINNING, chip_thinning, cutting_data
+from tests.synthetic_plan import BALL as SLIM
+from tests.synthetic_plan import step
+from toolpath.deflection import Bend, effective_diameter, left_by_layers
+from toolpath.plan import LATTICE_CARE
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
 FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}
@@ -107,3 +111,22 @@ def test_the_sweep_notices_what_it_should(monkeypatch):
         assert faults(job), wrong
     monkeypatch.setattr(feeds_sweep, "cut_table", lambda _setup: {"T1": replace(cut, finish=replace(cut, feed=101.0))})
     assert faults(job) == ["T1 finishing: feed F101 of 100"]
+
+
+def test_what_layers_leave_is_what_the_planner_leaves():
+    """``toolpath.plan`` computes it where it plans them."""
+    assert left_by_layers(1.2, 0.08) == max(0.1 * 1.2, LATTICE_CARE * 0.08) == LATTICE_CARE * 0.08
+    assert left_by_layers(2.0, 0.1) == max(0.1 * 2.0, LATTICE_CARE * 0.1) == 0.2
+
+
+def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
+    far, near = Bend(0.4, 0.05, 0.2, 0.12), Bend(0.06, 0.05, 0.8, 0.05)
+    steps = [replace(step(1, SLIM, "layers"), bend=near), replace(step(2, SLIM, "layers"), bend=far),
+             replace(step(3, SLIM, "zlevel"), bend=Bend(0.004, 0.005, 1.0, 0.004)), step(4, SLIM, "zigzag"),
+             replace(step(5, SLIM, "zlevel"), bend=Bend(0.02, 0.005, 1.0, 0.02, fixed=True))]
+    told = bent(steps)
+    assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]
+    assert told[0].sentence == ("tool T1 in S02 layers and 1 other steps, roughing: its tip would bend 0.400 mm "
+                                "(limit 0.050 mm); its feed is eased to 20 %, with 0.120 mm; a shorter or thicker "
+                                "tool needs no easing")
+    assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "the setup's own" in told[1].remedy
