@@ -88,8 +88,8 @@ class Stock(WireModel):
     """The blank the job starts from."""
 
     kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
-        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm, for "
-                    "programs that are verified, not for plans yet; step is not built yet.")
+        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step is "
+                    "not built yet.")
         ] = "part_offset"
     margin_mm: Annotated[Number, Field(ge=0, le=1000, description="How far the blank stands off the part, mm.")] = 1.0
     uncertainty_mm: Annotated[Number, Field(ge=0, le=100, description="How far the real blank may stand beyond the "

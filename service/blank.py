@@ -13,6 +13,7 @@ from geometry.errors import SetupError
 from geometry.part import Part
 from schemas.setup import Setup
 from service.convert import face_numbers
+from service.stock import Blank
 from zones.machinable import SEEN, SEEN_SHARE
 
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
@@ -20,8 +21,10 @@ AWAY = 1e-6  # of a unit normal: what looks along a side does not look at it
 FULL = 1e-6  # share of a box that must be free of the part to be called stock
 
 
-def check_against_part(setup: Setup, part: Part) -> None:
+def check_against_part(setup: Setup, part: Part, blank: Blank) -> None:
     """Refuse a blank that does not hold the part and what is to stay on it, and a fixture that stands inside it.
+
+    part, blank : in the setup frame
 
     Raises
     ------
@@ -29,7 +32,7 @@ def check_against_part(setup: Setup, part: Part) -> None:
         Code 'stock_misses_part', 'allowance_beyond_stock', 'no_stock' or 'fixture_in_part'.
     """
     _check_box(setup, part)
-    _check_cylinder(setup, part)
+    _check_cylinder(setup, part, blank)
     _check_fixtures(setup, part)
 
 
@@ -53,43 +56,11 @@ def _check_box(setup: Setup, part: Part) -> None:
                          remedy="give a larger stock.box_mm, or a stock.margin_mm above 0")
 
 
-def stock_cylinder(setup: Setup, part: Part,
-                   rotation: np.ndarray) -> tuple[float, float, float, float, float] | None:
-    """x, y, bottom, radius, height of a cylinder blank as an access sees it, mm; None where the blank is none.
-
-    rotation : (3, 3) from the setup frame into that of the access. The uncertainty is in it on all sides.
-
-    Raises
-    ------
-    SetupError
-        Code 'cylinder_across_access': seen from there it lies, which the proof has no picture of.
-    """
-    stock = setup.stock
-    if stock.kind != "cylinder":
-        return None
-    if float(np.hypot(rotation[2, 0], rotation[2, 1])) > AWAY:
-        raise SetupError("the program comes along another axis than Z of the setup, and a cylinder blank stands along "
-                         "that", code="cylinder_across_access", subjects=("stock.kind", "access"),
-                         measured=[round(float(v), 6) for v in rotation[2]], limit=[0.0, 0.0, 1.0],
-                         remedy="give the box round the cylinder as stock.box_mm, or turn the setup so that the "
-                                "cylinder stands along the access")
-    lower, upper = part.bounds
-    if (given := stock.cylinder_mm) is not None:
-        centre, low, high, radius = np.array([given.x, given.y]), given.bottom, given.bottom + given.height, \
-            0.5 * given.diameter
-    else:
-        centre, low, high = 0.5 * (lower + upper)[:2], float(lower[2]), float(upper[2]) + stock.margin_mm
-        radius = 0.5 * float(np.hypot(*(upper - lower)[:2])) + stock.margin_mm
-    ends = np.array([[*centre, low - stock.uncertainty_mm], [*centre, high + stock.uncertainty_mm]]) @ rotation.T
-    bottom, top = sorted(ends[:, 2].tolist())
-    return float(ends[0, 0]), float(ends[0, 1]), bottom, radius + stock.uncertainty_mm, top - bottom
-
-
-def _check_cylinder(setup: Setup, part: Part) -> None:
+def _check_cylinder(setup: Setup, part: Part, blank: Blank) -> None:
     """Refuse a cylinder that the part stands out of, or that it fills."""
-    given, blank = setup.stock.cylinder_mm, stock_cylinder(setup, part, np.eye(3))
-    if blank is not None:
-        volume = float(np.pi * blank[3] ** 2 * blank[4])
+    given = setup.stock.cylinder_mm
+    if blank.bar is not None:
+        volume = blank.bar.grown(blank.uncertainty).volume
         if volume - part.volume <= FULL * volume:
             raise SetupError("nothing stands on the part that could be cut: the part fills its cylinder blank",
                              code="no_stock", subjects=("stock",), measured=max(volume - part.volume, 0.0), limit=0.0,

@@ -25,7 +25,6 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
-from service.blank import stock_cylinder
 from service.cautions import bent, limited, sentences
 from service.convert import (
     check_plannable,
@@ -36,7 +35,7 @@ from service.convert import (
 )
 from service.delivery import Files, deliver, json_bytes
 from service.materials import STEP_DOWN, bending, cutting_data, rates_of
-from service.prepare import Prepared, prepare, stock_box, table_height
+from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
 from service.programs import (
     access_of,
@@ -44,7 +43,6 @@ from service.programs import (
     gauge_lengths,
     programs_of,
     proof_frame,
-    stock_corners,
     turning_of,
 )
 from service.scoring import score
@@ -281,14 +279,8 @@ def cut_table(setup: Setup) -> dict[str, CutData]:
 
 def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
-    stock = ready.setup.stock
-    lo, hi = stock_corners(ready, view)
-    step = max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
-    box = stock_box(ready.setup, ready.part)
-    if box is not None:
-        grown = np.array([box[0] - stock.uncertainty_mm, box[1] + stock.uncertainty_mm])
-        return StockMap.block(view.tree, grown, view.rotation, step)
-    return StockMap.around(view.tree, view.part.bounds, stock.margin_mm + stock.uncertainty_mm, step)
+    lo, hi = ready.blank.corners(view.rotation)
+    return ready.blank.planned(view, max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS))))
 
 
 def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
@@ -313,12 +305,10 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
     # its height is one of the setup frame: a program read in the frame of an oblique access is not held against it
     tabled = (s.machine.kind == "5-axis" and np.array_equal(view.rotation, np.eye(3))
               and not (foreign and s.machine.table_z_mm is None))
-    box = stock_corners(ready, view) if s.stock.kind == "box" else None
-    if box is not None:
-        box = np.array([box[0] - s.stock.uncertainty_mm, box[1] + s.stock.uncertainty_mm])
+    cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
     return ProofSetup(
-        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm, stock_box=box,
-        stock_cylinder=stock_cylinder(s, ready.part, view.rotation),
+        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm,
+        stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
         fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
@@ -332,7 +322,7 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
                      for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
-        table=table_height(s, ready.part) if tabled else None,
+        table=table_height(s, ready.blank) if tabled else None,
         table_known=s.machine.table_z_mm is not None,
         kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
         rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))

@@ -91,20 +91,14 @@ def check_blank(setup: Setup) -> None:
 
 
 def check_plannable(setup: Setup) -> None:
-    """Refuse a blank that plans are not built for, and accesses the machine cannot turn to.
+    """Refuse accesses the machine cannot turn to.
 
     Raises
     ------
     SetupError
-        Code 'cylinder_not_planned', 'dogleg_rapids', 'no_gauge_length', 'no_rotary_zero',
+        Code 'dogleg_rapids', 'no_gauge_length', 'no_rotary_zero',
         'access_out_of_reach', 'access_from_below', 'two_clampings'; as ``rotary_machine``.
     """
-    if setup.stock.kind == "cylinder":
-        raise SetupError("plans start from a box or from the part grown by a margin so far; of a cylinder only "
-                         "finished programs can be verified", code="cylinder_not_planned", subjects=("stock.kind",),
-                         measured=setup.stock.kind, limit=["part_offset", "box"],
-                         remedy="give stock.kind 'box' with the box round the cylinder, or verify a program: zonemill "
-                                "verify, POST /v1/verifications")
     machine = rotary_machine(setup.machine)
     if machine is not None:
         _check_turning(setup, machine)

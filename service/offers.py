@@ -117,7 +117,7 @@ def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np
     standing = next(iter(view.fields.values())).standing
     out = {}
     for o in found:
-        limit = tip_field(ready.setup, ready.part, view.rotation, standing, view.part.bounds, o.body)
+        limit = tip_field(ready.setup, ready.blank, view.rotation, standing, view.part.bounds, o.body)
         few = touchable(limit, s.points[rows], s.normals[rows], ready.lift)
         reach = Reach(np.zeros(len(s), np.bool_), np.zeros(len(s), np.bool_), np.zeros((len(s), 3)))
         reach.by_cutter[rows], reach.by_tool[rows], reach.tips[rows] = few

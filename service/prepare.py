@@ -22,6 +22,7 @@ from geometry.trim import FacePatch
 from schemas.setup import Access, Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, rotary_machine, tool_bodies
+from service.stock import Blank, blank_of
 from zones.approach import directions_over_hemisphere
 from zones.categories import Categories
 from zones.decompose import decompose
@@ -56,6 +57,7 @@ class Prepared:
     """A part with everything known before the first pass is laid.
 
     part          : Part in the setup frame
+    blank         : Blank, the stock before the first cut
     accesses      : of the setup, and after them those that were found on a machine with rotary axes
     views         : one per access, each in its own frame
     decomposition : in the frame of the first view, as the samples
@@ -67,6 +69,7 @@ class Prepared:
 
     setup: Setup
     part: Part
+    blank: Blank
     accesses: tuple[Access, ...]
     views: tuple[View, ...]
     decomposition: Decomposition
@@ -118,26 +121,23 @@ def placement_of(setup: Setup) -> Placement:
     return Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
 
 
-def table_height(setup: Setup, part: Part) -> float:
+def table_height(setup: Setup, blank: Blank) -> float:
     """mm, setup frame: what a leaning tool stays above: the table, where that is not known the bottom of the blank."""
-    if setup.machine.table_z_mm is not None:
-        return setup.machine.table_z_mm
-    box = stock_box(setup, part)
-    return float(part.bounds[0, 2] if box is None else box[0, 2])
+    return blank.seat if setup.machine.table_z_mm is None else setup.machine.table_z_mm
 
 
-def obstacle_mesh(part: Part, setup: Setup, *, leaning: bool = False) -> TriangleMesh:
+def obstacle_mesh(part: Part, setup: Setup, *, table: float | None = None) -> TriangleMesh:
     """The part and the fixture boxes, these grown by the rapid clearance, as one mesh.
 
-    leaning : the tool leans, so that the table is in its way as well
+    table : mm, setup frame, its height where the tool leans, so that it is in its way as well
     """
     vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
     n = len(part.mesh.vertices)
     boxes = [np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures]
-    if leaning:
-        top, middle = table_height(setup, part), part.bounds.mean(axis=0)
-        boxes.append(np.array([[middle[0] - TABLE, middle[1] - TABLE, top - TABLE],
-                               [middle[0] + TABLE, middle[1] + TABLE, top + TABLE_SPARE]]))
+    if table is not None:
+        middle = part.bounds.mean(axis=0)
+        boxes.append(np.array([[middle[0] - TABLE, middle[1] - TABLE, table - TABLE],
+                               [middle[0] + TABLE, middle[1] + TABLE, table + TABLE_SPARE]]))
     for box in boxes:
         lo, hi = box[0] - setup.clearance_mm.rapid, box[1] + setup.clearance_mm.rapid
         v, f = _box(lo, hi)
@@ -154,33 +154,17 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
 
 
-def _room(body: ToolBody, bounds: F64, stock: F64 | None, setup: Setup) -> float:
-    """How far round the part a tool is planned, mm; beside a block it has to get round what stands there.
+def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
+    """How far round the part a tool is planned, mm; beside a large blank it has to get round what stands there.
 
-    bounds : (2, 3) float64 of the part; stock : (2, 3) float64 of a box blank or None; both in the access frame
+    bounds : (2, 3) float64, mm, of the part in the access frame, into which rotation (3, 3) leads
     """
     beside = 0.0
-    if stock is not None:
+    if blank.stands_alone:
+        stock = blank.corners(rotation)
         spare = float(np.max([bounds[0, :2] - stock[0, :2], stock[1, :2] - bounds[1, :2]]))
-        beside = min(spare + setup.stock.uncertainty_mm + body.radius, MOST_ROOM)
+        beside = min(spare + blank.uncertainty + body.radius, MOST_ROOM)
     return body.radius + max(AIR, beside)
-
-
-def stock_box(setup: Setup, part: Part) -> F64 | None:
-    """(2, 3) corners of a box blank, mm, setup frame, uncertainty left out; None where the blank is no box."""
-    if setup.stock.kind != "box":
-        return None
-    if setup.stock.box_mm is not None:
-        return np.array(setup.stock.box_mm, dtype=np.float64)
-    grown = np.array([part.bounds[0] - setup.stock.margin_mm, part.bounds[1] + setup.stock.margin_mm])
-    grown[0, 2] = part.bounds[0, 2]
-    return grown
-
-
-def turned_box(box: F64, rotation: F64) -> F64:
-    """(2, 3) float64, mm: the smallest box along the turned axes that holds a box (2, 3); rotation (3, 3)."""
-    corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
-    return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True) -> Prepared:
@@ -195,7 +179,8 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     """
     progress("read", 0.0)
     part = load(path, setup)
-    check_against_part(setup, part)
+    blank = blank_of(setup, part)
+    check_against_part(setup, part, blank)
     progress("zones", 0.12)
     accesses = list(setup.access)
     rotations = [access_rotation(a.direction) for a in accesses]
@@ -209,7 +194,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
 
     def look(access: Access) -> None:
         rotation = access_rotation(access.direction)
-        views.append(_view(setup, access.id, part, rotation, rotations[0], samples, decomposition, channels))
+        views.append(_view(setup, access.id, part, blank, rotation, rotations[0], samples, decomposition, channels))
 
     def zoned(known: Sequence[Mapping[str, Reach]] = ()) -> Zoning:
         return build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels), known)
@@ -219,7 +204,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
         progress("zones", 0.14 + 0.08 * (k + 1) / len(accesses))
     zoning = zoned()
     progress("zones", 0.24)
-    for access in _further(setup, part, views, zoning, lift) if search else ():
+    for access in _further(setup, part, blank, views, zoning, lift) if search else ():
         accesses.append(access)
         look(access)
         progress("zones", 0.25)
@@ -227,7 +212,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
     warnings = (*part.warnings, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
-    return Prepared(setup, part, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
+    return Prepared(setup, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
 
 
 def _seen_from(setup: Setup, rotations: list[F64], search: bool) -> F64:
@@ -240,7 +225,7 @@ def _seen_from(setup: Setup, rotations: list[F64], search: bool) -> F64:
     return np.vstack([given, axes[machine.stands(axes)]])
 
 
-def _further(setup: Setup, part: Part, views: list[View], zoning: Zoning, lift: float) -> list[Access]:
+def _further(setup: Setup, part: Part, blank: Blank, views: list[View], zoning: Zoning, lift: float) -> list[Access]:
     """Accesses a machine with rotary axes turns to beyond those of the setup, for what these leave."""
     machine = rotary_machine(setup.machine)
     if machine is None or setup.machine.orientations == "given":
@@ -248,8 +233,8 @@ def _further(setup: Setup, part: Part, views: list[View], zoning: Zoning, lift: 
     samples = views[0].samples
     turn = views[0].rotation
     here = turned_samples(samples, turn.T)
-    gatherer = Gatherer(TriangleTree(obstacle_mesh(part, setup, leaning=True)), tool_bodies(setup), clearances(setup),
-                        setup.quality.scallop_height_mm, lift, setup.quality.stock_allowance_mm)
+    gatherer = Gatherer(TriangleTree(obstacle_mesh(part, setup, table=table_height(setup, blank))), tool_bodies(setup),
+                        clearances(setup), setup.quality.scallop_height_mm, lift, setup.quality.stock_allowance_mm)
     worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
     known = np.array([v.direction for v in views])
     axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands, machine.even, known,
@@ -272,21 +257,20 @@ def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tupl
     return ()
 
 
-def tip_field(setup: Setup, part: Part, rotation: F64, standing: DiscHeights, bounds: F64,
+def tip_field(setup: Setup, blank: Blank, rotation: F64, standing: DiscHeights, bounds: F64,
               body: ToolBody) -> TipField:
     """Tip limits of a tool along an access, over the part, the room beside it and the blank.
 
-    part                  : Part in the setup frame
+    blank                 : Blank in the setup frame
     rotation              : (3, 3) from there into the access frame
     standing, bounds      : DiscHeights of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
     """
-    box = stock_box(setup, part)
-    box = None if box is None else turned_box(box, rotation)
-    return TipField(standing.tree, body, clearances(setup), bounds, _room(body, bounds, box, setup), lattice_step(body),
+    room = _room(body, bounds, blank, rotation)
+    return TipField(standing.tree, body, clearances(setup), bounds, room, lattice_step(body),
                     setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm, standing)
 
 
-def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, samples: SurfaceSamples,
+def _view(setup: Setup, name: str, part: Part, blank: Blank, rotation: F64, first: F64, samples: SurfaceSamples,
           decomposition: Decomposition, channels: ChannelPlan) -> View:
     """An access: the part turned into its frame, tip limits of all tools, regions of the samples."""
     is_first = rotation is first or np.array_equal(rotation, first)
@@ -297,9 +281,10 @@ def _view(setup: Setup, name: str, part: Part, rotation: F64, first: F64, sample
     if setup.fixtures or leaning:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
-        obstacles = TriangleTree(obstacle_mesh(part, setup, leaning=leaning).transformed(matrix))
+        table = table_height(setup, blank) if leaning else None
+        obstacles = TriangleTree(obstacle_mesh(part, setup, table=table).transformed(matrix))
     standing = DiscHeights(obstacles)
-    fields = {b.id: tip_field(setup, part, rotation, standing, here.bounds, b) for b in tool_bodies(setup)}
+    fields = {b.id: tip_field(setup, blank, rotation, standing, here.bounds, b) for b in tool_bodies(setup)}
     seen = turned_samples(samples, rotation @ first.T)
     regioner = Regioner(here, decomposition, channels, first=is_first)
     there = None if is_first else (samples.points, samples.normals)

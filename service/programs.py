@@ -17,8 +17,9 @@ from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import rotary_machine, tool_bodies
 from service.materials import rates_of
-from service.prepare import TABLE_SPARE, Prepared, stock_box, table_height, turned_box
+from service.prepare import TABLE_SPARE, Prepared, table_height
 from service.sides import Look, Program, Side
+from service.stock import turned_box
 from service.version import VERSION
 from toolpath.motion import Workingstep
 from toolpath.settings import Turning
@@ -27,17 +28,6 @@ from zones.view import View
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
-
-
-def stock_corners(ready: Prepared, view: View | Look) -> np.ndarray:
-    """(2, 3) corners of the nominal stock in the frame of a view, mm, uncertainty left out."""
-    box = stock_box(ready.setup, ready.part)
-    if box is not None:
-        return turned_box(box, view.rotation)
-    bounds, margin = ready.part.bounds, ready.setup.stock.margin_mm
-    grown = np.array([bounds[0] - margin, bounds[1] + margin])
-    grown[0, 2] = bounds[0, 2]
-    return turned_box(grown, view.rotation)
 
 
 def fixture_boxes(ready: Prepared, view: View | Look) -> tuple[np.ndarray, ...]:
@@ -93,7 +83,7 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
     spare = setup.stock.uncertainty_mm
-    boxes = [np.array(stock_corners(ready, look)) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
+    boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
     frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
@@ -103,7 +93,7 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
     lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
-                        table_height(setup, ready.part) + setup.clearance_mm.rapid)
+                        table_height(setup, ready.blank) + setup.clearance_mm.rapid)
     clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
     words = ("fixed tool axes, one after the other, each from what those before leave",)
     steps = tuple(t for s in sides for t in s.made.steps)
@@ -135,7 +125,7 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
                 least = np.maximum(least, gone / fastest)
         return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
 
-    table = table_height(setup, ready.part) + setup.clearance_mm.rapid + TABLE_SPARE
+    table = table_height(setup, ready.blank) + setup.clearance_mm.rapid + TABLE_SPARE
     return Turning(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
@@ -172,7 +162,7 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
     """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
     setup = ready.setup
     used = {s.tool.id for s in steps}
-    lo, hi = stock_corners(ready, look)
+    lo, hi = ready.blank.corners(look.rotation)
     return Workplan(setup.labels.get("order", "zonemill job"), steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
                     StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,

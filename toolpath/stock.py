@@ -27,6 +27,7 @@ SURE_RIM = 0.7  # lattice steps: half a cell diagonal
 POOLED = 12  # nodes a side of the squares whose highest stock is kept
 AIR_TOLERANCE = 0.01  # mm
 UPRIGHT = 1e-12  # of the normal of a face of a block
+LEANS = 1e-9  # of the axis of a bar: by less it stands, or lies
 ON_EDGE = 1e-9  # mm
 APART, MOST_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
@@ -55,14 +56,19 @@ class StockMap:
         self._ceilings: tuple[Ceilings, Ceilings] | None = None  # of stock, and of stock that is not part
 
     @classmethod
-    def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float) -> StockMap:
-        """Stock that stands ``offset`` mm off the part everywhere: the envelope of balls on its surface."""
+    def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float,
+               part: TriangleTree | None = None) -> StockMap:
+        """Stock that stands ``offset`` mm off a mesh everywhere: the envelope of balls on its surface.
+
+        tree, bounds : TriangleTree and (2, 3) float64, mm, of the part, or of a blank that holds it
+        part         : TriangleTree of the part where the mesh is another
+        """
         lat = Lattice.over(bounds, offset + 3 * step, step)
         r, half = max(offset, 1e-3), HALF_DIAGONAL * step
         # A ball dropped from above stands at the highest point of such balls; with a flat end as wide as the disc
         # round a cell it stands at the highest of the disc.
         top, cover = (drop_grid(tree, lat.x0, lat.y0, step, lat.nx, lat.ny, r + d, r) + r for d in (0.0, half))
-        return cls(lat, top, cover, _in_cells(tree, lat))
+        return cls(lat, top, cover, _in_cells(part or tree, lat))
 
     @classmethod
     def box(cls, tree: TriangleTree, lower: F64, upper: F64, step: float) -> StockMap:
@@ -98,6 +104,43 @@ class StockMap:
         near = ndimage.binary_dilation(stands, np.ones((3, 3)))
         cover = np.where(near, np.minimum(bound, corners[:, 2].max()), -np.inf)
         return cls(lat, np.where(stands, upper, -np.inf), cover, _in_cells(tree, lat))
+
+    @classmethod
+    def cylinder(cls, tree: TriangleTree, radius: float, ends: F64, step: float) -> StockMap:
+        """A round bar round the part, however it stands or lies.
+
+        radius : float, mm; ends : (2, 3) float64, mm, middles of its two flat ends, in the frame of the part
+
+        Exact at the nodes. No place of a cell is higher than ``cover``: of the wall and of the upper end that holds at
+        the corner of the cell where each is highest, and nothing stands in a cell whose rectangle along the bar misses
+        the bar's outline.
+        """
+        low, high = ends if ends[1][2] >= ends[0][2] else ends[::-1]
+        length = float(np.linalg.norm(high - low))
+        aside = float(np.hypot(*(high - low)[:2])) / length  # sine and cosine of how far it leans
+        up = float(high[2] - low[2]) / length
+        if aside < LEANS:
+            aside, up = 0.0, 1.0
+        bearing = (high - low)[:2] / (aside * length) if aside > 0.0 else np.array([1.0, 0.0])
+        spread = radius * np.sqrt(np.maximum(1.0 - ((high - low) / length) ** 2, 0.0))
+        lat = Lattice.over(np.array([np.minimum(low, high) - spread, np.maximum(low, high) + spread]), 3 * step, step)
+        x, y = np.meshgrid(lat.x0 + step * np.arange(lat.nx) - low[0], lat.y0 + step * np.arange(lat.ny) - low[1])
+        # in plan u runs along the bar and v square to it, from the middle of its lower end
+        u, v = bearing[0] * x + bearing[1] * y, bearing[0] * y - bearing[1] * x
+        arch = np.sqrt(np.maximum(radius * radius - v * v, 0.0))
+        far = up * arch  # how far the flat ends reach beyond their middles at v
+        held = np.clip(u, -far, aside * length + far)
+        stands = (np.abs(v) <= radius + ON_EDGE) & (np.abs(u - held) <= ON_EDGE)
+        wall, end = _wall(held, arch, aside, up), _upper_end(held, length, aside, up)
+        top = np.where(stands, low[2] + np.minimum(wall, end), -np.inf)
+        half = 0.5 * step * float(np.abs(bearing).sum())  # of a cell, along u and along v
+        near_v = np.maximum(np.abs(v) - half, 0.0)
+        arch = np.sqrt(np.maximum(radius * radius - near_v * near_v, 0.0))
+        far = up * arch
+        near = (near_v <= radius) & (u + half >= -far) & (u - half <= aside * length + far)
+        bound = np.minimum(_wall(u + half, arch, aside, up), _upper_end(u - half, length, aside, up))
+        cover = np.where(near, low[2] + np.minimum(bound, up * length + aside * radius), -np.inf)
+        return cls(lat, top, np.maximum(cover, top), _in_cells(tree, lat))
 
     def copied(self) -> StockMap:
         """The same stock, to be cut on its own."""
@@ -238,6 +281,16 @@ class StockMap:
     def highest(self) -> float:
         """Highest point of the stock, mm; -inf where there is none."""
         return float(self.cover.max()) if self.cover.size else float("-inf")
+
+
+def _wall(u: F64, arch: F64, aside: float, up: float) -> F64:
+    """Height of a leaning bar's wall over the middle of its lower end, mm, ``arch`` being sqrt(radius² - v²)."""
+    return np.asarray((up * u + arch) / aside) if aside > 0.0 else np.full(u.shape, np.inf)
+
+
+def _upper_end(u: F64, length: float, aside: float, up: float) -> F64:
+    """Height of the plane of a bar's upper end over the middle of its lower one, mm."""
+    return np.asarray((length - aside * u) / up) if up > LEANS else np.full(u.shape, np.inf)
 
 
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from geometry.mesh import F64
 from verify.model import ProofSetup, StockKind
+
+UPRIGHT = 1e-9  # of a unit axis: aside, or up, by so little does not count
 
 
 def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
@@ -14,22 +18,100 @@ def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
     if setup.stock_kind == StockKind.BOX and setup.stock_box is not None:
         return np.asarray(setup.stock_box, dtype=np.float64)
     if setup.stock_kind == StockKind.CYLINDER:
-        x, y, z, radius, height = blank_cylinder(bounds, setup)
-        return np.array([[x - radius, y - radius, z], [x + radius, y + radius, z + height]])
+        return blank_cylinder(bounds, setup).bounds
     lower = bounds[0] - grow
     if setup.stock_kind == StockKind.BOX:
         lower[2] = bounds[0, 2]
     return np.array([lower, bounds[1] + grow])
 
 
-def blank_cylinder(bounds: F64, setup: ProofSetup) -> tuple[float, float, float, float, float]:
-    """x, y, z_bottom, radius, height of a cylinder blank, mm; round the part, bounds (2, 3), without one."""
+def stands_over_air(setup: ProofSetup) -> bool:
+    """Whether a tool may go in under what stands of the blank before anything is cut."""
+    if setup.stock_kind == StockKind.CYLINDER:
+        return bool(np.hypot(*setup.stock_axis[:2]) > UPRIGHT)
+    return setup.stock_kind == StockKind.PART_OFFSET
+
+
+@dataclass(frozen=True, eq=False)
+class BlankCylinder:
+    """A cylinder blank, however it stands.
+
+    foot : (3,) float64, mm, middle of its lower end; axis : (3,) float64, unit, from there, Z not below 0
+    radius, height : mm
+
+    Notes
+    -----
+    A place p is inside where 0 <= t <= height and |q| <= radius, with t = (p - foot) a and q = p - foot - t a.
+    """
+
+    foot: F64
+    axis: F64
+    radius: float
+    height: float
+
+    @property
+    def upright(self) -> bool:
+        """Whether it stands along Z."""
+        return bool(np.hypot(self.axis[0], self.axis[1]) <= UPRIGHT)
+
+    @property
+    def bounds(self) -> F64:
+        """(2, 3) float64, mm: the smallest box along the axes that holds it."""
+        ends = np.array([self.foot, self.foot + self.height * self.axis])
+        aside = self.radius * np.sqrt(np.maximum(1.0 - self.axis**2, 0.0))
+        return np.array([ends.min(axis=0) - aside, ends.max(axis=0) + aside])
+
+    def tops(self, x: F64, y: F64) -> F64:
+        """Where vertical lines at x, y, two arrays of one shape, mm, leave it upwards: mm, -inf where they pass by."""
+        wx, wy = x - self.foot[0], y - self.foot[1]
+        if self.upright:
+            return np.where(np.hypot(wx, wy) <= self.radius, self.foot[2] + self.height, -np.inf)
+        ax, ay, az = self.axis.tolist()
+        along = wx * ax + wy * ay  # t at the height of the foot
+        aside2 = ax * ax + ay * ay  # |q|² = c + 2 b z + aside2 z²
+        b, c = -along * az, wx * wx + wy * wy - along * along
+        root = b * b - aside2 * (c - self.radius**2)
+        half = np.sqrt(np.maximum(root, 0.0)) / aside2
+        low, high = -b / aside2 - half, -b / aside2 + half
+        inside = root >= 0.0
+        if az > UPRIGHT:
+            low, high = np.maximum(low, -along / az), np.minimum(high, (self.height - along) / az)
+        else:
+            inside &= (along >= 0.0) & (along <= self.height)
+        return np.where(inside & (low <= high), self.foot[2] + high, -np.inf)
+
+    def depth(self, x: F64, y: F64, z: F64) -> F64:
+        """How far inside places lie, mm, arrays of one shape together; below 0 outside, no nearer than they are."""
+        wx, wy, wz = x - self.foot[0], y - self.foot[1], z - self.foot[2]
+        if self.upright:
+            return np.asarray(np.minimum(self.radius - np.hypot(wx, wy), np.minimum(wz, self.height - wz)))
+        ax, ay, az = self.axis.tolist()
+        along = wx * ax + wy * ay + wz * az
+        off = np.sqrt((wx - along * ax) ** 2 + (wy - along * ay) ** 2 + (wz - along * az) ** 2)
+        return np.asarray(np.minimum(self.radius - off, np.minimum(along, self.height - along)))
+
+    def way_out(self, points: F64, directions: F64) -> F64:
+        """(n,) float64, mm: how far it is from points (n, 3) inside, mm, out along unit directions (n, 3)."""
+        w = points - self.foot
+        along, slope = w @ self.axis, directions @ self.axis
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.where(slope > 0.0, (self.height - along) / slope, np.where(slope < 0.0, -along / slope, np.inf))
+        q, n = w - along[:, None] * self.axis, directions - slope[:, None] * self.axis
+        a, b, c = (n * n).sum(axis=1), (q * n).sum(axis=1), (q * q).sum(axis=1) - self.radius**2
+        side = np.where(a > 1e-12, (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / np.maximum(a, 1e-12), np.inf)
+        return np.asarray(np.minimum(ends, side))
+
+
+def blank_cylinder(bounds: F64, setup: ProofSetup) -> BlankCylinder:
+    """The cylinder blank of a setup; upright round a part with these bounds (2, 3), mm, where it names none."""
     if setup.stock_cylinder is not None:
-        return setup.stock_cylinder
+        x, y, z, radius, height = setup.stock_cylinder
+        return BlankCylinder(np.array([x, y, z]), np.array(setup.stock_axis), radius, height)
     grow = setup.margin + setup.uncertainty
     centre = 0.5 * (bounds[0] + bounds[1])
     radius = 0.5 * float(np.hypot(*(bounds[1, :2] - bounds[0, :2]))) + grow
-    return float(centre[0]), float(centre[1]), float(bounds[0, 2]), radius, float(bounds[1, 2] - bounds[0, 2]) + grow
+    return BlankCylinder(np.array([centre[0], centre[1], bounds[0, 2]]), np.array([0.0, 0.0, 1.0]), radius,
+                         float(bounds[1, 2] - bounds[0, 2]) + grow)
 
 
 def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, reach: float) -> F64:
@@ -41,14 +123,10 @@ def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, 
     """
     if setup.stock_kind == StockKind.PART_OFFSET:
         return np.full(len(points), min(setup.margin + setup.uncertainty, reach))
+    if setup.stock_kind == StockKind.CYLINDER:
+        return np.clip(blank_cylinder(bounds, setup).way_out(points, normals), 0.0, reach)
     box = stock_bounds(bounds, setup)
     with np.errstate(divide="ignore", invalid="ignore"):
         out = np.where(normals > 0, (box[1] - points) / normals, np.where(normals < 0, (box[0] - points) / normals,
                                                                         np.inf))
-    if setup.stock_kind == StockKind.CYLINDER:
-        x, y, _, radius, _ = blank_cylinder(bounds, setup)
-        w, n = points[:, :2] - (x, y), normals[:, :2]
-        a, b, c = (n * n).sum(1), (w * n).sum(1), (w * w).sum(1) - radius**2
-        side = np.where(a > 1e-12, (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / np.maximum(a, 1e-12), np.inf)
-        out = np.column_stack([side, out[:, 2]])
     return np.clip(out.min(axis=1), 0.0, reach)

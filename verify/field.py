@@ -96,11 +96,11 @@ def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetu
     for i in range(0, len(x), SLAB):
         s = slice(i, i + SLAB)
         if setup.stock_kind == StockKind.CYLINDER:
-            cx, cy, _, radius, _ = blank_cylinder(bounds, setup)
-            side = (radius - np.hypot(x[s, None] - cx, y[None, :] - cy))[:, :, None]
+            depth = blank_cylinder(bounds, setup).depth(x[s, None, None], y[None, :, None], z[None, None, :])
         else:
             side = np.minimum(np.minimum(x[s] - lower[0], upper[0] - x[s])[:, None, None], across)
-        values[s] = np.clip(np.minimum(side, high), -step, step)
+            depth = np.minimum(side, high)
+        values[s] = np.clip(depth, -step, step)
 
 
 def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
+from verify.blank import stands_over_air
 from verify.clash import fixture_points, run_clashes
 from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
 from verify.fitness import top_of_all
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
-from verify.model import ProofSetup, StockKind
+from verify.model import ProofSetup
 from verify.progress import Report, Stages
 from verify.removal import Moves
 from verify.stock import blank, run_bodies, run_stock
@@ -91,11 +92,11 @@ def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[Too
 def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:
     """Whether flutes went under stock or part that no body above them met, which lines of one height cannot follow.
 
-    Stock of a box or cylinder stands under itself until a feed move takes it from below.
+    Stock of a box or an upright cylinder stands under itself until a feed move takes it from below.
     """
     if run.under is None:
         return False
-    under = run.under if setup.stock_kind == StockKind.PART_OFFSET else run.under & moves.feed
+    under = run.under if stands_over_air(setup) else run.under & moves.feed
     met = run.events[(run.events[:, 2] > run.events[:, 3]) & np.isin(run.events[:, 1] % FIXTURE, (NECK, SHANK, HOLDER))]
     under[met[:, 0].astype(np.int64)] = False
     return bool(under.any())

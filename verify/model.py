@@ -40,7 +40,9 @@ class ProofSetup:
 
     stock_kind, margin, uncertainty : the part grown by margin + uncertainty, or a box or cylinder (axis Z)
                     round it by as much (not below the part)
-    stock_box     : (2, 3) float64 corners of a box blank, or None; stock_cylinder : (x, y, z_bottom, radius, height)
+    stock_box     : (2, 3) float64 corners of a box blank, or None
+    stock_cylinder, stock_axis : (x, y, z, radius, height) of a cylinder blank, or None, (x, y, z) the middle of its
+                    lower end; unit vector from there to the other end, not downwards
     fixtures      : boxes as (2, 3) float64 corners; each stands down to the table
     clearance_*   : radial; the part, its stock and fixtures nearer than this are rubbing, in a rapid a finding
     scallop_height, gouge_tolerance, stock_allowance : the budget -gouge <= residual - allowance <= scallop
@@ -68,6 +70,7 @@ class ProofSetup:
     uncertainty: float = 0.5
     stock_box: F64 | None = None
     stock_cylinder: tuple[float, float, float, float, float] | None = None
+    stock_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     fixtures: tuple[F64, ...] = ()
     clearance_neck: float = 0.05
     clearance_shank: float = 0.2

@@ -73,8 +73,8 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
     if setup.stock_kind == StockKind.BOX:
         height[np.ix_((x >= box[0, 0]) & (x <= box[1, 0]), (y >= box[0, 1]) & (y <= box[1, 1]))] = box[1, 2]
     elif setup.stock_kind == StockKind.CYLINDER:
-        cx, cy, _, radius, _ = blank_cylinder(mesh.bounds, setup)
-        height[np.hypot(x[:, None] - cx, y[None, :] - cy) <= radius] = box[1, 2]
+        tops = blank_cylinder(mesh.bounds, setup).tops(*np.meshgrid(x, y, indexing="ij"))
+        np.copyto(height, tops, where=np.isfinite(tops))
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
     _raise(height, origin, step, mesh, reach, threads, progress)
     return StockField(origin, step, height)

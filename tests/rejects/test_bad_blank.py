@@ -10,6 +10,7 @@ from geometry.mesh import TriangleMesh
 from service.blank import check_against_part
 from service.convert import parse_setup
 from service.errors import problem_document
+from service.stock import blank_of
 from tests.unit.test_boxes import block
 
 TOOLS = [{"id": "T1", "kind": "ball", "diameter_mm": 3}]
@@ -17,9 +18,13 @@ PART = SimpleNamespace(mesh=block([-10, -5, 0], [10, 5, 8]), bounds=np.array([[-
                        volume=20.0 * 10 * 8)
 
 
+def checked(setup, part):
+    check_against_part(setup, part, blank_of(setup, part))
+
+
 def refused(code, **fields):
     with pytest.raises(SetupError) as caught:
-        check_against_part(parse_setup({"tools": TOOLS, **fields}), PART)
+        checked(parse_setup({"tools": TOOLS, **fields}), PART)
     found = caught.value
     assert found.code == code, found.message
     assert found.remedy and found.subjects
@@ -29,7 +34,7 @@ def refused(code, **fields):
 
 
 def accepted(**fields):
-    check_against_part(parse_setup({"tools": TOOLS, **fields}), PART)
+    checked(parse_setup({"tools": TOOLS, **fields}), PART)
 
 
 @pytest.mark.parametrize(("corner", "axis", "side"), [
@@ -65,8 +70,7 @@ def test_no_stock():
 
 def test_a_box_at_finished_size_round_a_part_with_pockets_is_stock():
     pocketed = SimpleNamespace(mesh=PART.mesh, bounds=PART.bounds, volume=0.9 * PART.volume)
-    check_against_part(parse_setup({"tools": TOOLS, "stock": {"kind": "box", "margin_mm": 0, "uncertainty_mm": 0}}),
-                       pocketed)
+    checked(parse_setup({"tools": TOOLS, "stock": {"kind": "box", "margin_mm": 0, "uncertainty_mm": 0}}), pocketed)
 
 
 @pytest.mark.parametrize("allowance", [5.0, 1.5])
@@ -115,8 +119,8 @@ def test_only_what_is_to_be_machined_leaves_an_allowance():
                            volume=PART.volume)
 
     def check(side, **operations):
-        check_against_part(parse_setup({"tools": TOOLS, "stock": holding(side, 0.0), "operations": operations,
-                                        "quality": {"stock_allowance_mm": 1.0}}), part)
+        checked(parse_setup({"tools": TOOLS, "stock": holding(side, 0.0), "operations": operations,
+                             "quality": {"stock_allowance_mm": 1.0}}), part)
 
     check("+Z", faces=["F3", "F4"])
     check("+Z", exclude_faces=["F2"])
@@ -136,7 +140,7 @@ def test_an_allowance_is_measured_along_the_normal():
 
     def check(room):
         box = mesh.bounds + np.array([[-room, -room, 0], [room, room, 3.0]])
-        check_against_part(parse_setup({"tools": TOOLS, "quality": {"stock_allowance_mm": 1.0}, "stock": {
+        checked(parse_setup({"tools": TOOLS, "quality": {"stock_allowance_mm": 1.0}, "stock": {
             "kind": "box", "box_mm": box.tolist(), "uncertainty_mm": 0}}), part)
 
     check(0.9)  # 0.9 / cos 30 = 1.04

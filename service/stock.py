@@ -1,0 +1,152 @@
+"""The blank a setup describes, in the words of planner and proof.
+
+Shapes are those of the nominal blank unless it says otherwise; the real one may stand ``uncertainty`` beyond it on all
+sides. A blank grown from the part has no shape of its own: box and cylinder are None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.part import Part
+from schemas.setup import Setup
+from toolpath.stock import StockMap
+from zones.view import View
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A round bar along Z of the setup frame, mm: where its axis stands, its lower end, radius and height."""
+
+    x: float
+    y: float
+    bottom: float
+    radius: float
+    height: float
+
+    def grown(self, by: float) -> Bar:
+        """The bar with ``by`` mm more on all sides."""
+        return Bar(self.x, self.y, self.bottom - by, self.radius + by, self.height + 2.0 * by)
+
+    @property
+    def volume(self) -> float:
+        """mm³."""
+        return float(np.pi * self.radius**2 * self.height)
+
+    def ends(self, rotation: F64) -> F64:
+        """(2, 3) float64, mm: middles of lower and upper end in a frame that rotation (3, 3) leads to."""
+        return np.array([[self.x, self.y, self.bottom], [self.x, self.y, self.bottom + self.height]]) @ rotation.T
+
+
+@dataclass(frozen=True, eq=False)
+class Blank:
+    """The stock before the first cut, in the setup frame.
+
+    part        : (2, 3) float64, mm, bounds of the part
+    margin      : mm, how far a blank grown from the part stands off it
+    uncertainty : mm, how far the real blank may stand beyond the nominal one
+    box         : (2, 3) float64, mm, corners of a box blank, or None
+    bar         : of a cylinder blank, or None
+    """
+
+    part: F64
+    margin: float
+    uncertainty: float
+    box: F64 | None = None
+    bar: Bar | None = None
+
+    @property
+    def bounds(self) -> F64:
+        """(2, 3) float64, mm: the smallest box that holds the blank; one grown from the part ends at its underside."""
+        if self.box is not None:
+            return self.box
+        if self.bar is not None:
+            b = self.bar
+            return np.array([[b.x - b.radius, b.y - b.radius, b.bottom],
+                             [b.x + b.radius, b.y + b.radius, b.bottom + b.height]])
+        grown = np.array([self.part[0] - self.margin, self.part[1] + self.margin])
+        grown[0, 2] = self.part[0, 2]
+        return grown
+
+    @property
+    def seat(self) -> float:
+        """Height of what the blank stands on, mm: its lowest place."""
+        return float(self.bounds[0, 2])
+
+    @property
+    def stands_alone(self) -> bool:
+        """Whether the blank has a shape of its own, so that more than its margin may stand beside the part."""
+        return self.box is not None or self.bar is not None
+
+    def corners(self, rotation: F64) -> F64:
+        """(2, 3) float64, mm: a box that holds the blank in a frame that rotation (3, 3) leads to.
+
+        The smallest that holds the box, or the cylinder, or the box round the part and its margin.
+        """
+        if self.bar is None:
+            return turned_box(self.bounds, rotation)
+        ends = self.bar.ends(rotation)
+        aside = self.bar.radius * np.sqrt(np.maximum(1.0 - rotation[:, 2] ** 2, 0.0))
+        return np.array([ends.min(axis=0) - aside, ends.max(axis=0) + aside])
+
+    def planned(self, view: View, step: float) -> StockMap:
+        """The stock the planner of an access starts from: the largest there may be, at nodes ``step`` mm apart."""
+        u = self.uncertainty
+        if self.box is not None:
+            return StockMap.block(view.tree, np.array([self.box[0] - u, self.box[1] + u]), view.rotation, step)
+        if self.bar is not None:
+            bar = self.bar.grown(u)
+            return StockMap.cylinder(view.tree, bar.radius, bar.ends(view.rotation), step)
+        return StockMap.around(view.tree, view.part.bounds, self.margin + u, step)
+
+    def proof_box(self, rotation: F64) -> F64 | None:
+        """(2, 3) float64, mm: a box round the largest box blank in a frame that rotation (3, 3) leads to, or None."""
+        if self.box is None:
+            return None
+        box = turned_box(self.box, rotation)
+        return np.array([box[0] - self.uncertainty, box[1] + self.uncertainty])
+
+    def proof_cylinder(self, rotation: F64) -> tuple[tuple[float, float, float, float, float] | None,
+                                                     tuple[float, float, float]]:
+        """The largest cylinder blank in a frame that rotation (3, 3) leads to, and the way it stands there.
+
+        Returns x, y, z of the middle of its lower end, radius and height, mm, or None where the blank is no cylinder,
+        and the unit vector from that end to the other.
+        """
+        if self.bar is None:
+            return None, (0.0, 0.0, 1.0)
+        bar = self.bar.grown(self.uncertainty)
+        low, high = sorted(bar.ends(rotation).tolist(), key=lambda end: end[2])
+        ax, ay, az = (((np.array(high) - low) / bar.height).round(15) + 0.0).tolist()
+        return (low[0], low[1], low[2], bar.radius, bar.height), (ax, ay, az)
+
+
+def blank_of(setup: Setup, part: Part) -> Blank:
+    """The blank of a setup for a part in the setup frame."""
+    stock, bounds = setup.stock, part.bounds
+    blank = Blank(bounds, stock.margin_mm, stock.uncertainty_mm)
+    if stock.kind == "box":
+        box = np.array(stock.box_mm, dtype=np.float64) if stock.box_mm is not None else blank.bounds
+        return Blank(bounds, stock.margin_mm, stock.uncertainty_mm, box=box)
+    if stock.kind == "cylinder":
+        return Blank(bounds, stock.margin_mm, stock.uncertainty_mm, bar=_bar(setup, part))
+    return blank
+
+
+def _bar(setup: Setup, part: Part) -> Bar:
+    """The cylinder of a setup: as given, or round the part, its margin aside and on top."""
+    stock, (lower, upper) = setup.stock, part.bounds
+    if (given := stock.cylinder_mm) is not None:
+        return Bar(given.x, given.y, given.bottom, 0.5 * given.diameter, given.height)
+    x, y = (0.5 * (lower + upper)[:2]).tolist()
+    return Bar(x, y, float(lower[2]), 0.5 * float(np.hypot(*(upper - lower)[:2])) + stock.margin_mm,
+               float(upper[2]) + stock.margin_mm - float(lower[2]))
+
+
+def turned_box(box: F64, rotation: F64) -> F64:
+    """(2, 3) float64, mm: the smallest box along the turned axes that holds a box (2, 3); rotation (3, 3)."""
+    corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
