@@ -120,7 +120,8 @@ class Caution(ReportModel):
     """What a machinist is to be told although it is no finding."""
 
     kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows. "
-                                           "deflection: a tool bends too far at its full feed.")]
+                                           "deflection: a tool bends too far at its full feed. thin_wall: a wall "
+                                           "is high for its thickness; measured is height over thickness.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str
     measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None

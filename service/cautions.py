@@ -12,17 +12,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from schemas.setup import Setup
 from service.materials import cutting_data
+from service.prepare import Prepared
 from toolpath.deflection import Bend
 from toolpath.motion import Workingstep
+from zones.thinness import slender_walls
+
+MOST_RATIO = 10.0
+"""Height of a wall over its thickness, above which it is told of."""
 
 
 @dataclass(frozen=True)
 class Caution:
     """One of them.
 
-    kind      : 'limited' or 'deflection'
+    kind      : 'limited', 'thin_wall' or 'deflection'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -66,6 +73,21 @@ def limited(setup: Setup) -> list[Caution]:
     return out
 
 
+def thin_walls(ready: Prepared) -> list[Caution]:
+    """Walls to be cut that are more than ``MOST_RATIO`` times as high as thick, each once, where it is worst."""
+    view, cut = ready.views[0], set(np.unique(ready.samples.face).tolist())
+    walls = [w for w in ready.decomposition.walls if cut & set(w.faces)]
+    out = []
+    for s in slender_walls(view.part, view.tree, walls, MOST_RATIO):
+        x, y, z = view.back(np.array(s.at)).tolist()
+        message = (f"wall {s.wall} is {s.thickness:.2f} mm thick and {s.height:.2f} high near X{x:.2f} Y{y:.2f} "
+                   f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MOST_RATIO:g} to 1), so it gives way and swings")
+        out.append(Caution("thin_wall", (s.wall,), message, s.ratio, MOST_RATIO,
+                           "hold it or fill the room beside it, cut both its sides down in turn, or make it thicker",
+                           (x, y, z)))
+    return out
+
+
 def bent(steps: Sequence[Workingstep]) -> list[Caution]:
     """Tools that would bend too far, in layers and in finishing, each with the worst of its steps."""
     groups: dict[tuple[str, str], list[tuple[Workingstep, Bend]]] = {}
@@ -92,4 +114,4 @@ def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "sentences"]
+__all__ = ["Caution", "bent", "limited", "sentences", "thin_walls"]

@@ -25,7 +25,7 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
-from service.cautions import bent, limited, sentences
+from service.cautions import bent, limited, sentences, thin_walls
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -93,7 +93,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress)
-    cautions = limited(setup)
+    cautions = [*limited(setup), *thin_walls(ready)]
     ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     trimmed: Mapping[str, Sequence[Faces]] = {}
     if setup.operations.finishing:
@@ -207,6 +207,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
     """
     check_plannable(setup)
     ready = prepare(part_path, setup, progress)
+    ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *thin_walls(ready)])))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
     return out
