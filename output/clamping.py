@@ -90,8 +90,8 @@ def sections(plan: Workplan) -> list[Section]:
         raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
     walk, out, steps = _Walk(plan.clamping), [], plan.steps
     for k, step in enumerate(steps):
-        fresh = k == 0 or step.tool != steps[k - 1].tool
-        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool
+        fresh = k == 0 or step.tool != steps[k - 1].tool or step.fresh
+        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool or steps[k + 1].fresh
         grid_path(step)
         before = walk.enter(step, fresh)
         legs = walk.through(step)

@@ -100,7 +100,7 @@ class _Program:
         path = grid_path(step)
         start = path[0][1][0]
         self.lines.append("")
-        if step.tool != self.tool:
+        if step.tool != self.tool or step.fresh:
             self._change_tool(step)
         self.lines += _comment(_step_words(step))
         self._set_speed(step)
@@ -117,10 +117,14 @@ class _Program:
         if self.tool is not None:
             self._retract()
             self.lines += ["M5", "M9"]
-        self._put_in(step.tool)
+        self._put_in(step)
 
-    def _put_in(self, tool: ToolBody) -> None:
+    def _put_in(self, step: Workingstep) -> None:
+        """The tool of a step; for a fresh cutter it is put away first, as the control takes no tool that it has."""
+        tool = step.tool
         self.lines += _comment(tool_name(tool))
+        if step.fresh:
+            self.lines += ["T0 M6", *_comment(f"Fresh cutter in T{tool.number}: change it and set its length"), "M0"]
         self.lines += [f"T{tool.number} M6", f"G43 H{tool.number}"]
         self.tool, self.position, self.motion, self.feed, self.speed = tool, None, "", "", ""
 
@@ -202,7 +206,7 @@ class _Turning(_Program):
         if section.fresh:
             if self.tool is not None:
                 self.lines += ["M5", "M9"]
-            self._put_in(step.tool)
+            self._put_in(step)
         self.lines += _comment(_step_words(step))
         self._set_speed(step)
         if section.fresh:

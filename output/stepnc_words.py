@@ -48,7 +48,7 @@ def ways(plan: Workplan) -> list[Way]:
     clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
     for k, step in enumerate(plan.steps):
         path = tuple(Curve(*pair) for pair in grid_path(step))
-        fresh = k == 0 or plan.steps[k - 1].tool != step.tool
+        fresh = k == 0 or plan.steps[k - 1].tool != step.tool or step.fresh
         before: tuple[Curve, ...] = ()
         if not fresh:
             points = link(out[-1].path[-1].points[-1], path[0].points[0], clearance)

@@ -52,7 +52,10 @@ class ToolUse(ReportModel):
     """How a tool is used by the plan."""
 
     id: str
-    minutes_in_cut: float | None = None
+    minutes_in_cut: Annotated[float | None, Field(description="Of moves that take stock, as simulated.")] = None
+    metres_in_cut: Annotated[float | None, Field(description="Of its cutting passes, as planned.")] = None
+    life_min: float | None = None
+    cutters: Annotated[int | None, Field(description="How many of them the program asks for.")] = None
     slenderness: Annotated[float | None, Field(description="Neck length over neck diameter, of a tool without a neck "
                                                            "stickout over diameter.")] = None
     deflection_mm: Annotated[float | None, Field(
@@ -121,7 +124,8 @@ class Caution(ReportModel):
 
     kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows. "
                                            "deflection: a tool bends too far at its full feed. thin_wall: a wall "
-                                           "is high for its thickness; measured is height over thickness.")]
+                                           "is high for its thickness; measured is height over thickness. tool_life: a "
+                                           "tool takes more than one cutter, or more than one for a run.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str
     measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None

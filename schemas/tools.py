@@ -74,7 +74,9 @@ class Tool(WireModel):
     max_engagement_deg: Annotated[Number | None, Field(
         gt=0, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
                                   "deeper than a twentieth of its radius; 180 is a slot. null: not limited.")] = None
-    life_min: Annotated[Number | None, Field(gt=0, le=1e6, description="Life in cut, min; null: not given.")] = None
+    life_min: Annotated[Number | None, Field(
+        gt=0, le=1e6, description="Life in cut, min: plans ask for a fresh cutter before it ends, between two passes; "
+                                  "null: not counted.")] = None
     spindle_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Spindle speed, 1/min, of all its steps; null: from the material. No more than "
                                   "max_rpm and machine.max_rpm allow.")] = None

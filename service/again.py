@@ -24,7 +24,7 @@ from zones.zoning import ZoneArea
 PLANS = 3  # of a job at most
 MOST = 24  # findings: more are no wrong estimates
 MET = (FindingKind.COLLISION, FindingKind.RUBBING)
-STEP = re.compile(r"^\((S\d+)\b")
+STEP = re.compile(r"^\((S\d+[a-z]*)\b")
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
 from toolpath.deflection import Bend
+from toolpath.life import minutes_in_cut
 from toolpath.motion import Workingstep
 from zones.thinness import slender_walls
 
@@ -29,7 +30,7 @@ MOST_RATIO = 10.0
 class Caution:
     """One of them.
 
-    kind      : 'limited', 'thin_wall' or 'deflection'
+    kind      : 'limited', 'thin_wall', 'deflection' or 'tool_life'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -109,9 +110,31 @@ def bent(steps: Sequence[Workingstep]) -> list[Caution]:
     return out
 
 
+def lives_ended(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
+    """Tools that take more than one cutter, and steps that one cutter does not last for, in the order of the tools."""
+    out = []
+    for tool in setup.tools:
+        mine = [s for s in steps if s.tool.id == tool.id]
+        if tool.life_min is None or not mine:
+            continue
+        asked = [s.id for s in mine if s.fresh]
+        if asked:
+            total = float(sum(minutes_in_cut(s).sum() for s in mine))
+            message = (f"tool {tool.id} is in cut for {total:.1f} min and lasts for {tool.life_min:g}: the program "
+                       f"stops for a fresh cutter before {', '.join(asked)}")
+            out.append(Caution("tool_life", (tool.id, *asked), message, total, tool.life_min,
+                               f"have {len(asked) + 1} cutters at hand"))
+        for step, minutes in [(s.id, float(minutes_in_cut(s).sum())) for s in mine]:
+            if minutes > tool.life_min * (1.0 + 1e-9):
+                message = f"{step} keeps tool {tool.id} in cut for {minutes:.1f} min (limit {tool.life_min:g} min)"
+                out.append(Caution("tool_life", (tool.id, step), message, minutes, tool.life_min,
+                                   "the tool never goes up in it, so no cutter is changed; take one that lasts longer"))
+    return out
+
+
 def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
     """The sentences of cautions."""
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "sentences", "thin_walls"]
+__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls"]

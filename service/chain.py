@@ -25,7 +25,7 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
-from service.cautions import bent, limited, sentences, thin_walls
+from service.cautions import bent, limited, lives_ended, sentences, thin_walls
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -51,6 +51,7 @@ from service.sides import Look, Side, in_first_frame, in_setup_frame
 from service.trimmed import trimmed_faces
 from toolpath.deflection import effective_diameter
 from toolpath.family import Target
+from toolpath.life import with_fresh_cutters, worn
 from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
@@ -125,7 +126,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             break
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
-    late = bent(made.steps)
+    late = [*bent(made.steps), *lives_ended(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
@@ -192,6 +193,9 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     zones = [ready.zones[k] for k in mine]
     made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
                    lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
+    lives = {t.id: t.life_min for t in ready.setup.tools if t.life_min is not None}
+    used = worn(t for s in before for t in s.made.steps)
+    made = Plan(tuple(with_fresh_cutters(made.steps, lives, settings.clearance, used)), made.zones)
     if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
     return Side(view, made, settings.clearance, stock)

@@ -271,7 +271,8 @@ def _step(step: Workingstep) -> dict[str, Any]:
             "strategy": step.strategy, "faces": faces(step.faces), "spindle_rpm": r(step.spindle_rpm, 1),
             "feed_mm_min": r(step.feed, 1), "side_step_mm": r(step.side_step),
             "cutting_length_mm": r(cutting_length(step), 1), "machining_time_s": r(step.seconds, 1),
-            "points": int(sum(len(t.points) for t in step.trajectories)), **_bend(step.bend)}
+            "points": int(sum(len(t.points) for t in step.trajectories)), "fresh_cutter": step.fresh,
+            **_bend(step.bend)}
 
 
 def _bend(bend: Bend | None) -> dict[str, Any]:
@@ -283,13 +284,16 @@ def _bend(bend: Bend | None) -> dict[str, Any]:
 
 
 def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[dict[str, Any]]:
-    out = []
+    out, lives = [], {t.id: t.life_min for t in ready.setup.tools}
     for f in ready.views[0].fields.values():
         t = f.tool
-        bent = [s.bend.deflection for s in steps if s.tool.id == t.id and s.bend is not None]
+        mine = [s for s in steps if s.tool.id == t.id]
+        bent = [s.bend.deflection for s in mine if s.bend is not None]
         engaged = proof.engaged.get(t.number)
         slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
         out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),
+                    "metres_in_cut": r(0.001 * sum(map(cutting_length, mine)), 3),
+                    "life_min": lives[t.id], "cutters": sum(s.fresh for s in mine) + bool(mine),
                     "slenderness": r(slender, 2), "deflection_mm": r(max(bent), 5) if bent else None,
                     "engagement_deg": None if engaged is None else
                     {"max": r(math.degrees(engaged.most), 2), "p99": r(math.degrees(engaged.p99), 2)},

@@ -51,14 +51,19 @@ class Trajectory:
 
 def seconds_of(trajectories: Sequence[Trajectory], rates: Rates) -> float:
     """Seconds of trajectories run one behind the other; where rapids and feed moves meet the control stands still."""
+    return float(trajectory_seconds(trajectories, rates).sum())
+
+
+def trajectory_seconds(trajectories: Sequence[Trajectory], rates: Rates) -> F64:
+    """(k,) float64, s, of each of k trajectories run one behind the other; see ``seconds_of``."""
     if not trajectories:
-        return 0.0
+        return np.zeros(0)
     count = [len(t.points) - 1 for t in trajectories]
     rapid = np.repeat([t.motion is Motion.RAPID for t in trajectories], count)
     feed = np.where(rapid, rates.rapid, np.repeat([t.feed for t in trajectories], count))
     stop = np.concatenate([[False], rapid[1:] != rapid[:-1]])
     way = np.concatenate([np.diff(t.points, axis=0) for t in trajectories])
-    return float(move_seconds(way, feed, rates, stop).sum())
+    return np.add.reduceat(move_seconds(way, feed, rates, stop), np.cumsum([0, *count[:-1]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,7 @@ class Workingstep:
     access    : id of the access in whose frame all this is; '' where the plan has one frame
     rates     : what the machine does, for times
     bend      : what its cuts bend the tool by, as estimated; None where nobody knows
+    fresh     : the program asks for a fresh cutter before it
     """
 
     id: str
@@ -98,6 +104,7 @@ class Workingstep:
     access: str = ""
     rates: Rates = RATES
     bend: Bend | None = None
+    fresh: bool = False
 
     @property
     def seconds(self) -> float:

@@ -1,0 +1,114 @@
+"""How long tools are in cut, and steps parted where the life of a cutter ends.
+
+A feed move is taken to be in cut unless it is as fast as moves in air are, so that what is counted is never less than
+what the proof finds in stock. Minutes are those of ``geometry.timing``, speeding up and slowing down counted. A cutter
+is changed between two passes, where the tool is up at the clearance plane along Z, or between two steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath.motion import Motion, Trajectory, Workingstep, trajectory_seconds
+
+AT_PLANE = 1e-9  # mm
+AS_FAST = 1.0 + 1e-9
+
+
+def minutes_in_cut(step: Workingstep) -> NDArray[np.float64]:
+    """(k,) float64, min: what each trajectory of a step keeps the tool in cut at most."""
+    cuts = np.array([t.motion is not Motion.RAPID and t.feed <= step.feed * AS_FAST for t in step.trajectories])
+    return np.asarray(np.where(cuts, trajectory_seconds(step.trajectories, step.rates), 0.0) / 60.0)
+
+
+def worn(steps: Iterable[Workingstep]) -> dict[str, float]:
+    """Minutes in cut of the cutter that is in each tool after some steps, by tool id."""
+    out: dict[str, float] = {}
+    for s in steps:
+        out[s.tool.id] = (0.0 if s.fresh else out.get(s.tool.id, 0.0)) + float(minutes_in_cut(s).sum())
+    return out
+
+
+def with_fresh_cutters(steps: Sequence[Workingstep], lives: Mapping[str, float], clearance: float,
+                       used: Mapping[str, float] | None = None) -> list[Workingstep]:
+    """Steps with a fresh cutter asked for before the life of the last one ends.
+
+    lives     : min in cut, by tool id; tools it does not hold last for ever
+    clearance : mm, height at which rapids across are free
+    used      : min, what the cutters have been in cut before
+
+    Returns the steps, those that a change falls into in parts named S07, S07b, S07c and so on, each of them a step by
+    itself. A run that is longer than a life alone gets a cutter of its own.
+    """
+    spent, out = dict(used or {}), []
+    for step in steps:
+        life = lives.get(step.tool.id)
+        if life is None:
+            out.append(step)
+            continue
+        minutes, parts = minutes_in_cut(step), [0]
+        fresh, so_far = False, spent.get(step.tool.id, 0.0)
+        for first, end in _runs(step, clearance):
+            run = float(minutes[first:end].sum())
+            if so_far + run > life and so_far > 0.0:
+                so_far = 0.0
+                if first == 0:
+                    fresh = True
+                else:
+                    parts.append(first)
+            so_far += run
+        spent[step.tool.id] = so_far
+        out += _parted(step, parts, fresh, clearance)
+    return out
+
+
+def _runs(step: Workingstep, clearance: float) -> list[tuple[int, int]]:
+    """Trajectories from one place where the tool is up to the next, as first and end; only those with a cut."""
+    at = [0, *(k for k in range(1, len(step.trajectories)) if _is_up(step.trajectories, k, clearance)),
+          len(step.trajectories)]
+    cut = [any(t.motion is Motion.CUT for t in step.trajectories[a:b]) for a, b in zip(at[:-1], at[1:], strict=True)]
+    ends = [b for b, c in zip(at[1:], cut, strict=True) if c]
+    starts = [0, *ends[:-1]]
+    return list(zip(starts, [*starts[1:], len(step.trajectories)], strict=True))
+
+
+def _is_up(trajectories: Sequence[Trajectory], k: int, clearance: float) -> bool:
+    """Whether the tool stands upright at the clearance plane before trajectory k."""
+    before, after = trajectories[k - 1], trajectories[k]
+    return before.axes is None and after.axes is None and float(after.points[0, 2]) >= clearance - AT_PLANE
+
+
+def _parted(step: Workingstep, parts: Sequence[int], fresh: bool, clearance: float) -> list[Workingstep]:
+    """The parts of a step that begin at some of its trajectories; all but the first with a fresh cutter."""
+    out = []
+    for n, (first, end) in enumerate(zip(parts, [*parts[1:], len(step.trajectories)], strict=True)):
+        mine = step.trajectories[first:end]
+        if n:
+            while len(mine) > 1 and _is_across(mine[0], clearance):  # from where the cutter before has ended
+                mine = mine[1:]
+        name = step.id + _letters(n)
+        new = fresh or n > 0
+        words = name + step.name.removeprefix(step.id) if step.name.startswith(step.id) else step.name
+        out.append(replace(step, id=name, name=f"{words} fresh cutter" if new else words, trajectories=mine, fresh=new))
+    return out
+
+
+def _is_across(trajectory: Trajectory, clearance: float) -> bool:
+    """Whether a trajectory is a rapid at the clearance plane."""
+    return trajectory.motion is Motion.RAPID and bool((trajectory.points[:, 2] >= clearance - AT_PLANE).all())
+
+
+def _letters(n: int) -> str:
+    """'' for 0, then b to z, and bb, bc and so on."""
+    out = ""
+    while n > 0:
+        n, k = divmod(n - 1, 25)
+        out = chr(ord("b") + k) + out
+    return out
+
+
+__all__ = ["minutes_in_cut", "with_fresh_cutters", "worn"]
