@@ -38,9 +38,11 @@ class Job(ReportModel):
     progress: Annotated[float, Field(ge=0, le=1, description="Share done, 0 to 1; never goes back while an attempt "
                                                              "runs.")]
     attempt: Annotated[int, Field(ge=0, description="How often it was started.")]
-    content_sha256: Annotated[str, Field(description="Hash of part and canonical setup (and program).")]
+    content_sha256: Annotated[str, Field(description="Hash of part and canonical setup (and blank, program).")]
     part_sha256: Annotated[str, Field(description="Hash of the part's bytes.")]
     setup_sha256: Annotated[str, Field(description="Hash of the canonical setup.")]
+    stock_sha256: Annotated[str | None, Field(description="Hash of the bytes of the blank's file; null where it is "
+                                                          "none.")] = None
     labels: dict[str, str] = {}
     created_at: Annotated[str, Field(description="UTC, ISO 8601.", examples=["2026-01-31T12:00:00Z"])]
     finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while not final.")] = None

@@ -15,6 +15,7 @@ class Inputs(ReportModel):
 
     part_sha256: str
     setup_sha256: str
+    stock_sha256: Annotated[str | None, Field(description="Of the file of a step blank.")] = None
 
 
 class ScallopFacts(ReportModel):

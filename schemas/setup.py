@@ -88,8 +88,8 @@ class Stock(WireModel):
     """The blank the job starts from."""
 
     kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
-        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step is "
-                    "not built yet.")
+        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step: the "
+                    "solid of a STEP file, see step_file.")
         ] = "part_offset"
     margin_mm: Annotated[Number, Field(ge=0, le=1000, description="How far the blank stands off the part, mm.")] = 1.0
     uncertainty_mm: Annotated[Number, Field(ge=0, le=100, description="How far the real blank may stand beyond the "
@@ -100,11 +100,17 @@ class Stock(WireModel):
     cylinder_mm: Annotated[Cylinder | None, Field(
         description="A cylinder blank along Z of the setup frame, mm; null: round the part's bounding box, grown by "
                     "margin_mm aside and on top.")] = None
+    step_file: Annotated[str | None, Field(
+        min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$",
+        description="The STEP file of a step blank, one closed solid in the coordinates of the part's file. On the "
+                    "command line its path, from the folder of the setup; over HTTP the file is sent as part 'stock' "
+                    "of the request and this name is not looked at. Its bytes count in the content of a job, its name "
+                    "does not.")] = None
 
     @model_validator(mode="after")
     def _check(self) -> Stock:
-        if self.kind == "step":
-            raise ValueError("stock.kind 'step' is not built yet; use part_offset, box or cylinder")
+        if self.step_file is not None and self.kind != "step":
+            raise ValueError("stock.step_file belongs to stock.kind 'step'")
         if self.cylinder_mm is not None and self.kind != "cylinder":
             raise ValueError("stock.cylinder_mm belongs to stock.kind 'cylinder'")
         if self.box_mm is not None:
@@ -237,9 +243,10 @@ def _check_box(box: list[list[float]], name: str) -> None:
 def canonical_json(setup: Setup) -> bytes:
     """The setup as canonical JSON: all defaults filled in, keys sorted, no blanks, UTF-8.
 
-    Two setups that mean the same give the same bytes: 3 and 3.0 too, as every number field is one float.
+    Two setups that mean the same give the same bytes: 3 and 3.0 too, as every number field is one float. What the file
+    of a blank is called is left out.
     """
-    data = setup.model_dump(mode="json")
+    data = setup.model_dump(mode="json", exclude={"stock": {"step_file"}})
     return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
@@ -248,12 +255,15 @@ def setup_sha256(setup: Setup) -> str:
     return hashlib.sha256(canonical_json(setup)).hexdigest()
 
 
-def content_hash(part_bytes: bytes, setup: Setup) -> str:
+def content_hash(part_bytes: bytes, setup: Setup, stock_bytes: bytes | None = None) -> str:
     """What makes two jobs the same: SHA-256 over the hashes of the part's bytes and of the canonical setup, hex.
 
-    File name, media type and multipart boundary do not count.
+    The bytes of a blank's file count too where there is one. File name, media type and multipart boundary do not.
     """
-    return hashlib.sha256(f"{hashlib.sha256(part_bytes).hexdigest()}:{setup_sha256(setup)}".encode()).hexdigest()
+    text = f"{hashlib.sha256(part_bytes).hexdigest()}:{setup_sha256(setup)}"
+    if stock_bytes is not None:
+        text += f":stock {hashlib.sha256(stock_bytes).hexdigest()}"
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 __all__ = [

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from schemas.setup import Setup
     from service.shown import MeshWish
 
 
@@ -48,6 +49,32 @@ def make_folder(out: Path, *, verification: bool = False) -> None:
         raise InputError(f"the folder {out} cannot be written to: {error.strerror}", code="out_not_writable",
                          remedy="give another --out") from None
     (clear_verification if verification else clear_results)(out)
+
+
+def blank_file(setup_path: Path, setup: Setup) -> Path | None:
+    """The STEP file of a blank, named from the folder of the setup; None where the blank is none.
+
+    Raises
+    ------
+    SetupError
+        ``no_stock_file``: the setup does not name it.
+    StepError
+        The file cannot be read, or its text is no STEP file.
+    """
+    from geometry.errors import InputError
+    from geometry.step_text import check_text
+    from service.convert import no_stock_file, of_blank
+
+    if setup.stock.kind != "step":
+        return None
+    if setup.stock.step_file is None:
+        raise no_stock_file()
+    path = setup_path.parent / setup.stock.step_file
+    try:
+        check_text(path)
+    except InputError as error:
+        raise of_blank(error) from None
+    return path
 
 
 def read_program(path: Path) -> str:

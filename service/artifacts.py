@@ -76,9 +76,10 @@ def code_version() -> str:
 
 
 def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256: str | None = None,
-                 spindle_tool: int = 0) -> str:
-    """Name of a result: same code, kind, part, setup, program and tool in the spindle give the same key."""
-    text = "\n".join((code_version(), kind, part_sha256, setup_sha256, program_sha256 or "", str(spindle_tool)))
+                 spindle_tool: int = 0, stock_sha256: str | None = None) -> str:
+    """Name of a result: same code, kind, part, setup, program, tool in the spindle and blank give the same key."""
+    text = "\n".join((code_version(), kind, part_sha256, setup_sha256, program_sha256 or "", str(spindle_tool),
+                      stock_sha256 or ""))
     return hashlib.sha256(text.encode()).hexdigest()
 
 

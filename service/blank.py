@@ -9,8 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.boxes import point_of_mesh_in_box
+from geometry.bvh import TriangleTree
 from geometry.errors import SetupError
+from geometry.mesh import TriangleMesh
+from geometry.nearest import nearest
 from geometry.part import Part
+from geometry.rays import first_hits
+from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.convert import face_numbers
 from service.stock import Blank
@@ -19,6 +24,8 @@ from zones.machinable import SEEN, SEEN_SHARE
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
 AWAY = 1e-6  # of a unit normal: what looks along a side does not look at it
 FULL = 1e-6  # share of a box that must be free of the part to be called stock
+APART, MOST_PLACES = 0.5, 50_000  # mm between places of part and blank that are held against each other; and of each
+RAYS = np.array([[0.2672, 0.5345, 0.8018], [-0.7071, 0.1231, 0.6963], [0.4319, -0.8137, -0.3893]])
 
 
 def check_against_part(setup: Setup, part: Part, blank: Blank) -> None:
@@ -33,6 +40,7 @@ def check_against_part(setup: Setup, part: Part, blank: Blank) -> None:
     """
     _check_box(setup, part)
     _check_cylinder(setup, part, blank)
+    _check_solid(part, blank)
     _check_fixtures(setup, part)
 
 
@@ -78,6 +86,54 @@ def _check_cylinder(setup: Setup, part: Part, blank: Blank) -> None:
                          measured=round(float(out.max()), 6), limit=0.0,
                          remedy=f"in the setup frame the part reaches ({', '.join(f'{x:.3f}' for x in at + 0.0)}) mm; "
                                 "the cylinder must hold that, or placement.origin_mm be another")
+
+
+def _check_solid(part: Part, blank: Blank) -> None:
+    """Refuse a solid blank that the part stands out of, or that it fills.
+
+    Looked at are the corners of both meshes and places about ``APART`` mm apart on them: a part that stands out between
+    these is not seen here, and no harm is done, for the proof takes what is part for stock.
+    """
+    if blank.solid is None:
+        return
+    stands, shell = part.mesh, blank.solid.mesh
+    places = np.concatenate([stands.vertices, _spread(stands)])
+    off = _off(TriangleTree(shell), places, inside=False)
+    holes = np.concatenate([shell.vertices, _spread(shell)])
+    deep = _off(TriangleTree(stands), holes, inside=True)
+    far, at = max(((float(d.max(initial=0.0)), p[int(d.argmax())]) for d, p in ((off, places), (deep, holes))),
+                  key=lambda found: found[0])
+    if far > OVERHANG:
+        where = f"({', '.join(f'{x:.3f}' for x in at + 0.0)})"
+        raise SetupError(f"the part stands out of its blank by {far:.3f} mm at {where}", code="stock_misses_part",
+                         subjects=("stock.step_file", where), measured=round(far, 6), limit=0.0,
+                         remedy="the place is in the setup frame; both files are read in the same coordinates, that of "
+                                "the part: move the blank there, or give a larger one")
+    volume = blank.solid.volume + float(shell.areas.sum()) * blank.uncertainty
+    if volume - part.volume <= FULL * volume:
+        raise SetupError("nothing stands on the part that could be cut: the part fills its blank", code="no_stock",
+                         subjects=("stock.step_file",), measured=max(volume - part.volume, 0.0), limit=0.0,
+                         remedy="give the file of the blank, not that of the part, or its uncertainty_mm")
+
+
+def _spread(mesh: TriangleMesh) -> np.ndarray:
+    """(n, 3) mm: places all over a mesh, ``APART`` mm apart or more where that would be over ``MOST_PLACES``."""
+    return sample_surface(mesh, min(APART**-2, MOST_PLACES / float(mesh.areas.sum())), seed=0).points
+
+
+def _off(tree: TriangleTree, points: np.ndarray, *, inside: bool) -> np.ndarray:
+    """(n,) mm: how far from a closed mesh points (n, 3) are that lie in it, or that do not; 0 for the others.
+
+    A point is in it where two of three rays first meet a facet from behind.
+    """
+    behind = np.zeros(len(points), np.int64)
+    for ray in RAYS:
+        _, row = first_hits(tree, points, ray)
+        behind += (row >= 0) & (tree.mesh.normals[row] @ ray > 0.0)
+    wanted = np.flatnonzero((behind >= 2) == inside)
+    out = np.zeros(len(points))
+    out[wanted] = nearest(tree, points[wanted])[0]
+    return out
 
 
 def _check_contains(box: np.ndarray, part: Part) -> None:

@@ -73,11 +73,12 @@ FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and 
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
-         planner: Planner = plan_job) -> dict[str, Any]:
+         planner: Planner = plan_job, blank_path: Path | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
     mesh : also write the machined part as a mesh, in the frame of the proof (``service.programs.proof_frame``)
     planner : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
+    blank_path : STEP file of the blank where ``stock.kind`` is 'step'; what the setup calls it is not looked at
 
     Returns
     -------
@@ -93,7 +94,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
-    ready = prepare(part_path, setup, progress)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path)
     cautions = [*limited(setup), *thin_walls(ready)]
     ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     trimmed: Mapping[str, Sequence[Faces]] = {}
@@ -201,8 +202,10 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     return Side(view, made, settings.clearance, stock)
 
 
-def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, Any]:
+def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> dict[str, Any]:
     """The dry check: walls, connections, channels, zones with their tools, and what stays out of reach.
+
+    blank_path : as ``plan``
 
     Raises
     ------
@@ -210,7 +213,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
         As ``plan``.
     """
     check_plannable(setup)
-    ready = prepare(part_path, setup, progress)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path)
     ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *thin_walls(ready)])))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
@@ -219,7 +222,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress) -> dict[str, A
 
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
-                   spindle_tool: int = 0) -> dict[str, Any]:
+                   spindle_tool: int = 0, blank_path: Path | None = None) -> dict[str, Any]:
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
@@ -229,6 +232,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
 
     out  : folder for the deviation map, the mesh and the report; none is written where it is None
     mesh : the machined part is wanted too; it is written into ``out``
+    blank_path : as ``plan``
 
     Raises
     ------
@@ -241,7 +245,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         raise SetupError(f"the setup has no access {access}; it has {', '.join(known)}", code="no_such_access",
                          subjects=(access,), remedy="name one of them, or leave it out for the first")
     check_spindle_tool(setup, spindle_tool)
-    ready = prepare(part_path, setup, progress, search=False)
+    ready = prepare(part_path, setup, progress, search=False, blank_path=blank_path)
     view = ready.view(access or known[0])
     look = proof_frame(ready) if access is None else Look.of(view)
     dense = look.into(score(ready).samples, ready.views[0])
@@ -312,8 +316,9 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
               and not (foreign and s.machine.table_z_mm is None))
     cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
     return ProofSetup(
-        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=s.stock.uncertainty_mm,
+        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=ready.blank.beyond,
         stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
+        stock_mesh=ready.blank.proof_mesh(view.rotation),
         fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,

@@ -1,9 +1,9 @@
 # The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
 """``python -m service.child REQUEST.json FD``: run one job, send progress lines to the pipe FD.
 
-The request is {"kind", "part", "setup", "program", "spindle_tool", "out", "chain", "address_bytes"}. Lines on the pipe
-are JSON: {"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an
-error.
+The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "chain", "address_bytes"}. Lines on
+the pipe are JSON: {"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3
+with an error.
 """
 
 
@@ -54,15 +54,17 @@ def compute(request, progress):
     chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])
     setup = parse_setup(request["setup"])
+    blank = {"blank_path": Path(request["stock"])} if request.get("stock") else {}
     if request["kind"] == "plan":
-        result, name = chain.plan(part, setup, out, progress), "report.json"
+        result, name = chain.plan(part, setup, out, progress, **blank), "report.json"
         state = result["state"]
     elif request["kind"] == "zones":
-        result, name = chain.zones_only(part, setup, progress), "zones.json"
+        result, name = chain.zones_only(part, setup, progress, **blank), "zones.json"
         state = "done"
     else:
         text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
-        result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"])
+        result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"],
+                                      **blank)
         name = "report.json"
         state = "unproved" if result["findings"] else "proved"
     if not (out / name).exists():

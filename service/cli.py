@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.arguments import make_folder, mesh_wish, read_program
+from service.arguments import blank_file, make_folder, mesh_wish, read_program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,11 +41,11 @@ def plan(part: Part, setup: SetupPath,
          mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
     """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
 
-    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.chain import plan as plan_job
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
-        report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box))
+        report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box), blank_path=blank)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
     with _errors(as_json):
@@ -57,10 +57,10 @@ def plan(part: Part, setup: SetupPath,
 def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
-    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.chain import zones_only
 
-        return zones_only(part, given, progress), 0
+        return zones_only(part, given, progress, blank_path=blank), 0
 
     _exit(part, setup, run, as_json)
 
@@ -79,13 +79,13 @@ def verify(part: Part, setup: SetupPath,
            mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
     """Prove any program, also a foreign one; the report goes to stdout, what was found in short to stderr."""
 
-    def run(given: Setup, progress: Progress) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.chain import verify_program
         from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
         started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
-        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool)
+        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank)
         progress.close()
         say(verification_summary(result, time.monotonic() - started))
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
@@ -199,7 +199,8 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
                          remedy="take another seed, or fewer walls and connections") from None
 
 
-def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress], tuple[Any, int]], as_json: bool) -> None:
+def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None], tuple[Any, int]],
+          as_json: bool) -> None:
     """Run a command on part and setup, print its result and leave with its exit code."""
     with _errors(as_json):
         from geometry.step_text import check_text
@@ -208,9 +209,10 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress], tuple[Any, i
 
         given = read_setup(setup)
         check_text(part)
+        blank = blank_file(setup, given)
         progress = Progress()
         try:
-            result, code = run(given, progress)
+            result, code = run(given, progress, blank)
         finally:
             progress.close()
         print_json(result)

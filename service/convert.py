@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from geometry.errors import OutputError, SetupError
+from geometry.errors import CamError, OutputError, SetupError
 from geometry.toolbody import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine
 from schemas.machine import Machine
@@ -62,6 +62,21 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
+def of_blank(error: CamError) -> CamError:
+    """The same error about the file of a blank: of the class and the code that it has about that of a part."""
+    remedy = ("export the one body that is the blank to a file of its own" if error.code == "several_solids"
+              else error.remedy)
+    return type(error)(f"the blank: {error.message}", code=error.code, subjects=("stock.step_file", *error.subjects),
+                       measured=error.measured, limit=error.limit, remedy=remedy)
+
+
+def no_stock_file() -> SetupError:
+    """The blank of a setup is a STEP file, and nobody says which."""
+    return SetupError("the blank is a STEP file (stock.kind 'step') and none was given", code="no_stock_file",
+                      subjects=("stock.step_file",), remedy="name it in stock.step_file, from the folder of the setup; "
+                                                            "over HTTP send it as the part 'stock' of the form")
+
+
 def check_blank(setup: Setup) -> None:
     """Refuse a blank grown from the part that leaves nothing to cut, or less than is to stay on the part.
 
@@ -73,7 +88,7 @@ def check_blank(setup: Setup) -> None:
         Code 'no_stock' or 'allowance_beyond_stock'.
     """
     stock, allowance = setup.stock, setup.quality.stock_allowance_mm
-    if stock.box_mm is not None or stock.cylinder_mm is not None:
+    if stock.box_mm is not None or stock.cylinder_mm is not None or stock.kind == "step":
         return
     grown = stock.margin_mm + stock.uncertainty_mm
     offset = stock.kind == "part_offset"

@@ -22,6 +22,7 @@ jobs = sa.Table(
     Column("part_sha256", String(64), nullable=False),
     Column("setup_sha256", String(64), nullable=False),
     Column("program_sha256", String(64), nullable=True),
+    Column("stock_sha256", String(64), nullable=True),
     Column("spindle_tool", Integer, nullable=False, server_default="0"),
     Column("setup_json", Text, nullable=False),
     Column("labels_json", Text, nullable=False),

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry.bvh import TriangleTree
-from geometry.errors import SetupError
+from geometry.errors import CamError, SetupError
 from geometry.frames import Placement
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
@@ -21,7 +21,7 @@ from geometry.toolbody import ToolBody
 from geometry.trim import FacePatch
 from schemas.setup import Access, Setup
 from service.blank import check_against_part
-from service.convert import face_numbers, rotary_machine, tool_bodies
+from service.convert import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
 from service.stock import Blank, blank_of
 from zones.approach import directions_over_hemisphere
 from zones.categories import Categories
@@ -115,6 +115,20 @@ def load(path: Path, setup: Setup) -> Part:
     return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup))
 
 
+def load_blank(path: Path, setup: Setup) -> Part:
+    """The solid of a blank's STEP file in the setup frame, which is that of the part.
+
+    Raises
+    ------
+    CamError
+        As ``geometry.step.read_part``, of the same class and code; it says that the blank is meant.
+    """
+    try:
+        return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup))
+    except CamError as error:
+        raise of_blank(error) from None
+
+
 def placement_of(setup: Setup) -> Placement:
     """The setup frame in the coordinates of the file."""
     p = setup.placement
@@ -167,10 +181,12 @@ def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
     return body.radius + max(AIR, beside)
 
 
-def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True) -> Prepared:
+def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,
+            blank_path: Path | None = None) -> Prepared:
     """Read, decompose, measure reach, build zones.
 
     search : on a machine with rotary axes look for further tool axes; else the accesses of the setup are all
+    blank_path : STEP file of a blank of kind step
 
     Raises
     ------
@@ -178,8 +194,10 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
         The part or the setup is wrong, or the reader ran out of its limits.
     """
     progress("read", 0.0)
+    if setup.stock.kind == "step" and blank_path is None:
+        raise no_stock_file()
     part = load(path, setup)
-    blank = blank_of(setup, part)
+    blank = blank_of(setup, part, None if blank_path is None else load_blank(blank_path, setup))
     check_against_part(setup, part, blank)
     progress("zones", 0.12)
     accesses = list(setup.access)
@@ -211,7 +229,8 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     if len(views) > len(zoning.reach):
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
-    warnings = (*part.warnings, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
+    of_blank = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
+    warnings = (*part.warnings, *of_blank, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
     return Prepared(setup, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
 
 

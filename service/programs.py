@@ -82,7 +82,7 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     machine = rotary_machine(setup.machine)
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
-    spare = setup.stock.uncertainty_mm
+    spare = ready.blank.beyond
     boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
@@ -162,6 +162,8 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
     """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
     setup = ready.setup
     used = {s.tool.id for s in steps}
+    if ready.blank.solid is not None:
+        words = (*words, f"stock sha256 {ready.blank.solid.sha256}")
     lo, hi = ready.blank.corners(look.rotation)
     return Workplan(setup.labels.get("order", "zonemill job"), steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,

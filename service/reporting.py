@@ -194,7 +194,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     report = {
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
         "labels": dict(ready.setup.labels),
-        "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
+        "inputs": _inputs(ready),
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
         "proposal": offers.as_dict(ready.setup, offers.offers(ready)), "findings": findings,
@@ -315,6 +315,12 @@ def deviation(proof: Proof) -> list[dict[str, Any]]:
             for n, f in sorted(proof.faces.items())]
 
 
+def _inputs(ready: Prepared) -> dict[str, str]:
+    """Hashes of what went in; of the blank where it is a file."""
+    out = {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)}
+    return out if ready.blank.solid is None else {**out, "stock_sha256": ready.blank.solid.sha256}
+
+
 def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) -> dict[str, Any]:
     """The answer to ``zonemill verify``."""
     total = float(dense.area.sum())
@@ -326,7 +332,7 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
     findings = [*(f.as_dict() for f in proof.findings), *unmet]
     return {"state": "unproved" if findings else "proved", "findings": findings,
             "finding_counts": _counted(proof, unmet),
-            "inputs": {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)},
+            "inputs": _inputs(ready),
             "coverage": r(coverage, 6), "gouge_max_mm": r(proof.gouge_max, 5),
             "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
             "cutting_length_mm": r(proof.cutting_length, 1),

@@ -44,8 +44,9 @@ def job_resource(row: RowMapping) -> Job:
         error = Problem(**problem_document(error_from_dict(json.loads(row["error_json"])), path))
     return Job(id=row["id"], kind=kind, state=row["state"], stage=row["stage"], progress=row["progress"],
                attempt=row["attempt"], content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
-               setup_sha256=row["setup_sha256"], labels=json.loads(row["labels_json"]),
-               created_at=_time(row["created"]) or "", finished_at=_time(row["finished"]), error=error, links=links)
+               setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
+               labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
+               finished_at=_time(row["finished"]), error=error, links=links)
 
 
 def event_data(row: RowMapping) -> str:

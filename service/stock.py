@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.mesh import F64
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from schemas.setup import Setup
+from service.convert import no_stock_file
 from toolpath.stock import StockMap
-from zones.view import View
+from zones.view import View, turned
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class Blank:
     uncertainty : mm, how far the real blank may stand beyond the nominal one
     box         : (2, 3) float64, mm, corners of a box blank, or None
     bar         : of a cylinder blank, or None
+    solid       : Part, the blank that was read from a STEP file, or None
     """
 
     part: F64
@@ -57,6 +60,7 @@ class Blank:
     uncertainty: float
     box: F64 | None = None
     bar: Bar | None = None
+    solid: Part | None = None
 
     @property
     def bounds(self) -> F64:
@@ -67,6 +71,8 @@ class Blank:
             b = self.bar
             return np.array([[b.x - b.radius, b.y - b.radius, b.bottom],
                              [b.x + b.radius, b.y + b.radius, b.bottom + b.height]])
+        if self.solid is not None:
+            return self.solid.bounds
         grown = np.array([self.part[0] - self.margin, self.part[1] + self.margin])
         grown[0, 2] = self.part[0, 2]
         return grown
@@ -79,13 +85,20 @@ class Blank:
     @property
     def stands_alone(self) -> bool:
         """Whether the blank has a shape of its own, so that more than its margin may stand beside the part."""
-        return self.box is not None or self.bar is not None
+        return self.box is not None or self.bar is not None or self.solid is not None
+
+    @property
+    def beyond(self) -> float:
+        """How far the real blank may stand beyond the shapes here, mm: a mesh is off its solid as well."""
+        return self.uncertainty + (0.0 if self.solid is None else max(self.solid.chord, self.solid.deviation))
 
     def corners(self, rotation: F64) -> F64:
         """(2, 3) float64, mm: a box that holds the blank in a frame that rotation (3, 3) leads to.
 
-        The smallest that holds the box, or the cylinder, or the box round the part and its margin.
+        The smallest that holds the box, the cylinder or the solid, or the box round the part and its margin.
         """
+        if self.solid is not None:
+            return turned(self.solid, rotation).bounds
         if self.bar is None:
             return turned_box(self.bounds, rotation)
         ends = self.bar.ends(rotation)
@@ -100,6 +113,9 @@ class Blank:
         if self.bar is not None:
             bar = self.bar.grown(u)
             return StockMap.cylinder(view.tree, bar.radius, bar.ends(view.rotation), step)
+        if self.solid is not None:
+            mesh = turned(self.solid, view.rotation).mesh
+            return StockMap.around(TriangleTree(mesh), mesh.bounds, self.beyond, step, view.tree)
         return StockMap.around(view.tree, view.part.bounds, self.margin + u, step)
 
     def proof_box(self, rotation: F64) -> F64 | None:
@@ -124,9 +140,26 @@ class Blank:
         return (low[0], low[1], low[2], bar.radius, bar.height), (ax, ay, az)
 
 
-def blank_of(setup: Setup, part: Part) -> Blank:
-    """The blank of a setup for a part in the setup frame."""
+    def proof_mesh(self, rotation: F64) -> TriangleMesh | None:
+        """The mesh of a solid blank in a frame that rotation (3, 3) leads to; None where there is none."""
+        return None if self.solid is None else turned(self.solid, rotation).mesh
+
+
+def blank_of(setup: Setup, part: Part, solid: Part | None = None) -> Blank:
+    """The blank of a setup for a part in the setup frame.
+
+    solid : what was read from the file of a step blank, in the setup frame
+
+    Raises
+    ------
+    SetupError
+        Code 'no_stock_file': the blank is of kind step, and there is none.
+    """
     stock, bounds = setup.stock, part.bounds
+    if stock.kind == "step":
+        if solid is None:
+            raise no_stock_file()
+        return Blank(bounds, stock.margin_mm, stock.uncertainty_mm, solid=solid)
     blank = Blank(bounds, stock.margin_mm, stock.uncertainty_mm)
     if stock.kind == "box":
         box = np.array(stock.box_mm, dtype=np.float64) if stock.box_mm is not None else blank.bounds

@@ -35,6 +35,7 @@ class NewJob:
     program_sha256: str | None = None
     spindle_tool: int = 0
     idempotency_key: str | None = None
+    stock_sha256: str | None = None
 
 
 def new_id() -> str:
@@ -61,8 +62,9 @@ class JobStore:
         values = {
             "id": new_id(), "kind": new.kind, "principal": new.principal, "idempotency_key": new.idempotency_key,
             "content_sha256": new.content_sha256, "part_sha256": new.part_sha256, "setup_sha256": new.setup_sha256,
-            "program_sha256": new.program_sha256, "spindle_tool": new.spindle_tool, "setup_json": new.setup_json,
-            "labels_json": json.dumps(new.labels), "state": "queued", "stage": "queued", "progress": 0.0,
+            "program_sha256": new.program_sha256, "stock_sha256": new.stock_sha256,
+            "spindle_tool": new.spindle_tool, "setup_json": new.setup_json, "labels_json": json.dumps(new.labels),
+            "state": "queued", "stage": "queued", "progress": 0.0,
             "event_seq": 1, "attempt": 0, "created": time.time(),
         }
         try:

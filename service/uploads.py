@@ -15,7 +15,7 @@ from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_text import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.artifacts import Artifacts
-from service.convert import check_plannable, check_spindle_tool, parse_setup
+from service.convert import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
 from service.engine import Engine
 from service.errors import RequestError
 from service.store import NewJob
@@ -24,7 +24,7 @@ CHUNK = 1 << 20
 MAX_SETUP_BYTES = 4_000_000
 KEY_LIMIT = 255
 TOOL_DIGITS = 6
-SPINDLE_TOOL = "spindle_tool"
+SPINDLE_TOOL, STOCK = "spindle_tool", "stock"
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Form:
     setup: bytes
     program: UploadFile | None
     spindle_tool: int = 0
+    stock: UploadFile | None = None
 
 
 async def read_form(request: Request, *, with_program: bool) -> Form:
@@ -58,21 +59,23 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                            remedy="let the client write the multipart body: curl -F part=@PART.step -F "
                                   "'setup=@SETUP.json;type=application/json'") from None
     names = [name for name, _ in form.multi_items()]
-    optional = {SPINDLE_TOOL} if with_program else set()
+    optional = {STOCK, SPINDLE_TOOL} if with_program else {STOCK}
     for name in sorted(set(names) - wanted - optional):
         raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
-                           remedy=f"send {' and '.join(sorted(wanted))}, each once")
+                           remedy=f"send {' and '.join(sorted(wanted))}, each once; {STOCK} where the blank is a file")
     for name in sorted(wanted | (optional & set(names))):
         if (count := names.count(name)) != 1:
             raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
                                subjects=(name,), code="repeated_part" if count else "missing_part", measured=count,
                                limit=1, remedy=f"send {' and '.join(sorted(wanted))}, each once")
-    part, program = form["part"], form.get("program")
-    if not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile)):
-        raise RequestError("part and program must be sent as files, with a file name", code="not_a_file",
+    part, program, stock = form["part"], form.get("program"), form.get(STOCK)
+    if (not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile))
+            or (STOCK in names and not isinstance(stock, UploadFile))):
+        raise RequestError("part, program and stock must be sent as files, with a file name", code="not_a_file",
                            subjects=("part",), remedy="curl -F part=@PART.step")
     return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
-                _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0)
+                _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
+                stock if isinstance(stock, UploadFile) else None)
 
 
 def _tool_number(data: bytes) -> int:
@@ -110,11 +113,15 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     if kind != "verify":
         check_plannable(setup)
     check_spindle_tool(setup, form.spindle_tool)
+    if (setup.stock.kind == "step") != (form.stock is not None):
+        raise no_stock_file() if form.stock is None else _stock_not_asked(setup.stock.kind)
     part_sha = store_part(engine.artifacts, form.part.file)
+    stock_sha = _store_stock(engine.artifacts, form.stock.file) if form.stock else None
     program_sha = _store_program(engine.artifacts, form.program.file) if form.program else None
     setup_sha = setup_sha256(setup)
-    return NewJob(kind, principal, content_of(part_sha, setup_sha, program_sha, form.spindle_tool), part_sha, setup_sha,
-                  canonical_json(setup).decode(), _labels(setup), program_sha, form.spindle_tool, key)
+    content = content_of(part_sha, setup_sha, program_sha, form.spindle_tool, stock_sha)
+    return NewJob(kind, principal, content, part_sha, setup_sha, canonical_json(setup).decode(), _labels(setup),
+                  program_sha, form.spindle_tool, key, stock_sha)
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
@@ -134,6 +141,19 @@ def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
     return sha
 
 
+def _store_stock(artifacts: Artifacts, file: BinaryIO) -> str:
+    try:
+        return store_part(artifacts, file)
+    except InputError as error:
+        raise of_blank(error) from None
+
+
+def _stock_not_asked(kind: str) -> SetupError:
+    return SetupError(f"a file of the blank was sent, and the blank of the setup is of kind '{kind}'",
+                      code="stock_not_asked", subjects=(STOCK, "stock.kind"), measured=kind, limit="step",
+                      remedy="say stock.kind 'step' in the setup, or leave the part 'stock' out of the form")
+
+
 def _store_program(artifacts: Artifacts, file: BinaryIO) -> str:
     sha, size = artifacts.put_blob(_chunks(file))
     if size == 0:
@@ -149,9 +169,10 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
 
 
 def content_of(part_sha256: str, setup_sha: str, program_sha256: str | None = None,
-               spindle_tool: int = 0) -> str:
+               spindle_tool: int = 0, stock_sha256: str | None = None) -> str:
     """The content hash of ``schemas.setup.content_hash``, from hashes; a program and the tool before it count too."""
-    text = f"{part_sha256}:{setup_sha}" + (f":{program_sha256}" if program_sha256 else "")
+    text = f"{part_sha256}:{setup_sha}" + (f":stock {stock_sha256}" if stock_sha256 else "")
+    text += f":{program_sha256}" if program_sha256 else ""
     text += f":T{spindle_tool}" if spindle_tool else ""
     return hashlib.sha256(text.encode()).hexdigest()
 

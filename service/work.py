@@ -80,7 +80,7 @@ class _Attempt:
         """Final state and key of the result."""
         row = self.row
         key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
-                           row["spindle_tool"])
+                           row["spindle_tool"], row["stock_sha256"])
         if not self.artifacts.has_result(key):
             self._make(key)
         return (self.artifacts.result(key) / "state").read_text().strip(), key
@@ -96,10 +96,11 @@ class _Attempt:
 
     def _attempt(self, key: str) -> None:
         workspace = self.artifacts.workspace()
-        program = self.row["program_sha256"]
+        program, stock = self.row["program_sha256"], self.row["stock_sha256"]
         request = {
             "kind": self.row["kind"], "part": str(self.artifacts.blob(self.row["part_sha256"])),
             "setup": self.row["setup_json"], "program": str(self.artifacts.blob(program)) if program else None,
+            "stock": str(self.artifacts.blob(stock)) if stock else None,
             "spindle_tool": self.row["spindle_tool"], "out": str(workspace), "chain": self.config.chain,
         }
         try:

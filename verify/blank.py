@@ -1,4 +1,4 @@
-"""The blank before the first cut: its box, its cylinder, and what of it stands on normals of the part."""
+"""The blank before the first cut: its box, its cylinder, its mesh, and what of it stands on normals of the part."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.mesh import F64
+from geometry.bvh import TriangleTree
+from geometry.errors import VerificationError
+from geometry.mesh import F64, TriangleMesh
 from verify.model import ProofSetup, StockKind
+from verify.ways import way_out_of_mesh
 
 UPRIGHT = 1e-9  # of a unit axis: aside, or up, by so little does not count
 
@@ -19,6 +22,8 @@ def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
         return np.asarray(setup.stock_box, dtype=np.float64)
     if setup.stock_kind == StockKind.CYLINDER:
         return blank_cylinder(bounds, setup).bounds
+    if setup.stock_kind == StockKind.STEP:
+        return blank_mesh(setup).bounds + np.array([[-setup.uncertainty], [setup.uncertainty]])
     lower = bounds[0] - grow
     if setup.stock_kind == StockKind.BOX:
         lower[2] = bounds[0, 2]
@@ -29,7 +34,7 @@ def stands_over_air(setup: ProofSetup) -> bool:
     """Whether a tool may go in under what stands of the blank before anything is cut."""
     if setup.stock_kind == StockKind.CYLINDER:
         return bool(np.hypot(*setup.stock_axis[:2]) > UPRIGHT)
-    return setup.stock_kind == StockKind.PART_OFFSET
+    return setup.stock_kind in (StockKind.PART_OFFSET, StockKind.STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,17 +119,27 @@ def blank_cylinder(bounds: F64, setup: ProofSetup) -> BlankCylinder:
                          float(bounds[1, 2] - bounds[0, 2]) + grow)
 
 
+def blank_mesh(setup: ProofSetup) -> TriangleMesh:
+    """The mesh of a blank of kind step, mm (VerificationError, ``no_stock_mesh``, where the setup has none)."""
+    if setup.stock_mesh is None:
+        raise VerificationError("a blank of kind step has no mesh", code="no_stock_mesh", subjects=("stock_mesh",),
+                                remedy="give the surface of the blank as a closed mesh")
+    return setup.stock_mesh
+
+
 def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, reach: float) -> F64:
     """Stock on each outward normal before the first cut, not above ``reach``.
 
     points, normals : (n, 3) float64, mm and unit; bounds : (2, 3) of the part
 
-    Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the way out of the box or cylinder.
+    Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the way out of the box, cylinder or mesh.
     """
     if setup.stock_kind == StockKind.PART_OFFSET:
         return np.full(len(points), min(setup.margin + setup.uncertainty, reach))
     if setup.stock_kind == StockKind.CYLINDER:
         return np.clip(blank_cylinder(bounds, setup).way_out(points, normals), 0.0, reach)
+    if setup.stock_kind == StockKind.STEP:
+        return way_out_of_mesh(TriangleTree(blank_mesh(setup)), points, normals, setup.uncertainty, reach)
     box = stock_bounds(bounds, setup)
     with np.errstate(divide="ignore", invalid="ignore"):
         out = np.where(normals > 0, (box[1] - points) / normals, np.where(normals < 0, (box[0] - points) / normals,

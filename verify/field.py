@@ -18,7 +18,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.nearest import nearest
 from geometry.toolbody import ToolBody
-from verify.blank import blank_cylinder, stock_bounds
+from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
@@ -82,6 +82,8 @@ def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 
     values = np.empty(tuple(counts.tolist()), np.float32)
     if setup.stock_kind == StockKind.PART_OFFSET:
         _grown(values, origin, step, mesh, setup.margin + setup.uncertainty, threads, progress)
+    elif setup.stock_kind == StockKind.STEP:
+        _grown(values, origin, step, blank_mesh(setup), setup.uncertainty, threads, progress)
     else:
         _simple(values, origin, step, mesh.bounds, setup)
     return Field(origin, step, values)
@@ -105,7 +107,7 @@ def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetu
 
 def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
            progress: Progress | None) -> None:
-    """The part grown by ``reach`` all round: the surface of nodes near it is looked up, the rest is inside or not."""
+    """Part or blank grown by ``reach`` all round: the surface of nodes near it is looked up, others are in or not."""
     inside = np.zeros(values.shape, np.bool_)
     cuts = np.linspace(0, len(values), 4 * max(threads, 1) + 1).astype(int)
 

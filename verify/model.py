@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from geometry.mesh import F64, I32
+from geometry.mesh import F64, I32, TriangleMesh
 from geometry.sampling import SurfaceSamples
 from verify.kinematics import Kinematics
 
@@ -18,6 +18,7 @@ class StockKind(StrEnum):
     PART_OFFSET = "part_offset"
     BOX = "box"
     CYLINDER = "cylinder"
+    STEP = "step"
 
 
 class FindingKind(StrEnum):
@@ -39,10 +40,11 @@ class ProofSetup:
     """Stock, surroundings and tolerances of a proof.
 
     stock_kind, margin, uncertainty : the part grown by margin + uncertainty, or a box or cylinder (axis Z)
-                    round it by as much (not below the part)
+                    round it by as much (not below the part), or a mesh grown by the uncertainty alone
     stock_box     : (2, 3) float64 corners of a box blank, or None
     stock_cylinder, stock_axis : (x, y, z, radius, height) of a cylinder blank, or None, (x, y, z) the middle of its
                     lower end; unit vector from there to the other end, not downwards
+    stock_mesh    : TriangleMesh, closed, normals outwards, mm, of a blank of kind step, or None
     fixtures      : boxes as (2, 3) float64 corners; each stands down to the table
     clearance_*   : radial; the part, its stock and fixtures nearer than this are rubbing, in a rapid a finding
     scallop_height, gouge_tolerance, stock_allowance : the budget -gouge <= residual - allowance <= scallop
@@ -71,6 +73,7 @@ class ProofSetup:
     stock_box: F64 | None = None
     stock_cylinder: tuple[float, float, float, float, float] | None = None
     stock_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    stock_mesh: TriangleMesh | None = None
     fixtures: tuple[F64, ...] = ()
     clearance_neck: float = 0.05
     clearance_shank: float = 0.2

@@ -95,7 +95,7 @@ def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]
     if nc.turn is None:
         return replace(setup, work_offset=offset), part.mesh.bounds
     there = part.mesh.vertices @ nc.turn.T
-    own = replace(setup, work_offset=offset, stock_kind=StockKind.BOX, stock_cylinder=None,
+    own = replace(setup, work_offset=offset, stock_kind=StockKind.BOX, stock_cylinder=None, stock_mesh=None,
                   stock_box=_box_round(stock_bounds(part.mesh.bounds, setup), nc.turn),
                   fixtures=tuple(_box_round(f, nc.turn) for f in setup.fixtures))
     return own, np.stack([there.min(axis=0), there.max(axis=0)])

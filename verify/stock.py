@@ -29,12 +29,13 @@ import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
-from verify.blank import blank_cylinder, stock_bounds
+from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import UNDER, stock_tile
 from verify.model import ProofSetup, StockKind
+from verify.progress import Stages
 from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
 from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
 
@@ -59,7 +60,8 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
           progress: Progress | None = None) -> StockField:
     """The stock before the first cut, never below the part; lines are spacing mm apart, or wider to be six million.
 
-    Exact on every line: an offset blank is the union of spheres on the surface, by facets, edges and corners.
+    Exact on every line: an offset blank, or a mesh grown, is the union of spheres on the surface, by facets, edges and
+    corners.
     """
     box = stock_bounds(mesh.bounds, setup)
     corners = [box, mesh.bounds]
@@ -75,8 +77,11 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
     elif setup.stock_kind == StockKind.CYLINDER:
         tops = blank_cylinder(mesh.bounds, setup).tops(*np.meshgrid(x, y, indexing="ij"))
         np.copyto(height, tops, where=np.isfinite(tops))
+    stages = Stages(progress)
+    if setup.stock_kind == StockKind.STEP:
+        _raise(height, origin, step, blank_mesh(setup), setup.uncertainty, threads, stages.span(0.0, 0.5))
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
-    _raise(height, origin, step, mesh, reach, threads, progress)
+    _raise(height, origin, step, mesh, reach, threads, stages.span(0.5, 1.0))
     return StockField(origin, step, height)
 
 

@@ -48,6 +48,10 @@ def multipart(with_program: bool) -> dict[str, Any]:
         properties["program"] = {"type": "string", "format": "binary", "description": "The NC program."}
         encoding["program"] = {"contentType": "text/plain, application/octet-stream"}
     required = list(properties)
+    properties["stock"] = {
+        "type": "string", "format": "binary",
+        "description": "The STEP file of the blank; sent where the setup says stock.kind 'step', and only then."}
+    encoding["stock"] = {"contentType": "model/step, application/step, application/octet-stream"}
     if with_program:
         properties["spindle_tool"] = {
             "type": "integer", "minimum": 0, "maximum": 999999, "default": 0,

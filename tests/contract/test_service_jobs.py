@@ -193,3 +193,29 @@ def test_pages_do_not_shift_and_filter_by_state(make_client, post):
     assert [j["id"] for j in client.get("/v1/jobs?state=cancelled").json()["items"]] == [ids[0]]
     assert client.get("/v1/jobs?kind=zones").json()["items"] == []
     assert client.get("/v1/jobs?cursor=nonsense").json()["code"] == "bad_cursor"
+
+
+def test_the_file_of_a_blank_counts_by_its_bytes_and_reaches_the_chain(client, post, finish, setup_json):
+    setup, blank = setup_json(stock={"kind": "step", "step_file": "../../etc/blank.step"}), STEP + b"\n"
+    job = post(client, setup=setup, stock=blank, key="casting").json()
+    sha = hashlib.sha256(blank).hexdigest()
+    assert job["stock_sha256"] == sha
+    assert job["content_sha256"] == content_hash(STEP, parse_setup(setup), blank)
+    job = finish(client, job)
+    assert job["state"] == "proved"
+    assert client.get(job["links"]["report"]).json()["inputs"]["stock_sha256"] == sha
+    renamed = {**setup, "stock": {"kind": "step"}}
+    assert post(client, setup=renamed, stock=blank, key="casting").json()["id"] == job["id"]
+    other = post(client, setup=setup, stock=STEP, key="casting")
+    assert other.status_code == 422 and other.json()["code"] == "idempotency_key_reused"
+    plain = post(client, key="no casting").json()
+    assert plain["stock_sha256"] is None
+
+
+def test_a_blank_that_is_not_sent_or_not_asked_for_or_no_step_file(client, post, setup_json):
+    setup = setup_json(stock={"kind": "step", "step_file": "blank.step"})
+    for answer, code in ((post(client, setup=setup), "no_stock_file"), (post(client, stock=STEP), "stock_not_asked"),
+                         (post(client, setup=setup, stock=b"no STEP"), "not_step"),
+                         (post(client, setup=setup, stock=b""), "empty_file")):
+        assert answer.status_code == 422 and answer.json()["code"] == code, answer.json()
+        assert answer.json()["remedy"] and answer.json()["subjects"]

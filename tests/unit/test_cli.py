@@ -29,15 +29,15 @@ class FakeChain(types.ModuleType):
             raise self.answer
         return self.answer
 
-    def plan(self, part_path, setup, out, progress, mesh=None):
+    def plan(self, part_path, setup, out, progress, mesh=None, blank_path=None):
         self.mesh = mesh
         return self._say(progress)
 
-    def zones_only(self, part_path, setup, progress):
+    def zones_only(self, part_path, setup, progress, blank_path=None):
         return self._say(progress)
 
     def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
-                       spindle_tool=0):
+                       spindle_tool=0, blank_path=None):
         assert program_text.strip()
         self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
         return self._say(progress)

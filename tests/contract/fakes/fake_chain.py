@@ -1,6 +1,7 @@
 """A chain for tests of the service alone: what it does is said by the setup's label "do"."""
 
 import ctypes
+import hashlib
 import os
 import time
 
@@ -39,7 +40,7 @@ def _misbehave(what, progress):
         raise errors.PartError("the part has open shells", code="open_shell", subjects=("F3",))
 
 
-def plan(part_path, setup, out, progress):
+def plan(part_path, setup, out, progress, blank_path=None):
     what = setup.labels.get("do", "")
     _misbehave(what, progress)
     for k in range(3):
@@ -51,6 +52,8 @@ def plan(part_path, setup, out, progress):
     (out / "job.stpnc").write_text("ISO-10303-21;\n")
     (out / "deviation.png").write_bytes(b"\x89PNG of the fake")
     report = _report(setup, state, findings)
+    if blank_path is not None:
+        report["inputs"]["stock_sha256"] = hashlib.sha256(blank_path.read_bytes()).hexdigest()
     (out / "zones.json").write_text(__import__("json").dumps(
         {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}))
     return report
