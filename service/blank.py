@@ -19,6 +19,8 @@ from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.convert import face_numbers
 from service.stock import Blank
+from verify.blank import stock_on_normals
+from verify.model import ProofSetup
 from zones.machinable import SEEN, SEEN_SHARE
 
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
@@ -41,6 +43,7 @@ def check_against_part(setup: Setup, part: Part, blank: Blank) -> None:
     _check_box(setup, part)
     _check_cylinder(setup, part, blank)
     _check_solid(part, blank)
+    _check_room_for_allowance(setup, part, blank)
     _check_fixtures(setup, part)
 
 
@@ -114,6 +117,35 @@ def _check_solid(part: Part, blank: Blank) -> None:
         raise SetupError("nothing stands on the part that could be cut: the part fills its blank", code="no_stock",
                          subjects=("stock.step_file",), measured=max(volume - part.volume, 0.0), limit=0.0,
                          remedy="give the file of the blank, not that of the part, or its uncertainty_mm")
+
+
+def _check_room_for_allowance(setup: Setup, part: Part, blank: Blank) -> None:
+    """Refuse a cylinder or a solid that ends nearer to what is to be machined than the allowance, as a box is refused.
+
+    Looked at are the corners of the facets, along their normals. The underside does not count.
+    """
+    allowance = setup.quality.stock_allowance_mm
+    if allowance <= 0 or (blank.bar is None and blank.solid is None):
+        return
+    mesh = part.mesh
+    to_cut = np.isin(mesh.face_ids, _faces_to_cut(setup, part)) & (mesh.normals[:, 2] > SEEN)
+    points, normals = mesh.triangles[to_cut].reshape(-1, 3), np.repeat(mesh.normals[to_cut], 3, axis=0)
+    if not len(points):
+        return
+    cylinder, upwards = blank.proof_cylinder(np.eye(3))
+    stands = ProofSetup(stock_kind=setup.stock.kind, uncertainty=blank.beyond, stock_cylinder=cylinder,
+                        stock_axis=upwards, stock_mesh=blank.proof_mesh(np.eye(3)))
+    room = stock_on_normals(points, normals, part.bounds, stands, allowance)
+    at, least = int(room.argmin()), float(room.min())
+    if least >= allowance - min(OVERHANG, setup.quality.gouge_tolerance_mm):
+        return
+    where = f"({', '.join(f'{x:.3f}' for x in points[at] + 0.0)})"
+    raise SetupError(f"quality.stock_allowance_mm {allowance:g} is to stay on the part, but the blank with its "
+                     f"uncertainty_mm {setup.stock.uncertainty_mm:g} holds only {least:.3f} mm at {where}",
+                     code="allowance_beyond_stock", subjects=("quality.stock_allowance_mm", "stock", where),
+                     measured=round(least, 6), limit=allowance,
+                     remedy="leave less on the part, give a larger blank, or leave the faces there alone with "
+                            "operations.exclude_faces")
 
 
 def _spread(mesh: TriangleMesh) -> np.ndarray:

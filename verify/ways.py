@@ -24,10 +24,11 @@ def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: fl
 
     Notes
     -----
-    A place is inside the mesh where the first facet ahead is seen from behind. Inside, the way goes on to that facet;
-    outside, by as much as the nearest place of the mesh is nearer than ``beyond``, which never passes the surface
-    looked for (sphere tracing); within 1e-6 mm it is taken for reached. A line that grazes it for 200 steps gets
-    ``reach``: too much and never too little.
+    A place is inside the mesh where the first facet ahead is seen from behind. Inside, the way goes on to that facet
+    and as far as ``beyond`` it, for a ball round the place where it is met is part of what is grown; outside, by as
+    much as the nearest place of the mesh is nearer than ``beyond``, which never passes the surface looked for (sphere
+    tracing). Within 1e-6 mm it is taken for reached. A line that grazes it for 200 steps gets ``reach``: too much and
+    never too little.
     """
     out, normals = np.zeros(len(points)), tree.mesh.normals
     active = np.arange(len(points))
@@ -38,7 +39,7 @@ def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: fl
         ahead, row = first_hits(tree, at, way, t_min=CLOSE)
         inside = row >= 0
         inside[inside] = np.einsum("ij,ij->i", normals[row[inside]], way[inside]) > 0.0
-        further = np.where(inside, ahead, 0.0)
+        further = np.where(inside, ahead + beyond, 0.0)
         outside = np.flatnonzero(~inside)
         further[outside] = np.maximum(beyond - nearest(tree, at[outside], beyond + CLOSE)[0], 0.0)
         out[active] += further

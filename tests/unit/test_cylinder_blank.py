@@ -59,6 +59,21 @@ def test_a_part_that_stands_out_of_it_is_refused(wrong, side, out):
     assert caught.value.code == "stock_misses_part" and caught.value.measured == pytest.approx(out)
 
 
+def test_an_allowance_that_it_does_not_hold_is_refused():
+    """The top of the block is at 0, and that of the cylinder at 0.5 with its uncertainty."""
+    bar = {"bottom": -10, "diameter": 60, "height": 10.25}
+
+    def check(allowance):
+        given = parse_setup({"tools": [TOOL], "quality": {"stock_allowance_mm": allowance},
+                             "stock": {"kind": "cylinder", "uncertainty_mm": 0.25, "cylinder_mm": bar}})
+        check_against_part(given, block(), blank(given))
+
+    check(0.5)
+    with pytest.raises(SetupError) as caught:
+        check(0.6)
+    assert caught.value.code == "allowance_beyond_stock" and caught.value.measured == pytest.approx(0.5)
+
+
 def test_plans_start_from_a_cylinder():
     check_plannable(setup())
 

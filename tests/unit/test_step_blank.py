@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from geometry.errors import CamError, PartError, SetupError, StepError
+from geometry.mesh import TriangleMesh
 from schemas.setup import canonical_json, content_hash
 from service.arguments import blank_file
 from service.blank import check_against_part
@@ -72,6 +73,20 @@ def test_a_blank_beside_the_part():
 def test_the_part_itself_is_no_blank():
     refused("no_stock", PART.mesh, uncertainty_mm=0.0)
     checked(PART.mesh, uncertainty_mm=0.1)
+
+
+def test_an_allowance_that_the_blank_does_not_hold_is_refused_where_it_lacks():
+    low = box_mesh([-1.0, -1.0, -1.0], [9.0, 7.0, 4.3])
+    given = parse_setup({"tools": [TOOL], "quality": {"stock_allowance_mm": 0.5},
+                         "stock": {"kind": "step", "uncertainty_mm": 0.1}})
+    part = as_part(TriangleMesh(PART.mesh.vertices, PART.mesh.faces, np.ones(len(PART.mesh.faces), np.int32)))
+    with pytest.raises(SetupError) as caught:
+        check_against_part(given, part, blank_of(given, part, replace(as_part(low), chord=0.0)))
+    assert caught.value.code == "allowance_beyond_stock" and caught.value.measured == pytest.approx(0.4, abs=1e-5)
+    assert "4.000)" in caught.value.subjects[2]
+    less = parse_setup({"tools": [TOOL], "quality": {"stock_allowance_mm": 0.4},
+                        "stock": {"kind": "step", "uncertainty_mm": 0.1}})
+    check_against_part(less, part, blank_of(less, part, as_part(low)))
 
 
 def test_what_planner_and_proof_are_given():
