@@ -25,6 +25,7 @@ from service.materials import DEFAULT_MAX_FEED_MM_MIN, DEFAULT_MAX_RPM
 from toolpath.settings import CutData
 
 PARTS = 300
+OTHERS = ("narrow", "leaning_pair", "three_walls", "wavy")
 MACHINES: dict[str, dict[str, Any]] = {
     "no limits stated": {},
     "old mill": {"max_rpm": 4000, "max_feed_mm_min": 800},
@@ -39,10 +40,12 @@ OVERRIDES: list[dict[str, float]] = [
 
 
 def suggested(parts: int) -> Iterator[dict[str, Any]]:
-    """The setups suggested for family parts by seed."""
-    for seed in range(parts):
-        layout = draw_layout(seed, "random")
-        yield suggest_setup(layout, truth_of(layout, f"random-{seed}"))
+    """The setups suggested for family parts: of three two random ones, and one of the other recipes in turn."""
+    for k in range(parts):
+        third, place = divmod(k, 3)
+        recipe, seed = ("random", 2 * third + place) if place < 2 else (OTHERS[third % len(OTHERS)], third)
+        layout = draw_layout(seed, recipe)
+        yield suggest_setup(layout, truth_of(layout, f"{recipe}-{seed}"))
 
 
 def varied(seed: int, raw: dict[str, Any]) -> Iterator[Setup]:

@@ -33,13 +33,16 @@ class CutData:
     bend: Bend | None = None
 
     def under(self, depth: float, width: float) -> CutData:
-        """The same with feeds eased to where a cut of a depth and a width, mm, bends the tool no more than it may."""
+        """The same with the feed eased to where a cut of a depth and a width, mm, bends the tool no more than it may.
+
+        Ways down are no faster than that.
+        """
         if self.bending is None:
             return self
         bend = self.bending.under(self.feed, depth, width)
-        down = 1.0 if self.bending.ways_fixed else bend.share
-        return replace(self, feed=max(LEAST_FEED, bend.share * self.feed),
-                       plunge_feed=max(LEAST_FEED, down * self.plunge_feed), bend=bend)
+        feed = max(LEAST_FEED, bend.share * self.feed)
+        down = self.plunge_feed if self.bending.ways_fixed else min(self.plunge_feed, feed)
+        return replace(self, feed=feed, plunge_feed=down, bend=bend)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,7 @@ def test_an_eased_feed_keeps_the_limit_or_stands_on_the_floor(material, kind, di
     cut = full.under(deep * diameter, wide * diameter)
     assert LEAST_SHARE <= cut.bend.share <= 1.0
     assert cut.feed == pytest.approx(max(0.1, cut.bend.share * full.feed))
+    assert cut.plunge_feed == pytest.approx(min(full.plunge_feed, cut.feed))
     if cut.bend.share > LEAST_SHARE:
         assert cut.bend.deflection <= cut.bend.limit * (1.0 + 1e-9)
     if full.feed * LEAST_SHARE > 0.2:  # what is reported is what a cut at that feed bends it by
