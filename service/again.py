@@ -65,8 +65,8 @@ class Attempt:
 def learned(before: Learned, tried: Attempt) -> Learned | None:
     """What to plan with next; None where the proof found nothing, or something that planning again is no answer to.
 
-    A place at which the tool dug is gone to with care next time; one at which it does so again, or beside a wall, or
-    at which it met something, is barred to it.
+    A place at which the tool dug is gone to with care next time, one at which too much of it was in stock in skims; one
+    at which it does so again, or beside a wall, or at which it met something, is barred to it.
     """
     findings = tried.proof.findings
     if not 0 < len(findings) <= MOST or len(findings) < sum(tried.proof.counts.values()):
@@ -76,19 +76,23 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
         if f.kind is FindingKind.RESIDUAL and f.depth > 0.0:
             continue  # all of them are told below, sample by sample
         step = _step_of(f, tried.programs)
-        if step is None or f.tip is None or f.kind not in (FindingKind.PLUNGE, *MET):
+        if step is None or f.tip is None or f.kind not in (FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *MET):
             return None
         side, made = next((s, t) for s in tried.sides for t in s.made.steps if t is step)
         tip = np.array(f.tip) @ tried.look.rotation @ side.view.rotation.T
         old = out.get(side.view.id, NONE)
         careful = f.kind is FindingKind.PLUNGE and made.strategy != "flank" and old.care(made.tool, tip[None]) == 1.0
+        thin = f.kind is FindingKind.ENGAGEMENT and made.strategy != "flank" and not old.crowds(made.tool, tip[None])[0]
+        how = "with care" if careful else "in skims" if thin else "and kept away"
         if careful:
             old = replace(old, dug=_with(old.dug, made.tool.id, tip))
+        elif thin:
+            old = replace(old, packed=_with(old.packed, made.tool.id, tip))
         else:
             old = replace(old, barred=_with(old.barred, made.tool.id, tip))
         out[side.view.id] = old
         x, y, z = f.point or f.tip
-        notes.append(f"planned again, {'with care' if careful else 'and kept away'} near X{x:.2f} Y{y:.2f} Z{z:.2f} "
+        notes.append(f"planned again, {how} near X{x:.2f} Y{y:.2f} Z{z:.2f} "
                      f"({made.id}): {f.message}")
     left = np.flatnonzero((tried.answered > 0) & ~tried.proof.proved)
     for k in np.unique(tried.answered[left]).tolist():

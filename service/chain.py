@@ -67,6 +67,7 @@ RAMP_ANGLE = np.radians(3.0)
 LINK_FEED = 3000.0  # mm/min, feed moves in air
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
+TOLD_APART = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
 PREPARED, PROVED = 0.28, 0.96  # shares of the work done
 FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
@@ -289,7 +290,14 @@ def cut_table(setup: Setup) -> dict[str, CutData]:
 def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
     lo, hi = ready.blank.corners(view.rotation)
-    return ready.blank.planned(view, max(STOCK_STEP, float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS))))
+    step = max(min(STOCK_STEP, _told_apart(ready.setup)), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
+    return ready.blank.planned(view, step)
+
+
+def _told_apart(setup: Setup) -> float:
+    """mm between places of the stock at which engaged angles can be told; inf where no tool has a limit of them."""
+    return min((TOLD_APART * 0.5 * t.diameter_mm for t in setup.tools if (t.max_engagement_deg or 180.0) < 180.0),
+               default=math.inf)
 
 
 def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
@@ -327,6 +335,7 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
         work_offset=access_of(ready, view).work_offset,
         travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
         gauge_length=gauge_lengths(s),
+        line_spacing=min(ProofSetup.line_spacing, _told_apart(s)),
         dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
         max_engaged={body.number: math.radians(t.max_engagement_deg)
                      for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},

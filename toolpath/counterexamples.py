@@ -22,6 +22,7 @@ CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these 
 CAREFUL = 1.0  # of the radius round a place, in plan, within which a line is one that goes there
 BARRED = 0.3  # of the radius round a place: what of a line is left out
 LEAST_BARRED = 0.2  # mm
+CROWDED = 0.75  # of the radius round a place: what of a line is skimmed first
 STRICTER = 0.5  # of what is aimed at, where more stayed than the plan had measured
 
 
@@ -31,12 +32,14 @@ class Counterexamples:
 
     dug    : where more than a skin was taken going down
     barred : where the tool must not go
+    packed : where too much of the cutter was in stock
     left   : (n,) int64, samples of a zone's checks at which more stayed than allowed
     lost   : (n,) int64, those at which it did so again: given up
     """
 
     dug: Mapping[str, F64] = field(default_factory=dict)
     barred: Mapping[str, F64] = field(default_factory=dict)
+    packed: Mapping[str, F64] = field(default_factory=dict)
     left: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     lost: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
@@ -50,6 +53,10 @@ class Counterexamples:
     def bars(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
         """(n,) bool: which of tips (n, 3), mm, are where the tool must not go."""
         return _near(self.barred.get(tool.id), points, max(BARRED * tool.radius, LEAST_BARRED))
+
+    def crowds(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
+        """(n,) bool: which of tips (n, 3), mm, are where too much of the tool was in stock."""
+        return _near(self.packed.get(tool.id), points, CROWDED * tool.radius)
 
     def aims(self, zone: str, aim: float, count: int) -> F64:
         """(count,) mm: what is aimed at at the samples of a zone, ``aim`` or, where too much stayed, less.

@@ -281,7 +281,8 @@ class Finish:
                       name, self.field.tool, self.cut, self.strategy.side_step, linker.finish(), self.settings)]
 
     def _linker(self) -> Linker:
-        return Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found)
+        return Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found,
+                      engaged=self.cut.engaged)
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""

@@ -7,13 +7,16 @@ Stock that stands higher over a pass than the flutes reach is first walked off a
 3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
    top is in air, or a free place close beside it is.
 A pass with none of these is left out. To where ways 2 and 3 begin the tool goes straight over what is between, or by
-the clearance plane where that is sooner. Rapids move Z alone between that plane and a height clear of the stock, or XY
-alone at the plane; below that height every move is a feed move, as no rapid keeps its clearance beside a wall.
+the clearance plane where that is sooner. Where the engaged angle has a limit (``toolpath.engaged``) ways in keep it,
+and where a pass would not it is first walked in skims above that. Rapids move Z alone between that plane and a height
+clear of the stock, or XY alone at the plane; below that height every move is a feed move, as no rapid keeps its
+clearance beside a wall.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from dataclasses import field as fresh
 from itertools import pairwise
@@ -23,6 +26,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.engaged import UNBOUNDED, skims, within
 from toolpath.levels import Line, dense, pieces_where, stretch, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
@@ -69,6 +73,7 @@ class Linker:
     depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
     found   : what a proof found wrong with an earlier plan
     hurries : what of a pass is in air is gone as fast as a link
+    engaged : rad, most of the front of the cutter that may be in stock
     """
 
     field: TipField
@@ -77,18 +82,21 @@ class Linker:
     depths: Depths
     found: Counterexamples = NONE
     hurries: bool = False
+    engaged: float = UNBOUNDED
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
     refused: int = 0
 
-    def add(self, line: Line, tolerance: float | None = None) -> bool:
+    def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
 
         Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
         stands in the way of shank or holder, and where the tool is barred, the line is left out; what is higher than
         rapids go, or was walked as it stands, is not walked.
+
+        eased : the line takes off what it comes to bit by bit, as a helix does, and needs no skims
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
@@ -96,7 +104,8 @@ class Linker:
         before = len(self.skipped)
         free = [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]
         for piece in [q for p in free for q in self._unwalked(p)]:
-            if not (self._topped(piece) and self._pass(piece.points, piece.closed)):
+            walk = self._one if eased else self._pass
+            if not (self._topped(piece) and walk(piece.points, piece.closed)):
                 self.skipped.append(piece)
                 self.refused += 1
         return len(self.skipped) == before
@@ -159,6 +168,23 @@ class Linker:
         return True
 
     def _pass(self, points: F64, closed: bool) -> bool:
+        """Walk a line, skimmed before where it would have too much of the cutter in stock; False where it is not."""
+        if self._one(points, closed, unless_over=True):
+            return True
+        line, tool = Line(points, closed), self.field.tool
+        for whole in (False, True) if self.engaged < UNBOUNDED else ():  # the whole, where only the way in is too much
+            for skim in skims(self.stock, line, tool, self.engaged, self.found, whole=whole):
+                way = Line(thinned(skim.points, self.motions.tolerance), skim.closed)
+                if not all(self._one(rest.points, rest.closed) for rest in self._unwalked(way)):
+                    return False
+            if self._one(points, closed):
+                return True
+        return False
+
+    def _one(self, points: F64, closed: bool, *, unless_over: bool = False) -> bool:
+        """Walk a line as it is; False where no way leads in, or where it is over the limit and not to be then."""
+        if unless_over and not within(self.stock, points, self.field.tool, self.engaged, self.found):
+            return False
         way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
         if way is None:
             return False
@@ -207,6 +233,23 @@ class Linker:
             out.append((Motion.CONNECT if air else Motion.CUT, stretch(cut, knots, low, high),
                         self.motions.link_feed if air else self.motions.feed))
         return out
+
+    def keep_down(self, ways: Iterable[F64]) -> bool:
+        """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
+
+        Returns whether there was one.
+        """
+        for way in ways:
+            steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
+            if not len(steps):
+                return True
+            points = dense(way, 0.5 * self.stock.lattice.step)
+            if (float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
+                    and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
+                self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+                return True
+        self._lift()
+        return False
 
     def finish(self) -> tuple[Trajectory, ...]:
         """Lift to the clearance plane and return all trajectories."""
@@ -267,10 +310,12 @@ class Linker:
         return None
 
     def _lane(self, tips: F64, most: float) -> bool:
-        """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), and none above the flutes."""
+        """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
+        too much of the cutter in it."""
         tool = self.field.tool
         return (float(self.stock.overlap(tips, tool).max()) <= most
-                and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length)
+                and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length
+                and within(self.stock, tips, tool, self.engaged, self.found))
 
     def _ramped(self, points: F64, closed: bool) -> Way | None:
         tool = self.field.tool
@@ -314,7 +359,10 @@ class Linker:
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
         tool = self.field.tool
-        return way_down(points, closed, over, tool, self.motions.ramp_angle, self.found.care(tool, points))
+        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, self.found.care(tool, points))
+        if ramp is None or not within(self.stock, ramp[:len(ramp) - len(points) + 1], tool, self.engaged, self.found):
+            return None
+        return ramp
 
     def _known_down(self, ramp: F64, points: F64) -> NDArray[np.bool_]:
         """Which moves of a ramp's way down, without the pass (n, 3) after it, the tool has cut before."""

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from toolpath.clearing import Clearing
+from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.family import Target
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.levels import dilated
@@ -105,16 +107,25 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, hurries=True)
+    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, hurries=True, engaged=cut.engaged)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
-    bottom = float(tips[:, 2].min()) + allowance
+    bounded = cut.engaged < UNBOUNDED
+    # the finish of a floor has the whole front in what is left on it
+    low = min(allowance, 0.5 * SKIN_SHARE * tool.radius) if bounded else allowance
+    bottom = float(tips[:, 2].min()) + low
     top = stock.highest
     if top <= bottom:
         return None
     swept, step = top, 0.85 * cut.step_down
     heights = layers.layer_heights(top, bottom, step)
+    if bounded:
+        floors = [f.bottom + low for f in zones if f.form is Form.LEVEL]
+        heights = sorted({*heights, *(z for z in floors if bottom < z < top)}, reverse=True)
     for z, below in zip(heights, _areas(field, tips, heights, step), strict=True):
+        if bounded:
+            Clearing(linker, z, below, allowance, 0.8 * tool.radius, settings.climb, settings.either_way,
+                     layers.STOCK_WORTH, 0.1 * lat.step).walk()
         for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), 0.1 * lat.step)

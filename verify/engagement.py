@@ -64,5 +64,5 @@ def engagement_findings(angle: F64, moves: Moves, source: Source, limits: Mappin
         out.append(Finding(FindingKind.ENGAGEMENT, source.names[source.program[m]], int(source.line[m]), None, None,
                            (x, y, z), float(math.degrees(angle[m] - limit[m])), float(math.degrees(limit[m])),
                            f"T{source.tool[m]}: {math.degrees(angle[m]):.0f} deg of the cutter are in stock (limit "
-                           f"{math.degrees(limit[m]):.0f} deg){span}", len(rows)))
+                           f"{math.degrees(limit[m]):.0f} deg){span}", len(rows), tip=(x, y, z)))
     return out

@@ -53,6 +53,16 @@ def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all():
     assert not once.along("A2").dug
 
 
+def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
+    once = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT)))
+    assert np.allclose(once.along("A1").packed[TOOL.id], [[1.0, 3.0, -2.0]]) and "in skims" in once.notes[0]
+    assert once.along("A1").crowds(TOOL, np.array([[1.0, 3.0, -2.0], [9.0, 3.0, -2.0]])).tolist() == [True, False]
+    twice = learned(once, attempt(found(FindingKind.ENGAGEMENT)))
+    assert len(twice.along("A1").barred[TOOL.id]) == 1 and "kept away" in twice.notes[1]
+    leaning = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
+    assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
+
+
 @pytest.mark.parametrize(("kind", "line"), [(FindingKind.COLLISION, 3), (FindingKind.RUBBING, 3),
                                             (FindingKind.PLUNGE, 5)])
 def test_what_was_met_or_dug_beside_a_wall_bars_the_tool(kind, line):

@@ -1,0 +1,78 @@
+"""How much of a cutter is in stock as the planner knows it, and what is walked before a pass that has too much in it.
+
+The engaged angle is that of the front half of the cutter, 180 degrees in a slot. Stock no deeper than a twentieth of
+the radius is skimmed and counts as none (``verify.engagement`` counts alike, with a model of its own). So where a pass
+would have too much of the cutter in stock, its way is gone before in skims from the top down, only there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.kernels.engaged import engaged
+from toolpath.levels import Line, dense, pieces_where
+from toolpath.stock import StockMap
+
+UNBOUNDED = math.pi  # rad: the whole front half may be in stock
+SKIN_SHARE = 0.05  # of the radius: stock that thin over the cutter is no engagement
+SURE = 0.95  # of a skin: stock is known at nodes
+CLOSE = 1e-6  # rad: angles are multiples of a sector, and a limit may be one
+LOOK = 0.1  # of the radius, between places the angle is asked at
+WINDOW = 0.5  # of the radius: way over which places met are put together
+BEYOND = 0.5  # of the radius: how far beyond the place that is over the limit a skim goes
+
+
+def angles(stock: StockMap, points: F64, tool: ToolBody) -> F64:
+    """Engaged angle (n,), rad, along a line of tips (n, 3), mm, in the stock as it stands.
+
+    Over half a radius of way, as places of the stock are met one by one; too great by up to the width of a node of it.
+    """
+    ways = np.diff(points[:, :2], axis=0)
+    ways = np.vstack([ways, ways[-1:]])
+    ways /= np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-12)[:, None]
+    out, lat = np.empty(len(points)), stock.lattice
+    engaged(stock.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), np.ascontiguousarray(ways),
+            tool.radius, tool.corner_radius, SKIN_SHARE * tool.radius, WINDOW * tool.radius, out)
+    return out
+
+
+def over_limit(stock: StockMap, points: F64, tool: ToolBody, most: float,
+               found: Counterexamples = NONE) -> NDArray[np.bool_]:
+    """(n,) bool: at which tips (n, 3), mm, of a line too much of the cutter is in stock.
+
+    most : rad; found : where a proof found so that the planner did not, as far as there is stock
+    """
+    if most >= UNBOUNDED:
+        return np.zeros(len(points), np.bool_)
+    angle = angles(stock, points, tool)
+    return np.asarray((angle > most + CLOSE) | (found.crowds(tool, points) & (angle > 0.0)))
+
+
+def within(stock: StockMap, points: F64, tool: ToolBody, most: float, found: Counterexamples = NONE) -> bool:
+    """Whether a line of tips (n, 3), mm, keeps the limit all along; parameters as ``over_limit``."""
+    return most >= UNBOUNDED or not over_limit(stock, dense(points, LOOK * tool.radius), tool, most, found).any()
+
+
+def skims(stock: StockMap, line: Line, tool: ToolBody, most: float, found: Counterexamples = NONE, *,
+          whole: bool = False) -> list[Line]:
+    """Lines over a pass, from the top down, after which no place of it has more than ``most`` rad in stock.
+
+    Over each stretch that is over the limit, to and fro, as a skim has no side. None where the limit is kept.
+
+    whole : over the whole line, whether it keeps the limit or not
+    """
+    way = Line(dense(line.points, LOOK * tool.radius), line.closed)
+    over = np.ones(len(way.points), np.bool_) if whole else over_limit(stock, way.points, tool, most, found)
+    deep, out = SURE * SKIN_SHARE * tool.radius, []
+    for piece in pieces_where(way, over, BEYOND * tool.radius, tool.radius):
+        count = int(max(float(stock.overlap(piece.points, tool).max()), 0.0) / deep)
+        for k in range(count, 0, -1):
+            raised = Line(piece.points + np.array([0.0, 0.0, k * deep]), piece.closed)
+            out.append(raised if k % 2 else raised.reversed())
+    return out

@@ -1,0 +1,70 @@
+"""Which part of the front of a cutter is in the planner's stock.
+
+The front is the half circle ahead of the way of a tip, in sectors from its right (0) to its left. A node of the stock
+counts where it stands higher over the cutter than ``skin``. It stands for a strip one step wide, and meets the edge at
+the angles off the way of both sides of that, as seen from where the profile meets its height.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+SECTORS = 36
+"""Of the half circle: an angle is known to a 36th of it."""
+
+
+@njit(cache=True, nogil=True)
+def _sector(sine):
+    return max(0, min(int((math.asin(min(max(sine, -1.0), 1.0)) / math.pi + 0.5) * SECTORS), SECTORS - 1))
+
+
+@njit(cache=True, nogil=True)
+def engaged(top, x0, y0, step, tips, ways, radius, corner, skin, window, out):
+    """Angle in stock, rad, at tips (n, 3), mm, on their ways (n, 2), unit, into ``out`` (n,).
+
+    top    : (ny, nx) mm, at nodes ``step`` mm apart from (x0, y0) on
+    skin   : mm of stock over the cutter that is not counted
+    window : mm of way before a tip, over which sectors are put together
+    """
+    ny, nx = top.shape
+    bits = np.zeros(len(tips), np.int64)
+    for k in range(len(tips)):
+        x, y, z = tips[k]
+        i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
+        j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                over = top[i, j] - z
+                if over <= skin:
+                    continue
+                wx, wy = x0 + step * j - x, y0 + step * i - y
+                if ways[k, 0] * wx + ways[k, 1] * wy < -step:
+                    continue
+                rho = math.sqrt(wx * wx + wy * wy)
+                bottom = 0.0
+                if rho > radius - corner:
+                    run = min(rho - radius + corner, corner)
+                    bottom = corner - math.sqrt(max(corner * corner - run * run, 0.0))
+                if rho > radius or over - bottom <= skin:
+                    continue
+                edge = radius
+                if over < corner:
+                    edge = radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
+                side = ways[k, 0] * wy - ways[k, 1] * wx
+                low, high = _sector((side - 0.5 * step) / edge), _sector((side + 0.5 * step) / edge)
+                bits[k] |= (np.int64(2) << high) - (np.int64(1) << low)
+        joint, way, m = bits[k], 0.0, k
+        while m > 0 and joint != 0:
+            way += math.sqrt((tips[m, 0] - tips[m - 1, 0]) ** 2 + (tips[m, 1] - tips[m - 1, 1]) ** 2)
+            if way > window:
+                break
+            m -= 1
+            joint |= bits[m]
+        count = 0
+        while joint != 0:
+            joint &= joint - 1
+            count += 1
+        out[k] = count * math.pi / SECTORS
