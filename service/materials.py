@@ -139,13 +139,14 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
     body  : the shape of the tool; data : its speeds in this kind of work
     depth : mm, of layers; None: finishing
 
-    Layers may bend it by half of what they leave for the finish, ``LAYER_LIMIT`` at most, the finish by half of the
-    gouge tolerance.
+    Layers may bend it by half of what they leave for the finish, ``LAYER_LIMIT`` at most. A finish that climbs bends it
+    off the wall and may leave what a cusp may; else it may dig, by half of the gouge tolerance.
     """
     material = setup.material
     if material.specific_cutting_force_n_mm2 is None or material.chip_thickness_exponent is None:
         return None
-    limit = 0.5 * setup.quality.gouge_tolerance_mm
+    climbs = setup.operations.cut_direction == "climb"
+    limit = setup.quality.scallop_height_mm if climbs else 0.5 * setup.quality.gouge_tolerance_mm
     if depth is not None:
         limit = min(LAYER_LIMIT, 0.5 * left_by_layers(depth, lattice_step(body)))
     return Bending(body, compliance(body), material.specific_cutting_force_n_mm2, material.chip_thickness_exponent,

@@ -19,7 +19,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from dataclasses import field as fresh
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
-from toolpath.levels import Line, dense, pieces_where, stretch, thinned
+from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
+from toolpath.pacing import Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.walked import Depths, still_to_walk
@@ -38,7 +38,6 @@ FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
 IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
 MOST_IN_FRONT = 0.5  # mm
-GUARD = 0.1  # of the diameter, before and after stock: as slow as in it
 OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
@@ -72,7 +71,7 @@ class Linker:
     refused : how many of them found no safe way in
     depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
     found   : what a proof found wrong with an earlier plan
-    hurries : what of a pass is in air is gone as fast as a link
+    pace    : Pace of passes that take stock off; None: all at one feed
     engaged : rad, most of the front of the cutter that may be in stock
     """
 
@@ -81,7 +80,7 @@ class Linker:
     motions: Motions
     depths: Depths
     found: Counterexamples = NONE
-    hurries: bool = False
+    pace: Pace | None = None
     engaged: float = UNBOUNDED
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
@@ -190,49 +189,29 @@ class Linker:
             return False
         entry, cut, joined = way
         if joined:
-            self._feed(Motion.CONNECT, np.vstack([self._here(), entry]), self.motions.feed)
+            self._paced(Motion.CONNECT, np.vstack([self._here(), entry]))
         else:
             self._come_down(entry[0])
             if len(entry) > 1:
                 self._feed(Motion.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self._here() - cut[0]) > 1e-9:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
-        for motion, points, feed in self._hurried(cut):
-            self._feed(motion, points, feed)
+        self._paced(Motion.CUT, cut)
         self.depths.cut(cut)
         self.passes += 1
         return True
 
-    def _hurried(self, cut: F64) -> list[tuple[Motion, F64, float]]:
-        """A pass (n, 3), mm, in stretches; those in air, ``GUARD`` from what stands, go as fast as links do.
+    def _paced(self, motion: Motion, points: F64) -> None:
+        """Go along a way (n, 3), mm, in stretches as fast as what stands there lets the tool, where a pace is given.
 
-        Only where the tool takes stock off: a finish is not left to what the stock's lattice shows.
+        Only where it takes stock off: a finish is not left to what the stock's lattice shows. Nor is a way down.
         """
-        whole = [(Motion.CUT, cut, self.motions.feed)]
-        if not self.hurries or self.motions.link_feed <= self.motions.feed:
-            return whole
-        guard = max(GUARD * self.field.tool.diameter, 2.0 * self.stock.lattice.step)
-        points = dense(cut, 0.25 * guard)
-        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        busy = self.stock.overlap(points, self.field.tool, SURE_RIM) > AIR_TOLERANCE
-        at = s[busy]
-        if not len(at):
-            return whole
-        knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(cut, axis=0), axis=1))])
-        ends = [0.0]
-        for a, b in zip([-math.inf, *at], [*at, math.inf], strict=True):  # gaps between places in stock
-            low, high = max(a + guard, 0.0), min(b - guard, float(s[-1]))
-            if high - low > guard:
-                ends += [low, high]
-        ends.append(float(s[-1]))
-        out: list[tuple[Motion, F64, float]] = []
-        for k, (low, high) in enumerate(pairwise(ends)):
-            if high - low <= 1e-9:
-                continue
-            air = k % 2 == 1
-            out.append((Motion.CONNECT if air else Motion.CUT, stretch(cut, knots, low, high),
-                        self.motions.link_feed if air else self.motions.feed))
-        return out
+        slow = self.pace is None or motion is Motion.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
+        if self.pace is None or slow:
+            self._feed(motion, points, self.motions.feed)
+            return
+        for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
+            self._feed(Motion.CONNECT if air else motion, part, feed)
 
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.

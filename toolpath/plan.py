@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from toolpath.levels import dilated
 from toolpath.linking import FLUTE_SHARE, Linker
 from toolpath.motion import Workingstep
 from toolpath.order import nearest_order
+from toolpath.pacing import Pace
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
@@ -107,7 +109,8 @@ def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     lat, tool = field.lattice, field.tool
     tips = np.vstack([z.tips for z in zones])
     allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, hurries=True, engaged=cut.engaged)
+    pace = Pace(cut.feed, cut.link_feed, partial(cut.feed_under, tool), cut.step_down)
+    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, pace, cut.engaged)
     walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
     chord = 0.5 * settings.chordal_tolerance
     bounded = cut.engaged < UNBOUNDED

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.timing import RATES, Rates
+from geometry.toolbody import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.deflection import LEAST_FEED, Bend, Bending
+from toolpath.deflection import LEAST_FEED, Bend, Bending, effective_diameter
 from toolpath.strategies.zigzag import Pattern
 
 
@@ -43,6 +44,17 @@ class CutData:
         feed = max(LEAST_FEED, bend.share * self.feed)
         down = self.plunge_feed if self.bending.ways_fixed else min(self.plunge_feed, feed)
         return replace(self, feed=feed, plunge_feed=down, bend=bend)
+
+    def feed_under(self, tool: ToolBody, depth: float, angle: float) -> float:
+        """mm/min at which a cut of a depth, mm, and an engaged angle, rad, bends the tool no more than it may.
+
+        Never less than the feed, which is for the worst, nor more than that was before it was eased.
+        """
+        if self.bending is None or self.bend is None or self.bend.share >= 1.0:
+            return self.feed
+        full = self.feed / self.bend.share
+        width = 0.5 * effective_diameter(tool.diameter, tool.corner_radius, depth) * (1.0 - math.cos(angle))
+        return max(self.feed, self.bending.under(full, depth, width).share * full)
 
 
 @dataclass(frozen=True)

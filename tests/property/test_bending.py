@@ -67,3 +67,12 @@ def test_a_material_without_a_specific_cutting_force_bends_nothing():
     plain = {"name": "X", "cutting_speed_m_min": 60, "feed_per_tooth": [{"diameter_mm": 1, "feed_per_tooth_mm": 0.01}]}
     cut = table(plain, "flat", 1.0, 15.0, 5.0)
     assert cut.bend is None and cut.finish.under(0.5, 0.5).bend is None
+
+
+@pytest.mark.parametrize(("direction", "limit"), [("climb", 0.03), ("conventional", 0.004), ("either", 0.004)])
+def test_a_finish_that_climbs_may_leave_what_a_cusp_may_and_one_that_may_dig_half_of_a_gouge(direction, limit):
+    tool = {"id": "T1", "kind": "flat", "diameter_mm": 6, "flute_length_mm": 12, "stickout_mm": 40}
+    given = {"tools": [tool], "operations": {"cut_direction": direction},
+             "quality": {"scallop_height_mm": 0.03, "gouge_tolerance_mm": 0.008}}
+    cut = cut_table(parse_setup(json.dumps(given)))["T1"]
+    assert cut.finish.under(1.0, 0.1).bend.limit == pytest.approx(limit) and cut.bend.limit == 0.05

@@ -39,7 +39,7 @@ def cleared(mesh, lower, upper, area, climb=True, either=False):
     field = field_of(mesh, tool(4.0, 0.0))
     stock = StockMap.box(TriangleTree(mesh), np.array(lower, float), np.array(upper, float), 0.1)
     motions = Motions(800, 200, 3000, 10000, 12.0, 10.0, RAMP, 1.6, 0.001)
-    link = Watched(field, stock, motions, Depths(stock.lattice), hurries=True, engaged=MOST)
+    link = Watched(field, stock, motions, Depths(stock.lattice), engaged=MOST)
     lat = field.lattice
     y, x = np.meshgrid(lat.y0 + lat.step * np.arange(lat.ny), lat.x0 + lat.step * np.arange(lat.nx), indexing="ij")
     Clearing(link, Z, area(x, y), ALLOWANCE, 1.6, climb, either, 0.05, 0.005).walk()

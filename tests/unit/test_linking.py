@@ -12,9 +12,10 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.levels import Line, dense
-from toolpath.linking import GUARD, OVER, Linker, Motions
+from toolpath.linking import OVER, Linker, Motions
 from toolpath.motion import Motion
 from toolpath.order import nearest_order
+from toolpath.pacing import GUARD, Pace
 from toolpath.stock import SKIN, StockMap
 from toolpath.walked import Depths
 
@@ -312,7 +313,7 @@ def test_a_shank_is_not_led_into_what_stands_beside_the_way_across():
 def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     """Stock over the right half: the way is the same, cut where it stands and a little before."""
     slow, fast = linker(top=-1.0), linker(top=-1.0)
-    fast.hurries = True
+    fast.pace = Pace(800, 3000, lambda depth, angle: 800, 1.0)
     for link in (slow, fast):
         x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
         link.stock.top[:, x > 15.0] = link.stock.cover[:, x > 15.0] = 1.5

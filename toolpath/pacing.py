@@ -1,0 +1,77 @@
+"""How fast a tool goes along a pass that takes stock off: in air like a link, in stock as what stands there lets it.
+
+A feed is made for the worst a layer has, a slot as deep as the layer. Along a pass less stands in front most of the
+time: a ring takes a strip from the side, a rim the allowance, a layer over a step next to nothing. What stands there is
+read off the stock map, depth and engaged angle, and rounded up; the least feed counts some way before and behind.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.engaged import angles
+from toolpath.levels import stretch
+from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
+
+GUARD = 0.1  # of the diameter, and two lattice steps at least, before and after stock: as slow as in it
+ASKED = 4  # places on that way
+DEPTHS = 8  # of a layer: depths are rounded up to a part of it
+ANGLE = math.radians(15.0)  # engaged angles are rounded up to a multiple
+STEP = 1.25  # between one feed and the next: a program that says F at every place is read by nobody
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Feeds of one tool in layers, mm/min.
+
+    feed  : at which the worst is cut; air : where nothing stands
+    under : where a cut has a depth and an engaged angle, mm and rad
+    layer : mm, depth of a layer
+    """
+
+    feed: float
+    air: float
+    under: Callable[[float, float], float]
+    layer: float
+
+
+def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
+    """A pass (n, 3), mm, in stretches: whether one is in air, its points, and its feed, mm/min.
+
+    Where the stock map shows nothing all along, it is one that takes what the map does not show.
+    """
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    guard = max(GUARD * tool.diameter, 2.0 * stock.lattice.step)
+    at = np.linspace(0.0, s[-1], max(2, math.ceil(ASKED * s[-1] / guard) + 1))
+    way = np.column_stack([np.interp(at, s, points[:, c]) for c in range(3)])
+    busy = stock.overlap(way, tool, SURE_RIM) > AIR_TOLERANCE
+    if not busy.any():
+        return [(False, points, pace.feed)]
+    feeds = np.full(len(at), pace.air)
+    feeds[busy] = _in_stock(way, stock, tool, pace)[busy]
+    feeds = minimum_filter1d(feeds, 2 * ASKED + 1, mode="nearest")
+    # what is faster for less than a guard's way is not worth a word
+    feeds = maximum_filter1d(minimum_filter1d(feeds, ASKED + 1, mode="nearest"), ASKED + 1, mode="nearest")
+    between = np.minimum(feeds[1:], feeds[:-1])
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(between)) + 1, [len(between)]])
+    return [(bool(between[a] >= pace.air), stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
+            for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+
+def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
+    """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not."""
+    depth = np.ceil(np.maximum(stock.overlap(way, tool), 0.0) / pace.layer * DEPTHS - 1e-9).astype(np.int64)
+    turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
+    turn[turn == 0] = round(math.pi / ANGLE)  # what is skimmed counts as none, and may be in all of the front
+    kinds, place = np.unique(np.column_stack([depth, turn]), axis=0, return_inverse=True)
+    known = np.array([pace.under(d * pace.layer / DEPTHS, t * ANGLE) for d, t in kinds.tolist()])
+    levels = np.floor(np.log(np.maximum(known, pace.feed) / pace.feed) / math.log(STEP) + 1e-9)
+    return np.minimum(pace.feed * STEP ** levels, max(pace.air, pace.feed))[place.reshape(-1)]
