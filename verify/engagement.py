@@ -17,15 +17,25 @@ from verify.removal import Moves
 
 WINDOW = 0.5
 """Share of the tool radius: way over which sectors are put together, as short moves meet few places of the stock."""
+CORNER = math.radians(30.0)
+"""Between two moves, from which on the second begins a way of its own."""
 RESOLUTION = 2 * math.pi / SECTORS
 """rad: sectors at both ends of an engaged arc are counted whole."""
 
 
 def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
-    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``."""
-    length = np.linalg.norm(moves.end - moves.start, axis=1)
-    window = WINDOW * np.array([t.radius for t in tools])
-    return np.asarray(window_angles(bits, length, moves.tool, moves.feed, window))
+    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``.
+
+    Sectors count from the way of a move, so those of a way before a corner are not put together with those after it.
+    """
+    way = moves.end - moves.start
+    length = np.linalg.norm(way, axis=1)
+    ahead = way / np.maximum(length, 1e-12)[:, None]
+    begins = np.ones(len(way), np.bool_)
+    begins[1:] = ((ahead[1:] * ahead[:-1]).sum(axis=1) < math.cos(CORNER)) | (moves.tool[1:] != moves.tool[:-1])
+    stretch = (np.cumsum(begins) - 1).astype(np.int32)
+    window = WINDOW * np.array([t.radius for t in tools])[moves.tool[begins]]
+    return np.asarray(window_angles(bits, length, stretch, moves.feed, window))
 
 
 def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int, Engagement]:

@@ -72,3 +72,15 @@ def test_a_slot_above_the_limit_is_a_finding_on_its_line():
     assert set(proof.counts) == {"engagement"}
     first = min(f.line for f in proof.findings if f.kind == FindingKind.ENGAGEMENT)
     assert first <= 14 and "limit 120 deg" in proof.findings[0].message
+
+
+@pytest.mark.parametrize(("turn", "joined"), [(0.0, True), (25.0, True), (40.0, False), (90.0, False)])
+def test_sectors_of_a_way_before_a_corner_are_not_put_together_with_those_after_it(turn, joined):
+    """The left quarter of the front is met on one short move, the right one on the next."""
+    a = math.radians(turn)
+    places = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.2 + 0.2 * math.cos(a), 0.2 * math.sin(a), 0]])
+    moves = Moves(places[:-1], places[1:], np.ones(2, bool), np.zeros(2, np.int32))
+    bits = np.array([0xFF, 0xFF << 24], np.int64)
+    quarter, second = engaged_angles(bits, moves, [TOOL])
+    assert quarter == pytest.approx(math.pi / 4)
+    assert second == pytest.approx(math.pi / 2 if joined else math.pi / 4)
