@@ -23,6 +23,7 @@ from zones.zoning import ZoneArea
 
 PLANS = 3  # of a job at most
 MOST = 24  # findings: more are no wrong estimates
+MOST_PACKED = 96  # those of the engaged angle, which hang on the lattice of the stock all along a pass
 MET = (FindingKind.COLLISION, FindingKind.RUBBING)
 STEP = re.compile(r"^\((S\d+[a-z]*)\b")
 
@@ -69,7 +70,10 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
     at which it does so again, or beside a wall, or at which it met something, is barred to it.
     """
     findings = tried.proof.findings
-    if not 0 < len(findings) <= MOST or len(findings) < sum(tried.proof.counts.values()):
+    packed = sum(f.kind is FindingKind.ENGAGEMENT for f in findings)
+    if not findings or len(findings) - packed > MOST or packed > MOST_PACKED:
+        return None
+    if len(findings) < sum(tried.proof.counts.values()):
         return None
     out, notes = dict(before.found), list(before.notes)
     for f in findings:

@@ -12,7 +12,7 @@ import pytest
 from examples.demo import write_small
 from schemas.setup import Setup
 from service import chain
-from service.again import MOST, Attempt, Learned, learned
+from service.again import MOST, MOST_PACKED, Attempt, Learned, learned
 from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, STRICTER, Counterexamples
@@ -59,6 +59,9 @@ def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
     assert once.along("A1").crowds(TOOL, np.array([[1.0, 3.0, -2.0], [9.0, 3.0, -2.0]])).tolist() == [True, False]
     twice = learned(once, attempt(found(FindingKind.ENGAGEMENT)))
     assert len(twice.along("A1").barred[TOOL.id]) == 1 and "kept away" in twice.notes[1]
+    many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MOST_PACKED + 1)]
+    assert len(learned(Learned(), attempt(*many[1:])).along("A1").packed[TOOL.id]) == MOST_PACKED > MOST
+    assert learned(Learned(), attempt(*many)) is None
     leaning = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
     assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
 
