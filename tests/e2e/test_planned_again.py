@@ -1,4 +1,4 @@
-"""A part of the five-axis sweep whose first plan digs 0.171 mm of 0.150 in one place: planned again, it is proved."""
+"""A part of the five-axis sweep whose first plan digs deeper than a skin in one place: planned again, it is proved."""
 
 from __future__ import annotations
 
@@ -23,18 +23,26 @@ def _planned(folder: Path, told: list[float]) -> dict[str, Any]:
     return chain.plan(step, setup, folder / "out", lambda _stage, share: told.append(share))
 
 
-def test_planned_once_it_is_unproved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain, "PLANS", 1)
-    report = _planned(tmp_path, [])
-    assert report["state"] == "unproved" and report["finding_counts"]["plunge"] == 1
-    assert report["findings"][0]["tip"] is not None
-    assert not any("planned again" in w for w in report["part"]["warnings"])
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The report of the first plan alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(chain, "PLANS", 1)
+        return _planned(tmp_path_factory.mktemp("once"), [])
 
 
-def test_planned_again_it_is_proved_and_says_what_was_changed(tmp_path: Path) -> None:
+def test_planned_once_it_is_unproved(once: dict[str, Any]) -> None:
+    assert once["state"] == "unproved" and once["finding_counts"]["plunge"] == 1
+    assert once["findings"][0]["tip"] is not None
+    assert not any("planned again" in w for w in once["part"]["warnings"])
+
+
+def test_planned_again_it_is_proved_and_says_what_was_changed(once: dict[str, Any], tmp_path: Path) -> None:
     shares: list[float] = []
     report = _planned(tmp_path, shares)
     assert report["state"] == "proved" and not report["findings"] and report["reach_coverage"] > 0.9999
     told = [w for w in report["part"]["warnings"] if "planned again" in w]
-    assert any("with care near X8.52 Y1.90 Z12.46" in w and "0.171 mm" in w for w in told)
+    (dug,) = once["findings"]
+    x, y, z = dug["point"]
+    assert any(f"with care near X{x:.2f} Y{y:.2f} Z{z:.2f}" in w and dug["message"] in w for w in told)
     assert shares == sorted(shares) and shares[-1] == 1.0
