@@ -42,7 +42,7 @@ def test_planned_again_it_is_proved_and_says_what_was_changed(once: dict[str, An
     report = _planned(tmp_path, shares)
     assert report["state"] == "proved" and not report["findings"] and report["reach_coverage"] > 0.9999
     told = [w for w in report["part"]["warnings"] if "planned again" in w]
-    (dug,) = once["findings"]
+    dug = next(f for f in once["findings"] if f["kind"] == "plunge")
     x, y, z = dug["point"]
     assert any(f"with care near X{x:.2f} Y{y:.2f} Z{z:.2f}" in w and dug["message"] in w for w in told)
     assert shares == sorted(shares) and shares[-1] == 1.0
