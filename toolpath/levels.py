@@ -7,6 +7,7 @@ the lattice, so their distance is right to one lattice step, and every move is t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ from toolpath.kernels.contour import (
 )
 from zones.reach import LEVEL_TOLERANCE, TipField
 
+LEAST_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
 BISECTIONS = 9  # a crossing is placed to step / 2**9
 SAME_PLACE = 1e-6  # mm
 BESIDE = 0.1234  # of that
@@ -108,33 +110,100 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
     list of Line
         Every point is free. A line that leaves the area is open.
     """
+    return _traced(field, z, active, tolerance)[0]
+
+
+def contour_pieces(field: TipField, z: float, active: NDArray[np.bool_], wanted: NDArray[np.bool_], extend: float,
+                   join: float, tolerance: float, dip: float = 0.0) -> list[Line]:
+    """The pieces of ``contours`` in wanted cells, made longer and joined as ``pieces_where`` does.
+
+    wanted : (ny, nx) bool on ``field.lattice``, inside the area ``active``
+    extend, join, dip : mm; dip : how far below z the lines come to lie
+
+    Most of what an area has in it is cut away again, so only what may stay is found exactly. Where more stays than was
+    foreseen, all of it is found so.
+    """
+    lat = field.lattice
+
+    def pieces(lines: list[Line]) -> list[Line]:
+        return [p for line in (Line(line.points - [0.0, 0.0, dip], line.closed) for line in lines)
+                for p in pieces_where(line, wanted[lat.cells(line.points[:, :2])], extend, join)]
+
+    lines, rough = _traced(field, z, active, tolerance, wanted, extend + 0.5 * join)
+    found = pieces(lines)
+    if len(rough) and any(np.isin(_flat(p.points), rough).any() for p in found):
+        found = pieces(contours(field, z, active, tolerance))
+    return found
+
+
+def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: float,
+            wanted: NDArray[np.bool_] | None = None, overrun: float = 0.0) -> tuple[list[Line], NDArray[np.complex128]]:
+    """``contours``, exact along ``overrun`` mm round wanted cells; (k,) x + iy of points in the rest, or next to it."""
+    rough = np.zeros(0, np.complex128)
     if not active.any():
-        return []
+        return [], rough
     lat = field.lattice
     rows, cols = _window(active, 1)
     blocked = np.ascontiguousarray(field.height[rows, cols] > z + LEVEL_TOLERANCE)
     ids, starts, closed = trace(blocked, np.ascontiguousarray(active[rows, cols]), SEGMENTS)
     if not len(ids):
-        return []
+        return [], rough
     x0, y0 = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
     xy = np.empty((len(ids), 2))
     where = (field.tree.arrays, field.noncut, field.coarse_row)
     shape = (z + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner, field.allowance)
-    place_crossings(*where, ids, blocked, x0, y0, lat.step, *shape, BISECTIONS, xy)
     follows = np.arange(1, len(ids) + 1)
     follows[starts[1:] - 1] = np.where(closed, starts[:-1], -1)
-    more, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
-    refine(*where, xy, follows, *shape, tolerance, lat.step, more, count)
-    points = more[np.arange(MOST_PER_CHORD) < count[:, None]]
+    exact = np.ones(len(ids), np.bool_)
+    if wanted is not None:
+        middle = _middles(ids, blocked.shape[1]) * lat.step + [x0, y0]
+        more = 2 + math.ceil(overrun / (LEAST_APART * lat.step))
+        exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
+        xy[~exact] = middle[~exact]
+    placed = np.empty((int(exact.sum()), 2))
+    place_crossings(*where, ids[exact], blocked, x0, y0, lat.step, *shape, BISECTIONS, placed)
+    xy[exact] = placed
+    both = exact & (follows >= 0)
+    both[both] = exact[follows[both]]
+    fine, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
+    refine(*where, xy, np.where(both, follows, -1), *shape, tolerance, lat.step, fine, count)
+    points = fine[np.arange(MOST_PER_CHORD) < count[:, None]]
     begins = np.concatenate([[0], np.cumsum(count)])[starts]
+    if not exact.all():
+        beside = ~exact
+        beside[follows[(follows >= 0) & ~exact]] = True
+        beside[(follows >= 0) & ~exact[follows]] = True
+        rough = _flat(xy[beside])
     out = []
     for k in range(len(starts) - 1):
-        fine = points[begins[k]:begins[k + 1]]
+        way = points[begins[k]:begins[k + 1]]
         if starts[k + 1] - starts[k] < 2:
             continue
         if closed[k]:
-            fine = np.vstack([fine, fine[:1]])
-        out.append(Line(np.column_stack([fine, np.full(len(fine), z)]), bool(closed[k])))
+            way = np.vstack([way, way[:1]])
+        out.append(Line(np.column_stack([way, np.full(len(way), z)]), bool(closed[k])))
+    return out, rough
+
+
+def _flat(points: F64) -> NDArray[np.complex128]:
+    return np.asarray(points[:, 0] + 1j * points[:, 1])
+
+
+def _middles(ids: NDArray[np.int64], nx: int) -> F64:
+    """(n, 2) middles of lattice edges in steps from the first node; numbered as ``kernels.contour`` does."""
+    node, up = ids // 2, ids % 2
+    return np.column_stack([node % nx + 0.5 * (1 - up), node // nx + 0.5 * up])
+
+
+def _along_chains(marked: NDArray[np.bool_], starts: NDArray[np.int64], closed: NDArray[np.bool_],
+                  more: int) -> NDArray[np.bool_]:
+    """(n,) bool: what is ``marked`` and ``more`` neighbours on each side, chain by chain."""
+    out = np.zeros_like(marked)
+    for k in range(len(starts) - 1):
+        part = marked[starts[k]:starts[k + 1]]
+        if part.any():
+            out[starts[k]:starts[k + 1]] = ndimage.maximum_filter1d(
+                part.view(np.uint8), 2 * more + 1, mode="wrap" if closed[k] else "constant").view(np.bool_)
     return out
 
 

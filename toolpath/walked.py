@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is t
 OVERLAP = 3  # known moves of a line walked once more on each side, less than the proof takes for a stretch run twice
 ON = 2.0 * WRITTEN  # off a move, and still on it
 CELL = 10.0 * WRITTEN  # in which places that may be one are looked for
+CELL_BITS = 2**21 - 1
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
@@ -73,11 +75,11 @@ class Walked:
     """
 
     def __init__(self) -> None:
-        self._moves: dict[bytes, list[tuple[F64, F64]]] = {}
+        self._moves: dict[int, list[tuple[F64, F64]]] = {}
 
     def add(self, points: F64) -> None:
         """Remember a way (n, 3), mm, that the tool has gone from end to end."""
-        keys = _cells(points)
+        keys = _cells(points).tolist()
         for a, b, p, q in zip(keys[:-1], keys[1:], points[:-1], points[1:], strict=True):
             self._moves.setdefault(a, []).append((p, q))
             self._moves.setdefault(b, []).append((q, p))
@@ -87,8 +89,14 @@ class Walked:
 
         A move is known where it is part of one that was walked, and shares an end with it.
         """
-        return np.array([not (self._along(p, q) or self._along(q, p))
-                         for p, q in zip(line.points[:-1], line.points[1:], strict=True)])
+        points, moves = line.points, self._moves
+        out = np.ones(len(points) - 1, np.bool_)
+        near = _cells(points[:, None, :] + ON * CORNERS).tolist()
+        known = [[key for key in dict.fromkeys(keys) if key in moves] for keys in near]
+        for k in range(len(out)):
+            p, q = points[k], points[k + 1]
+            out[k] = not (known[k] and self._along(p, q, known[k]) or known[k + 1] and self._along(q, p, known[k + 1]))
+        return out
 
     @staticmethod
     def again(line: Line) -> NDArray[np.bool_]:
@@ -103,10 +111,9 @@ class Walked:
             so_far.add(move)
         return out
 
-    def _along(self, start: F64, end: F64) -> bool:
-        """Whether a walked move from ``start`` goes over ``end``."""
-        near = dict.fromkeys(_cells(start + ON * CORNERS))
-        for p, q in (move for key in near for move in self._moves.get(key, ())):
+    def _along(self, start: F64, end: F64, near: Sequence[int]) -> bool:
+        """Whether a walked move from ``start``, in one of the cells ``near`` it, goes over ``end``."""
+        for p, q in (move for key in near for move in self._moves[key]):
             if float((p - start) @ (p - start)) >= ON * ON:
                 continue
             way, asked = q - start, end - start
@@ -148,6 +155,7 @@ def _written(points: F64) -> list[bytes]:
     return [row.tobytes() for row in np.rint(points / WRITTEN).astype(np.int64)]
 
 
-def _cells(points: F64) -> list[bytes]:
-    """The cell of each of points (n, 3), mm."""
-    return [row.tobytes() for row in np.floor(points / CELL).astype(np.int64)]
+def _cells(points: F64) -> NDArray[np.int64]:
+    """A number (...) for the cell of each of points (..., 3), mm; cells ``2**21`` apart share one."""
+    cells = np.floor(points / CELL).astype(np.int64) & CELL_BITS
+    return np.asarray(cells[..., 0] << 42 | cells[..., 1] << 21 | cells[..., 2])

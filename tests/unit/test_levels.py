@@ -9,6 +9,7 @@ from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from tests.plan_checks import dense
 from toolpath.levels import (
     Line,
+    contour_pieces,
     contours,
     dilated,
     free_pieces,
@@ -133,6 +134,28 @@ def test_a_contour_that_leaves_the_area_is_open():
     assert not line.closed
     assert contours(field, 1.0, np.zeros_like(active), 0.002) == []
     assert contours(field, 9.0, everywhere(field), 0.002) == []
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_pieces_found_exactly_only_where_they_stay_are_those_of_whole_contours(seed):
+    rng = np.random.default_rng(seed)
+    mesh = walls() if seed % 2 else box_mesh([0, 0, 0], [8, 5, 4])
+    level = 4.5 if seed % 2 else 1.0
+    field = field_of(mesh, (ball, lambda d: tool(d, 0.0))[seed % 3 == 0](float(rng.uniform(1.0, 3.0))))
+    borders = contours(field, level, everywhere(field), 0.002)
+    there = np.vstack([c.points for c in borders])
+    asked = field.lattice.mask(there[rng.integers(0, len(there), rng.integers(1, 9)), :2])
+    wanted = dilated(asked, float(rng.integers(2, 12)))
+    active = dilated(wanted, float(rng.integers(3, 60)))
+    extend, join, dip = rng.uniform(0.0, 1.5), rng.uniform(0.0, 3.0), 0.1 * (seed % 2)
+    twin = [p for c in contours(field, level, active, 0.002)
+            for p in pieces_where(c, wanted[field.lattice.cells(c.points[:, :2])], extend, join)]
+    found = contour_pieces(field, level, active, wanted, extend, join, 0.002, dip)
+    assert twin
+    assert [p.closed for p in found] == [p.closed for p in twin]
+    for one, other in zip(found, twin, strict=True):
+        assert len(one.points) == len(other.points)
+        assert np.abs(one.points + [0.0, 0.0, dip] - other.points).max() < 1e-9
 
 
 @pytest.mark.parametrize("distance", [0.4, 1.1])

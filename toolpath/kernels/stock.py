@@ -68,6 +68,8 @@ def overlap(top, x0, y0, step, tip, radius, corner, margin, half):
     worst = -np.inf
     for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
         for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+            if top[i, j] - tip[2] <= worst:  # the bottom is nowhere lower than the tip
+                continue
             rho = np.sqrt((x0 + j * step - tip[0]) ** 2 + (y0 + i * step - tip[1]) ** 2)
             if rho <= inner:
                 over = top[i, j] - tip[2] - _bottom(min(rho - half, radius), radius, corner)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.levels import Line, contours, dilated, pieces_where
+from toolpath.levels import Line, contour_pieces, dilated
 from zones.reach import TipField
 
 LEAST_STEP = 0.02  # mm, levels are never closer
@@ -76,15 +75,7 @@ def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance
             continue
         wanted = dilated(lat.mask(tips[near, :2]), reach)
         active = dilated(wanted, 2.0 * field.tool.radius / lat.step + 3)
-        lines: list[Line] = []
-        dip = np.array([0.0, 0.0, SHARP_DIP if field.tool.corner_radius == 0 else 0.0])
-        for line in contours(field, z, active, tolerance):
-            line = Line(line.points - dip, line.closed)
-            lines.extend(pieces_where(line, _on(field, wanted, line.points), 0.5 * field.tool.radius,
-                                      2.0 * field.tool.radius))
-        out.append(lines)
+        dip = SHARP_DIP if field.tool.corner_radius == 0 else 0.0
+        out.append(contour_pieces(field, z, active, wanted, 0.5 * field.tool.radius, 2.0 * field.tool.radius,
+                                  tolerance, dip))
     return out
-
-
-def _on(field: TipField, mask: NDArray[np.bool_], points: F64) -> NDArray[np.bool_]:
-    return np.asarray(mask[field.lattice.cells(points[:, :2])])
