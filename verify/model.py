@@ -30,6 +30,7 @@ class FindingKind(StrEnum):
     PLUNGE = "plunge"
     RUBBING = "rubbing"
     ENGAGEMENT = "engagement"
+    SUPPORT = "support"
     LIMIT = "limit"
     PROGRAM = "program"
     RESIDUAL = "residual"
@@ -65,6 +66,8 @@ class ProofSetup:
     rotary_rate   : rad/min, the fastest either turns in a feed move, or None
     table         : mm, Z of what the part stands on, or None; table_known : somebody said so, else it is held against
                     tools that lean only
+    free_ratio    : how many times as high as thick a wall may be free where it is finished (``verify.support``)
+    walls_in_turn : whether more than that is a finding; else it is a figure alone
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -99,6 +102,8 @@ class ProofSetup:
     rotary_rate: float | None = None
     table: float | None = None
     table_known: bool = False
+    free_ratio: float = 10.0
+    walls_in_turn: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +113,14 @@ class NcProgram:
     name, text  : of the program
     turn        : (3, 3) float64, from the frame of the proof to that of the program (another side up); None: the same
     work_offset : the one that is the zero of its frame; None: that of the setup
+    dialect     : whose words its text has (``verify.dialects``)
     """
 
     name: str
     text: str
     turn: F64 | None = None
     work_offset: str | None = None
+    dialect: str = "linuxcnc"
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +190,26 @@ class Spent:
 
 
 @dataclass(frozen=True)
+class Support:
+    """How far thin walls were free where they were finished.
+
+    walls  : sheets of the part that are somewhere more than ``limit`` times as high as thick
+    places : pairs of opposite places of them that were judged
+    most   : the most a wall was free for at one, in times its thickness; limit : what is allowed
+    over   : places at which it was more; found : and that is a finding
+    at     : mm, the place where it was most; None where there is none
+    """
+
+    walls: int
+    places: int
+    most: float
+    limit: float
+    over: int
+    found: bool = False
+    at: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
 class ZoneProof:
     """The proof of one zone: scallops of its claimed samples in mm, areas in mm², coverage 0..1."""
 
@@ -221,7 +248,7 @@ class FaceProof:
 class Proof:
     """The answer.
 
-    findings : gravest first, at most 200, the 22 gravest of each kind among them; counts : all there are of each kind
+    findings : gravest first, at most 200, the 20 gravest of each kind among them; counts : all there are of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
     line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
     proved   : (n,) bool, inside the budget
@@ -229,6 +256,7 @@ class Proof:
     spent    : where the time goes, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
     minutes  : minutes in cut by tool number; engaged : how much of each cutter was in stock, by tool number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
+    support  : how far thin walls were free where they were cut
     """
 
     findings: tuple[Finding, ...]
@@ -248,6 +276,7 @@ class Proof:
     reach: float
     line_spacing: float
     notes: tuple[str, ...] = field(default=())
+    support: Support = Support(0, 0, 0.0, 0.0, 0)
 
     @property
     def clean(self) -> bool:
@@ -265,4 +294,5 @@ class Proof:
             "tools": {str(k): v for k, v in self.minutes.items()},
             "engaged_rad": {str(k): asdict(v) for k, v in self.engaged.items()}, "error_bound_mm": self.error_bound,
             "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),
+            "support": asdict(self.support),
         }

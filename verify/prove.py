@@ -36,7 +36,17 @@ from verify.guard import (
     guard_samples,
 )
 from verify.material import contacts, dogleg_limits, unseen
-from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, ProofSetup, ScoredSamples, ZoneProof
+from verify.model import (
+    Engagement,
+    FaceProof,
+    Finding,
+    FindingKind,
+    Proof,
+    ProofSetup,
+    ScoredSamples,
+    Support,
+    ZoneProof,
+)
 from verify.progress import Report, Stages
 from verify.reader import Program
 from verify.removal import BOW, Moves, residual_on_normals
@@ -44,10 +54,11 @@ from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.stockpass import StockPass
+from verify.support import supported
 from verify.table import table_findings
 
 LEAST_REACH = 1.0
-READ, CUT, MET = 0.12, 0.5, 0.97  # shares of the work done when the programs are read, residuals and contacts known
+READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known
 
 
 def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -89,9 +100,11 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
     moves, source = moves_of(read, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
+    support, unheld = supported(TriangleTree(part.mesh), scored, setup, moves, tools, source, zone_ids, threads,
+                                stages.span(CUT, HELD))
     slides = slides_of(read, tools, setup)
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
-                   stages.span(CUT, MET))
+                   stages.span(HELD, MET))
     run = met.run
     fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
@@ -102,7 +115,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
-                *engagement_findings(angle, moves, source, setup.max_engaged),
+                *engagement_findings(angle, moves, source, setup.max_engaged), *unheld,
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(cuts.notes)
@@ -114,7 +127,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
-                  met.spacing, tuple(notes))
+                  met.spacing, tuple(notes), support)
 
 
 def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -216,7 +229,7 @@ def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids
 
 def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[Reading], moves: Moves,
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
-           engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...]) -> Proof:
+           engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...], support: Support) -> Proof:
     read = [r.program for r in readings]
     took = np.concatenate([minutes_of(p, setup) for p in read]) if read else np.zeros(0)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
@@ -234,7 +247,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
                  face_proofs(scored.samples, cuts.residual, has, proved, setup), cuts.gouge_max,
                  spent(read, took, known, run.cut), float(cut_length.sum()),
                  {int(t): float(minutes[used == t].sum()) for t in np.unique(used)}, engaged, error_bound(read),
-                 cuts.reach, spacing, notes)
+                 cuts.reach, spacing, notes, support)
 
 
 def error_bound(read: Sequence[Program]) -> float:

@@ -1,0 +1,186 @@
+"""Whether thin walls keep their support: both sides go down in turn, and stock stands beside them not far below.
+
+Notation: p and q are opposite places of a thin wall (``verify.slender``), K the ratio of height to thickness that a
+wall may be free for. ``done(p)`` is when no more than twice the scallop is left at p over the allowance, ``gone(p)``
+when so much of the stock before it is gone that it no longer holds the wall. **The rule**: when both p and q are done,
+there is a place of the same wall, no farther from p than its limit, K times the mean thickness below p, at which stock
+still stands on both sides; or something of the finished part holds the wall within that limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.bvh import TriangleTree
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from verify.blank import stock_on_normals
+from verify.findings import Source
+from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support
+from verify.progress import Report, silent
+from verify.removal import Moves, residual_on_normals
+from verify.scoring import RAY_ERROR
+from verify.slender import ThinWalls, thin_walls
+
+PARTS = 256
+"""Parts of the program that times are told in: what happens in one of them counts as at once, and as in order."""
+REST = 2.0  # scallops that may be left at a place that is done: later skims of that little do not bend a wall
+HOLDS = 0.5  # of what the blank has before a place, at most, that has to stand for it to hold the wall
+ROOM = 2.0  # of the distance of places: the highest that stands may lie so much below where stock begins to stand
+BLOCK = 256
+INT = NDArray[np.int64]
+NEVER = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True, eq=False)
+class Times:
+    """When places were done and what held them was gone, n places.
+
+    gone : (n,) int64, part of the program in which the stock before it stopped to hold, -1 before the first cut
+    done : (n,) int64, the same for the end of the cut, NEVER where nobody cut it
+    mover: (n,) int64, the move after which it was done, -1 where none
+    """
+
+    gone: INT
+    done: INT
+    mover: INT
+
+
+def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody],
+              source: Source, zone_ids: Sequence[str], threads: int = 2, report: Report = silent
+              ) -> tuple[Support, list[Finding]]:
+    """How far thin walls were free when they were cut, and where that is more than they may be.
+
+    tree   : TriangleTree of the part; Z of its frame is up
+    scored : the places are taken from these
+    report : called with the share done, 0 to 1; what it raises ends the work
+
+    Returns Support, and a finding for each wall and program, where the setup asks for it.
+
+    Notes
+    -----
+    A violation that is over within one of ``PARTS`` parts of the moves beside thin walls is not seen, and one by less
+    than twice ``ThinWalls.spacing`` is none: so no order that keeps the rule is accused.
+    """
+    walls = thin_walls(tree, scored.samples, setup.free_ratio)
+    if not len(walls) or not moves.feed.any():
+        return Support(0, 0, 0.0, setup.free_ratio, 0), []
+    times = [_times(p, n, walls.thickness, tree.mesh.bounds, setup, moves, tools, threads,
+                    lambda f, k=k: report(0.5 * (k + f)))  # type: ignore[misc]
+             for k, (p, n) in enumerate(((walls.points, walls.normals), (walls.across, walls.beyond)))]
+    free, judged = _free_ways(walls, *times)
+    over = np.flatnonzero(judged & (free > walls.limit + ROOM * walls.spacing))
+    ratio = np.where(judged, free / walls.limit, 0.0) * setup.free_ratio
+    x, y, z = walls.points[int(np.argmax(ratio))].tolist()
+    figures = Support(len(np.unique(walls.wall[walls.free])), int(judged.sum()), float(ratio.max()), setup.free_ratio,
+                      len(over), setup.walls_in_turn and bool(len(over)), (x, y, z) if judged.any() else None)
+    if not setup.walls_in_turn:
+        return figures, []
+    return figures, _findings(walls, free, over, times, setup, scored, source, zone_ids)
+
+
+def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofSetup, moves: Moves,
+           tools: Sequence[ToolBody], threads: int, report: Report) -> Times:
+    """When places (n, 3), mm, of walls ``thickness`` (n,) mm thick were cut."""
+    left = np.minimum(stock_on_normals(points, normals, bounds, setup, float(thickness.max())), thickness)
+    rest = REST * setup.scallop_height + RAY_ERROR
+    enough, told = setup.stock_allowance + rest, left.copy()
+    holds = np.minimum(thickness, HOLDS * stock_on_normals(points, normals, bounds, setup, np.inf))
+    gone = np.where((left >= holds) & (holds > enough), NEVER, -1)
+    done, mover = np.where(left <= enough, -1, NEVER), np.full(len(points), -1, np.int64)
+    near = np.flatnonzero(moves.feed & _beside(moves, tools, points, thickness))
+    parts = min(PARTS, max(1, len(near)))
+    for k, rows in enumerate(np.array_split(near, parts)):
+        chosen = np.zeros(len(moves), np.bool_)
+        chosen[rows] = True
+        asked = np.flatnonzero(_met(moves, rows, tools, points, thickness))
+        if len(asked) and len(rows):
+            after, by = residual_on_normals(points[asked], normals[asked], left[asked], moves.only(chosen), tools,
+                                            threads=threads)
+            cut = by >= 0
+            fell = asked[(gone[asked] == NEVER) & cut & (after < holds[asked] - RAY_ERROR)]
+            gone[fell] = k
+            # one that is never cut that far was done with the last cut that took more off it than is left elsewhere
+            ends = cut & (done[asked] != -1) & (told[asked] > enough)
+            ends &= (after <= enough) | (told[asked] - after > rest)
+            done[asked[ends]], mover[asked[ends]], told[asked[ends]] = k, rows[by[ends]], after[ends]
+            left[asked] = after
+        report((k + 1) / parts)
+    return Times(gone, done, mover)
+
+
+def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> tuple[F64, F64]:
+    """Boxes (k, 3) and (k, 3), mm, no cutting part of some moves comes nearer than ``room`` to anything outside of."""
+    reach = np.array([np.hypot(t.radius, t.flute_length) if moves.axes is not None else t.radius for t in tools])
+    wide = reach[moves.tool[rows]][:, None] + room
+    low, high = (f(moves.start[rows], moves.end[rows]) for f in (np.minimum, np.maximum))
+    tall = wide if moves.axes is not None else np.array([t.flute_length for t in tools])[moves.tool[rows]][:, None]
+    up = np.concatenate([wide, wide, tall + room], axis=1)
+    down = np.concatenate([wide, wide, wide if moves.axes is not None else np.full_like(wide, room)], axis=1)
+    return low - down, high + up
+
+
+def _beside(moves: Moves, tools: Sequence[ToolBody], points: F64, room: F64) -> NDArray[np.bool_]:
+    """(m,) bool: moves whose box meets that of all places."""
+    low, high = _boxes(moves, np.arange(len(moves)), tools, float(room.max()))
+    return np.asarray(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
+
+
+def _met(moves: Moves, rows: INT, tools: Sequence[ToolBody], points: F64, room: F64) -> NDArray[np.bool_]:
+    """(n,) bool: places within the box of some moves."""
+    if not len(rows):
+        return np.zeros(len(points), np.bool_)
+    low, high = _boxes(moves, rows, tools, float(room.max()))
+    return np.asarray(((points >= low.min(axis=0)) & (points <= high.max(axis=0))).all(axis=1))
+
+
+def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray[np.bool_]]:
+    """(n,) mm how far each place is from what held its wall when both its sides were done, and (n,) which count."""
+    middle = 0.5 * (walls.points + walls.across)
+    stands = np.minimum(one.gone, other.gone)
+    done = np.maximum(one.done, other.done)
+    judged = walls.free & (done != NEVER) & (np.maximum(one.mover, other.mover) >= 0)
+    free = np.zeros(len(walls))
+    for number in np.unique(walls.wall[judged]).tolist():
+        own = np.flatnonzero(walls.wall == number)
+        asked = own[judged[own]]
+        # what is held in the finished part is so within its own limit
+        held = np.where(walls.free[own], np.inf, walls.limit[own])
+        for rows in np.array_split(asked, -(-len(asked) // BLOCK)):
+            way = np.linalg.norm(middle[rows][:, None] - middle[own], axis=2)
+            by_stock = np.where(stands[own] >= done[rows][:, None], way, np.inf).min(axis=1)
+            free[rows] = np.minimum(by_stock, (way + held).min(axis=1))
+    # a sheet that nothing holds anywhere, as one that hangs in the stock
+    return np.where(np.isfinite(free), free, 2.0 * walls.limit), judged
+
+
+def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[Times], setup: ProofSetup,
+              scored: ScoredSamples, source: Source, zone_ids: Sequence[str]) -> list[Finding]:
+    """A finding for each wall and program, where its places (k,) ``over`` the limit are worst."""
+    last = np.where(times[0].done >= times[1].done, times[0].mover, times[1].mover)
+    last = np.where(last >= 0, last, np.maximum(times[0].mover, times[1].mover))
+    out = []
+    groups = np.column_stack([source.program[last[over]], walls.wall[over]])
+    _, group = np.unique(groups, axis=0, return_inverse=True)
+    for number in range(int(group.max(initial=-1)) + 1):
+        mine = over[group.reshape(-1) == number]
+        k = int(mine[np.argmax(free[mine] / walls.limit[mine])])
+        m, row = int(last[k]), int(walls.row[k])
+        zone = int(scored.zone[row])
+        x, y, z = (round(float(v), 6) for v in walls.points[k])
+        lines = source.line[last[mine]]
+        span = f", lines {int(lines.min())} to {int(lines.max())}" if lines.min() < lines.max() else ""
+        text = (f"T{source.tool[m]} finishes a wall {walls.thickness[k]:.2f} mm thick where it is free for "
+                f"{free[k]:.1f} mm: no nearer stands stock on both its sides ({setup.free_ratio:g} times its thickness "
+                f"are allowed){span}; cut both its sides down in turn, by no more than that, or hold it")
+        out.append(Finding(FindingKind.SUPPORT, source.names[source.program[m]], int(source.line[m]),
+                           zone_ids[zone - 1] if zone else None, f"F{scored.samples.face[row]}", (x, y, z),
+                           float(free[k]), float(walls.limit[k]), text, len(mine)))
+    return out
+
+
+__all__ = ["Support", "supported"]
