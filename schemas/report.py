@@ -35,8 +35,9 @@ class PlannedZone(ZoneFacts):
     machining_time_s: Annotated[float | None, Field(description="Of all its workingsteps.")] = None
     step: Annotated[str | None, Field(description="The first of `steps`.")] = None
     steps: Annotated[list[str], Field(description="Its finishing workingsteps in machining order: none where nothing "
-                                                  "could be planned, a second one where stock of another zone was in "
-                                                  "the way of the first.")] = []
+                                                  "could be planned, a further one where stock of another zone was in "
+                                                  "the way of the first, and one a band of depth where thin walls are "
+                                                  "cut in turn.")] = []
     scallop_mm: ScallopFacts | None = None
     gouge_mm: float | None = None
     coverage: Share | None = None
@@ -125,7 +126,9 @@ class Caution(ReportModel):
 
     kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows. "
                                            "deflection: a tool bends too far at its full feed. thin_wall: a wall "
-                                           "is high for its thickness; measured is height over thickness. tool_life: a "
+                                           "is high for its thickness; measured is height over thickness. support: "
+                                           "thin walls are finished without stock beside them near by; measured is how "
+                                           "far they are free, in times their thickness. tool_life: a "
                                            "tool takes more than one cutter, or more than one for a run.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str

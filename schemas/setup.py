@@ -165,6 +165,11 @@ class Operations(WireModel):
         description="Direction of cut on walls.")] = "climb"
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Passes over shallow area. auto: zigzag or spiral, whichever is less way.")] = "auto"
+    walls_in_turn: Annotated[bool, Field(
+        description="Both sides of a wall more than 10 times as high as thick go down in turn, so that it is never "
+                    "free for more than 10 times its thickness where it is finished; a program of one access on a "
+                    "3-axis machine that does not keep to that is not proved, of others it is a warning. false: such "
+                    "walls are held otherwise, and it is a warning.")] = True
 
     @model_validator(mode="after")
     def _check(self) -> Operations:

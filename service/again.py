@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from service.sides import Look, Program, Side
-from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.bands import HighWall
+from toolpath.counterexamples import CLOSER, NONE, Counterexamples
 from toolpath.motion import Workingstep
 from verify.model import Finding, FindingKind, Proof
 from zones.zoning import ZoneArea
@@ -67,7 +68,8 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
     """What to plan with next; None where the proof found nothing, or something that planning again is no answer to.
 
     A place at which the tool dug is gone to with care next time, one at which too much of it was in stock in skims; one
-    at which it does so again, or beside a wall, or at which it met something, is barred to it.
+    at which it does so again, or beside a wall, or at which it met something, is barred to it. Where a wall lacked
+    support, all goes down in lower bands.
     """
     findings = tried.proof.findings
     packed = sum(f.kind is FindingKind.ENGAGEMENT for f in findings)
@@ -80,6 +82,11 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
         if f.kind is FindingKind.RESIDUAL and f.depth > 0.0:
             continue  # all of them are told below, sample by sample
         step = _step_of(f, tried.programs)
+        if step is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
+            side = next(s for s in tried.sides for t in s.made.steps if t is step)
+            out[side.view.id] = _held(before.along(side.view.id), out.get(side.view.id, NONE), f, tried, side)
+            notes.append(f"planned again, in lower bands ({step.id}): {f.message}")
+            continue
         if step is None or f.tip is None or f.kind not in (FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *MET):
             return None
         side, made = next((s, t) for s in tried.sides for t in s.made.steps if t is step)
@@ -114,6 +121,13 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
         if len(again):
             notes.append(f"planned again, {len(again)} places of {zone.id} given up: more stayed there again")
     return Learned(out, tuple(notes))
+
+
+def _held(before: Counterexamples, old: Counterexamples, f: Finding, tried: Attempt, side: Side) -> Counterexamples:
+    """With a wall that a finding says was finished without support; it counts as thinner the second time."""
+    top = float((np.array(f.point) @ tried.look.rotation @ side.view.rotation.T)[2])
+    thin = f.limit / tried.proof.support.limit * CLOSER ** (2 if before.unheld else 1)
+    return replace(old, unheld=(*old.unheld, HighWall(top, top - f.depth, thin)))
 
 
 def _with(places: Mapping[str, F64], tool: str, tip: F64) -> Mapping[str, F64]:

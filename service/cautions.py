@@ -20,6 +20,8 @@ from service.prepare import Prepared
 from toolpath.deflection import Bend
 from toolpath.life import minutes_in_cut
 from toolpath.motion import Workingstep
+from verify.model import Support
+from zones.model import Wall
 from zones.thinness import slender_walls
 
 MOST_RATIO = 10.0
@@ -30,7 +32,7 @@ MOST_RATIO = 10.0
 class Caution:
     """One of them.
 
-    kind      : 'limited', 'thin_wall', 'deflection' or 'tool_life'
+    kind      : 'limited', 'thin_wall', 'support', 'deflection' or 'tool_life'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -74,12 +76,17 @@ def limited(setup: Setup) -> list[Caution]:
     return out
 
 
+def walls_to_cut(ready: Prepared) -> list[Wall]:
+    """Walls of which anything is to be cut."""
+    cut = set(np.unique(ready.samples.face).tolist())
+    return [w for w in ready.decomposition.walls if cut & set(w.faces)]
+
+
 def thin_walls(ready: Prepared) -> list[Caution]:
     """Walls to be cut that are more than ``MOST_RATIO`` times as high as thick, each once, where it is worst."""
-    view, cut = ready.views[0], set(np.unique(ready.samples.face).tolist())
-    walls = [w for w in ready.decomposition.walls if cut & set(w.faces)]
+    view = ready.views[0]
     out = []
-    for s in slender_walls(view.part, view.tree, walls, MOST_RATIO):
+    for s in slender_walls(view.part, view.tree, walls_to_cut(ready), MOST_RATIO):
         x, y, z = view.back(np.array(s.at)).tolist()
         message = (f"wall {s.wall} is {s.thickness:.2f} mm thick and {s.height:.2f} high near X{x:.2f} Y{y:.2f} "
                    f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MOST_RATIO:g} to 1), so it gives way and swings")
@@ -87,6 +94,19 @@ def thin_walls(ready: Prepared) -> list[Caution]:
                            "hold it or fill the room beside it, cut both its sides down in turn, or make it thicker",
                            (x, y, z)))
     return out
+
+
+def unheld(support: Support) -> list[Caution]:
+    """That thin walls are finished without support, where the proof of a job does not hold that against it.
+
+    support : of the proof, its place in the setup frame
+    """
+    if not support.over or support.found:
+        return []
+    message = (f"thin walls are finished where they are free for up to {support.most:.1f} times their thickness "
+               f"(limit {support.limit:g} times), at {support.over} of {support.places} places")
+    return [Caution("support", (), message, support.most, support.limit,
+                    "hold them or fill the room beside them, or cut their two sides down in turn", support.at)]
 
 
 def bent(steps: Sequence[Workingstep]) -> list[Caution]:
@@ -137,4 +157,4 @@ def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls"]
+__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "unheld", "walls_to_cut"]

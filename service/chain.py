@@ -25,7 +25,7 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
 from service.artifacts import clear_results
-from service.cautions import bent, limited, lives_ended, sentences, thin_walls
+from service.cautions import bent, limited, lives_ended, sentences, thin_walls, unheld
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -34,6 +34,7 @@ from service.convert import (
     tool_bodies,
 )
 from service.delivery import Files, deliver, json_bytes
+from service.held import FREE_RATIO, band_planes, in_turn
 from service.materials import STEP_DOWN, bending, cutting_data, rates_of
 from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
@@ -128,10 +129,11 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             break
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
-    late = [*bent(made.steps), *lives_ended(setup, made.steps)]
+    stated = in_setup_frame(look, proof)
+    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
-    report, rest = reporting.job_report(ready, made, in_setup_frame(look, proof), scored.samples, scored.labels, zone,
+    report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
                                         given_up, cautions)
     progress("report", PROVED)
     files: Files = {}
@@ -188,7 +190,8 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     """
     turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
     stock = planning_stock(ready, view)
-    settings = replace(plan_settings(ready, view, stock), found=told.along(view.id))
+    found = told.along(view.id)
+    settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
     if turned:
         stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before])
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
@@ -342,7 +345,7 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
         max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
                  if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
         table=table_height(s, ready.blank) if tabled else None,
-        table_known=s.machine.table_z_mm is not None,
+        table_known=s.machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
         kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
         rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
 

@@ -203,7 +203,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
-            "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes)},
+            "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes), "support": _support(proof)},
         "warnings": [c.as_dict() for c in cautions],
         "tools": _tools(ready, proof, made.steps), "deviation": deviation(proof), "machined": None, "files": [],
         "version": VERSION,
@@ -301,6 +301,13 @@ def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[
     return out
 
 
+def _support(proof: Proof) -> dict[str, Any]:
+    """How far thin walls were free where they were finished, in times their thickness."""
+    s = proof.support
+    return {"walls": s.walls, "places": s.places, "most_ratio": r(s.most, 2), "limit_ratio": r(s.limit, 2),
+            "places_over": s.over, "at_mm": None if s.at is None else [r(v) for v in s.at]}
+
+
 def _time(proof: Proof) -> dict[str, Any]:
     t = proof.spent
     return {"in_cut_s": r(t.in_cut, 1), "in_air_s": r(t.seconds - t.in_cut, 1), "rapid_s": r(t.rapid, 1),
@@ -337,6 +344,7 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
             "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
             "cutting_length_mm": r(proof.cutting_length, 1),
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
-                      "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes)},
+                      "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes),
+                      "support": _support(proof)},
             "deviation": deviation(proof), "machined": None, "files": [],
             "part": _shape(ready)["part"], "version": VERSION}

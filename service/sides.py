@@ -82,10 +82,11 @@ class Program:
 
 
 def in_setup_frame(look: Look, proof: Proof) -> Proof:
-    """The proof with the places of its findings in the setup frame."""
+    """The proof with the places of its findings, and of what walls lacked support, in the setup frame."""
     if np.array_equal(look.rotation, np.eye(3)):
         return proof
-    return replace(proof, findings=tuple(
+    support = replace(proof.support, at=_turned(proof.support.at, look.rotation))
+    return replace(proof, support=support, findings=tuple(
         replace(f, point=_turned(f.point, look.rotation), tip=_turned(f.tip, look.rotation)) for f in proof.findings))
 
 

@@ -1,9 +1,10 @@
 """What a proof found wrong with a plan, as the next plan of the same job takes it into account.
 
-A planner decides by estimates: the stock is known at the nodes of a lattice, a ramp by the slope of its line. Where one
-is wrong the proof shows the place. Planned again, the tool goes there in thinner skins; where that does not help, or
-what was met is not stock under its end, its lines leave the place out, and what they do not finish counts as left. A
-sample at which more stayed is aimed lower at, and given up where that is no help either.
+A planner decides by estimates: the stock is known at the nodes of a lattice, a ramp by the slope of its line, a wall by
+its profile. Where one is wrong the proof shows the place. Planned again, the tool goes there in thinner skins; where
+that does not help, or what was met is not stock under its end, its lines leave the place out, and what they do not
+finish counts as left. A sample at which more stayed is aimed lower at, and given up where that is no help either. For a
+thin wall that lacked support all tools go down in lower bands.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from toolpath.bands import HighWall
 from toolpath.levels import dense
 
 CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much
@@ -23,6 +25,7 @@ CAREFUL = 1.0  # of the radius round a place, in plan, within which a line is on
 BARRED = 0.3  # of the radius round a place: what of a line is left out
 LEAST_BARRED = 0.2  # mm
 CROWDED = 0.75  # of the radius round a place: what of a line is skimmed first
+CLOSER = 0.7  # of its thickness that a wall counts as, each time it was found without support
 STRICTER = 0.5  # of what is aimed at, where more stayed than the plan had measured
 
 
@@ -35,6 +38,7 @@ class Counterexamples:
     packed : where too much of the cutter was in stock
     left   : (n,) int64, samples of a zone's checks at which more stayed than allowed
     lost   : (n,) int64, those at which it did so again: given up
+    unheld : walls that were finished without support, thinner than they are where that has to be nearer
     """
 
     dug: Mapping[str, F64] = field(default_factory=dict)
@@ -42,6 +46,7 @@ class Counterexamples:
     packed: Mapping[str, F64] = field(default_factory=dict)
     left: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     lost: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    unheld: tuple[HighWall, ...] = ()
 
     def care(self, tool: ToolBody, points: F64) -> float:
         """What share of skin and slope a line through points (n, 3), mm, may have: 1 where nothing was found."""

@@ -98,6 +98,7 @@ class Finish:
         self.faces = faces
         self.layers: Workingstep | None = None  # those that were measured
         self.step: str | None = None
+        self.settled = False  # the strategy is chosen, and stays for the bands below
         self.begun_with = ""  # name of the strategy that went before the usual one
         self.passes = 0
         self.met = np.zeros(len(checks.points), np.bool_)
@@ -111,19 +112,27 @@ class Finish:
             if t.motion is Motion.CUT:
                 self.residual.cut(t.points, layers.tool)
 
-    def walk(self, step_id: str) -> list[Workingstep]:
-        """The workingsteps of the zone; none where no pass is walked.
+    def above(self, plane: float) -> NDArray[np.bool_]:
+        """(n,) bool: which checks are finished above a height of contact, mm, and with a tip that stays above it."""
+        low = plane - self.field.tool.corner_radius - 1e-6
+        return np.asarray((self.checks.points[:, 2] >= plane) & (self.checks.tips[:, 2] >= low))
+
+    def walk(self, step_id: str, wanted: NDArray[np.bool_] | None = None) -> list[Workingstep]:
+        """The workingsteps of the zone, of the samples ``wanted`` (n,) or of all; none where no pass is walked.
 
         Where passes along the borders of its faces are not much more way than the usual ones, where the flank of a tool
         that leans lies on its walls, or where its tilted end has the curvature of its faces, these are walked as well,
         each until no more than the scallop is left. What leaves the fewest samples above it stays, of those that leave
-        as many the fastest.
+        as many the fastest. It stays for the bands below too, and a zone in bands has no leaning passes.
         """
-        if not bool((self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height)).any()):
+        every = np.ones(len(self.checks.points), np.bool_) if wanted is None else wanted
+        if not bool((every & (self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height))).any()):
             return []
-        every = np.ones(len(self.checks.points), np.bool_)
+        if self.settled:
+            return self._rounds(step_id, every)
+        self.settled = True
         other, refused = self._along_borders()
-        leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0
+        leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0 and bool(every.all())
         if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)

@@ -6,6 +6,7 @@ what it lacks: after the other zones of its tool, and, where more than the scall
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.family import Target
@@ -67,35 +69,41 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     Plan
     """
     steps: list[Workingstep] = []
-    begun: list[Finish] = []
     order = list(dict.fromkeys(z.tool.id for z in zones))
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
+    under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
+    jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
+                     trimmed or {}, under) for tid in order]
+    bands = [*settings.planes, -math.inf]
     done = 0
 
     def following() -> str:
         return f"S{len(steps) + first_step:02d}"
 
-    for tid in order:
-        mine = [z for z in zones if z.tool.id == tid]
-        field, cut = fields[tid], cut_data[tid]
-        walked, depths = Walked(), Depths(stock.lattice)
-        layered = _layers(mine, field, cut, stock, settings, depths, following()) if settings.roughing else None
-        steps.extend([] if layered is None else [layered])
-        own: list[Finish] = []
-        for zone in mine:
-            if settings.finishing:
-                faces = (trimmed or {}).get(zone.id, ())
-                own.append(Finish(zone, check_of[zone.id], field, cut, stock, settings, faces, walked,
-                                  depths))
-                if layered is not None:
-                    own[-1].measure(layered)
-                steps.extend(own[-1].walk(following()))
-            done += 1
-            if progress is not None:
-                progress(AGAIN_SHARE * done / len(zones))
-        for f in own:
-            steps.extend(f.walk_again(following(), PASS_SHARE * settings.scallop_height))
-        begun.extend(own)
+    def tell(count: int) -> None:
+        nonlocal done
+        done += count
+        if progress is not None:
+            progress(AGAIN_SHARE * done / (len(zones) * len(bands)))
+
+    for plane in bands:
+        # a tool takes stock off for those after it too, so it is left out only where none of these has work here
+        last = max((k for k, job in enumerate(jobs) if job.has_work(plane)), default=-1)
+        for k, job in enumerate(jobs):
+            if k > last:
+                tell(len(job.zones))
+                continue
+            if settings.roughing:
+                steps.extend(job.layer(plane, following()))
+            if not settings.finishing:
+                tell(len(job.zones))
+                continue
+            for zone in job.zones:
+                steps.extend(job.finish(zone, plane, following()))
+                tell(1)
+            for f in job.begun:
+                steps.extend(f.walk_again(following(), PASS_SHARE * settings.scallop_height))
+    begun = [f for job in jobs for f in job.begun]
     for f in begun:  # stock that took another tool to get away: worth changing back for what would stay otherwise
         steps.extend(f.walk_again(following(), settings.scallop_height))
     if progress is not None:
@@ -103,46 +111,104 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     return Plan(tuple(steps), tuple(f.plan() for f in begun))
 
 
-def _layers(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap, settings: PlanSettings,
-            depths: Depths, step_id: str) -> Workingstep | None:
-    """One workingstep that takes the stock above all zones of a tool off in depth layers."""
-    lat, tool = field.lattice, field.tool
-    tips = np.vstack([z.tips for z in zones])
-    allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-    pace = Pace(cut.feed, cut.link_feed, partial(cut.feed_under, tool), cut.step_down)
-    linker = Linker(field, stock, motions_of(cut, settings), depths, settings.found, pace, cut.engaged)
-    walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
-    chord = 0.5 * settings.chordal_tolerance
-    bounded = cut.engaged < UNBOUNDED
-    # the finish of a floor has the whole front in what is left on it
-    low = min(allowance, 0.5 * SKIN_SHARE * tool.radius) if bounded else allowance
-    bottom = float(tips[:, 2].min()) + low
-    top = stock.highest
-    if top <= bottom:
-        return None
-    swept, step = top, 0.85 * cut.step_down
-    heights = layers.layer_heights(top, bottom, step)
-    if bounded:
-        floors = [f.bottom + low for f in zones if f.form is Form.LEVEL]
-        heights = sorted({*heights, *(z for z in floors if bottom < z < top)}, reverse=True)
-    for z, below in zip(heights, _areas(field, tips, heights, step), strict=True):
-        if bounded:
-            Clearing(linker, z, below, allowance, 0.8 * tool.radius, settings.climb, settings.either_way,
-                     layers.STOCK_WORTH, 0.1 * lat.step).walk()
-        for lines in layers.layer(field, stock, z, below, allowance, 0.8 * tool.radius):
-            for line in nearest_order(lines, linker.at, False):
-                linker.add(turned(line, settings), 0.1 * lat.step)
-        finished = lat.mask(walls[np.abs(walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
-        unseen = z <= swept - FLUTE_SHARE * tool.flute_length
-        swept = z if unseen else swept
-        rims = layers.rim(field, stock, z, below, finished, allowance, chord, unseen)
-        for line in nearest_order(rims, linker.at, False):
-            linker.add(turned(line, settings))
-    if not linker.passes:
-        return None
-    ids = " ".join(z.id for z in zones)
-    return step_of(step_id, f"{step_id} layers {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
-                   0.8 * tool.radius, linker.finish(), settings)
+class _ToolJob:
+    """What one tool does: its layers and the finish of its zones, band by band from the top."""
+
+    def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, Target], field: TipField, cut: CutData,
+                 stock: StockMap, settings: PlanSettings, trimmed: Mapping[str, Sequence[Faces]], under: float) -> None:
+        self.zones, self.checks, self.field, self.cut, self.stock = zones, checks, field, cut, stock
+        self.settings, self.trimmed, self.under = settings, trimmed, under
+        self.walked, self.depths = Walked(), Depths(stock.lattice)
+        self.layers: _Layers | None = None
+        self.layered: list[Workingstep] = []
+        self.finishes: dict[str, Finish] = {}
+
+    @property
+    def begun(self) -> list[Finish]:
+        """The zones that have been begun, in machining order."""
+        return [self.finishes[z.id] for z in self.zones if z.id in self.finishes]
+
+    def has_work(self, plane: float) -> bool:
+        """Whether anything of its zones is above a height, mm, and was not above the plane before."""
+        above = [h for h in self.settings.planes if h > plane]
+        top = min(above, default=math.inf)
+        return plane == -math.inf or any(
+            bool(((z[:, 2] >= plane) & (z[:, 2] < top)).any()) for z in (self.checks[a.id].points for a in self.zones))
+
+    def layer(self, plane: float, step_id: str) -> list[Workingstep]:
+        """The layers of a band that ends at a height of contact, mm, as one workingstep, or none."""
+        if self.layers is None:
+            self.layers = _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under)
+        made = self.layers.down_to(plane - self.under, step_id)
+        if made is None:
+            return []
+        self.layered.append(made)
+        for f in self.begun:
+            f.measure(made)
+        return [made]
+
+    def finish(self, zone: ZoneArea, plane: float, step_id: str) -> list[Workingstep]:
+        """The finish of a zone down to a height, mm."""
+        f = self.finishes.get(zone.id)
+        if f is None:
+            f = Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
+                       self.trimmed.get(zone.id, ()), self.walked, self.depths)
+            for layered in self.layered:
+                f.measure(layered)
+            self.finishes[zone.id] = f
+        return f.walk(step_id, None if plane == -math.inf and not self.settings.planes else f.above(plane))
+
+
+class _Layers:
+    """The stock above all zones of a tool, taken off in depth layers, some of them at a time."""
+
+    def __init__(self, zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap,
+                 settings: PlanSettings, depths: Depths, under: float) -> None:
+        self.zones, self.field, self.cut, self.stock = zones, field, cut, stock
+        self.settings, self.depths = settings, depths
+        lat, tool = field.lattice, field.tool
+        tips = np.vstack([z.tips for z in zones])
+        self.allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
+        self.walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
+        self.bounded = cut.engaged < UNBOUNDED
+        # the finish of a floor has the whole front in what is left on it
+        low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
+        bottom, top, step = float(tips[:, 2].min()) + low, stock.highest, 0.85 * cut.step_down
+        self.swept, self.left = top, list[tuple[float, NDArray[np.bool_]]]()
+        if top <= bottom:
+            return
+        heights = layers.layer_heights(top, bottom, step)
+        also = [f.bottom + low for f in zones if f.form is Form.LEVEL] if self.bounded else []
+        also += [plane - under for plane in settings.planes]
+        if also:
+            heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
+        self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
+
+    def down_to(self, lowest: float, step_id: str) -> Workingstep | None:
+        """One workingstep of the layers from ``lowest`` mm up that were not walked before; None where none is."""
+        field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
+        pace = Pace(cut.feed, cut.link_feed, partial(cut.feed_under, tool), cut.step_down)
+        linker = Linker(field, self.stock, motions_of(cut, settings), self.depths, settings.found, pace, cut.engaged)
+        chord = 0.5 * settings.chordal_tolerance
+        while self.left and self.left[0][0] >= lowest - 1e-9:
+            z, below = self.left.pop(0)
+            if self.bounded:
+                Clearing(linker, z, below, self.allowance, 0.8 * tool.radius, settings.climb, settings.either_way,
+                         layers.STOCK_WORTH, 0.1 * lat.step).walk()
+            for lines in layers.layer(field, self.stock, z, below, self.allowance, 0.8 * tool.radius):
+                for line in nearest_order(lines, linker.at, False):
+                    linker.add(turned(line, settings), 0.1 * lat.step)
+            finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
+            unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
+            self.swept = z if unseen else self.swept
+            rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen)
+            for line in nearest_order(rims, linker.at, False):
+                linker.add(turned(line, settings))
+        if not linker.passes:
+            return None
+        ids = " ".join(z.id for z in self.zones)
+        return step_of(step_id, f"{step_id} layers {tool.id} {ids}", None, self.zones, "roughing", "layers", tool, cut,
+                       0.8 * tool.radius, linker.finish(), settings)
 
 
 def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:

@@ -86,6 +86,8 @@ class PlanSettings:
     turning         : what the rotary axes can do; None on a machine without
     found           : what a proof found wrong with the plans before, in the frame of this one
     rates           : what the machine does, for times
+    planes          : heights of contact, descending, above which all is finished before any tool goes below
+                      (``toolpath.bands``)
     """
 
     scallop_height: float
@@ -103,3 +105,4 @@ class PlanSettings:
     turning: Turning | None = None
     found: Counterexamples = NONE
     rates: Rates = RATES
+    planes: tuple[float, ...] = ()

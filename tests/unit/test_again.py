@@ -15,7 +15,7 @@ from service import chain
 from service.again import MOST, MOST_PACKED, Attempt, Learned, learned
 from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
-from toolpath.counterexamples import BARRED, CARE, STRICTER, Counterexamples
+from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.levels import Line
 from toolpath.plan import plan_job
 from verify.model import Finding, FindingKind
@@ -64,6 +64,20 @@ def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
     assert learned(Learned(), attempt(*many)) is None
     leaning = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
     assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
+
+
+def test_a_wall_without_support_is_cut_in_bands_and_then_in_lower_ones():
+    unheld = replace(found(FindingKind.SUPPORT, tip=None, depth=8.0), limit=6.0)
+    tried = attempt(unheld)
+    tried.proof.support = SimpleNamespace(limit=10.0)
+    once = learned(Learned(), tried)
+    (wall,) = once.along("A1").unheld
+    top = float((np.array(unheld.point) @ TILT.T)[2])  # in the frame of the access
+    assert (wall.top, wall.bottom) == pytest.approx((top, top - 8.0)) and wall.thickness == pytest.approx(0.6 * CLOSER)
+    assert "in lower bands" in once.notes[0] and not once.along("A1").barred
+    twice = learned(once, tried)
+    assert twice.along("A1").unheld[1].thickness == pytest.approx(0.6 * CLOSER**2)
+    assert learned(Learned(), attempt(replace(unheld, line=0))) is None
 
 
 @pytest.mark.parametrize(("kind", "line"), [(FindingKind.COLLISION, 3), (FindingKind.RUBBING, 3),

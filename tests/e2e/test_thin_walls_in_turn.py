@@ -1,0 +1,93 @@
+"""A job with a high thin wall goes down by bands, and what it was before would not be proved."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from examples.setups import setup_with, tool
+from schemas.setup import Setup
+from service import chain
+from service.held import FREE_RATIO, PLANNED_RATIO, band_planes
+from service.prepare import prepare
+from tests.decomposition_shapes import box
+
+cq = pytest.importorskip("cadquery")
+
+FLAT, BALL = tool(1, "flat", 4.0, 12.0), tool(2, "ball", 2.0, 12.0)
+
+
+def base():
+    return box(14, 8, 3, -7, -4, 0)
+
+
+def written(shape, path):
+    cq.exporters.export(shape, str(path))
+    return path
+
+
+@pytest.fixture(scope="module")
+def wall(tmp_path_factory):
+    """0.6 mm thick and 9.5 high."""
+    return written(base().union(box(0.6, 8, 10, 0, -4, 2.5)), tmp_path_factory.mktemp("wall") / "wall.step")
+
+
+def setup(tools=(FLAT,), **changes) -> Setup:
+    plain = setup_with(list(tools), scallop=0.05)
+    plain |= {"stock": {"kind": "box", "margin_mm": 1.0}, "material": "AlMgSi1 6082", **changes}
+    return Setup.model_validate(plain)
+
+
+def plan(step, folder, asked):
+    return chain.plan(step, asked, folder, lambda *_: None)
+
+
+def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_path, monkeypatch):
+    banded = plan(wall, tmp_path / "banded", setup())
+    assert banded["state"] == "proved" and "program.linuxcnc.ngc" in {f["name"] for f in banded["files"]}
+    support = banded["proof"]["support"]
+    assert support["walls"] == 1 and support["places"] > 100 and support["places_over"] == 0
+    assert support["most_ratio"] <= PLANNED_RATIO + 1.0 and support["limit_ratio"] == FREE_RATIO
+    steps = [s["strategy"] for s in banded["steps"]]
+    assert steps.count("layers") == 2 and steps.index("zlevel") < len(steps) - 1 - steps[::-1].index("layers")
+    monkeypatch.setattr(chain, "band_planes", lambda *_: ())
+    monkeypatch.setattr(chain, "PLANS", 1)
+    whole = plan(wall, tmp_path / "whole", setup())
+    assert whole["state"] == "unproved" and set(whole["finding_counts"]) == {"support"}
+    assert 14.0 < whole["proof"]["support"]["most_ratio"] < 9.5 / 0.6 + 1.0  # the last layer at the foot still stands
+    assert not [f for f in whole["files"] if f["kind"] == "program"]
+    assert whole["coverage"] == pytest.approx(banded["coverage"], abs=1e-3)
+
+
+def test_a_wall_that_is_held_otherwise_is_cut_as_it_comes_and_told_of(wall, tmp_path):
+    asked = setup(operations={"walls_in_turn": False})
+    ready = prepare(wall, asked, lambda *_: None)
+    assert band_planes(ready, ready.views[0]) == ()
+    report = plan(wall, tmp_path, asked)
+    assert report["state"] == "proved" and [s["strategy"] for s in report["steps"]].count("layers") == 1
+    (told,) = [w for w in report["warnings"] if w["kind"] == "support"]
+    assert told["measured"] > 14.0 and told["limit"] == FREE_RATIO
+    assert told["at_mm"][2] == pytest.approx(12.5, abs=0.4) and told["message"] in " ".join(report["part"]["warnings"])
+    assert json.loads((tmp_path / "report.json").read_text())["warnings"] == report["warnings"]
+
+
+def test_tools_after_each_other_keep_it_too(tmp_path):
+    """A ball finishes a lying bar, its tip a radius lower than its contact: beside the wall stock goes that far too."""
+    shape = base().union(box(0.6, 8, 10, 0, -4, 2.5)).union(
+        cq.Workplane("XZ").center(4.0, 3.0).circle(1.5).extrude(8.0).translate((0.0, 4.0, 0.0)))
+    report = plan(written(shape, tmp_path / "bar.step"), tmp_path / "job", setup((FLAT, BALL)))
+    assert report["state"] == "proved" and report["proof"]["support"]["walls"] == 1
+    assert {s["tool"] for s in report["steps"]} == {"T1", "T2"} and report["proof"]["support"]["most_ratio"] < 9.0
+
+
+def test_what_no_decomposition_calls_a_wall_is_planned_again_in_bands(tmp_path):
+    """A pin of 0.8 mm, 9.5 high."""
+    shape = base().union(cq.Workplane().circle(0.4).extrude(10.0).translate((0, 0, 2.5))).union(
+        box(2, 8, 6, 4.5, -4, 2.5))
+    step = written(shape, tmp_path / "pin.step")
+    ready = prepare(step, setup(), lambda *_: None)
+    assert band_planes(ready, ready.views[0]) == ()
+    report = plan(step, tmp_path / "job", setup())
+    assert report["state"] == "proved" and report["proof"]["support"]["most_ratio"] <= FREE_RATIO
+    assert any("planned again, in lower bands" in w for w in report["part"]["warnings"])
