@@ -11,31 +11,21 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from verify.findings import Source, chains, worst_of
-from verify.kernels.engaged import SECTORS, window_angles
+from verify.kernels.engaged import FRONT, window_angles
 from verify.model import Engagement, Finding, FindingKind
 from verify.removal import Moves
+from verify.toolaxes import sector_frames
 
-WINDOW = 0.5
-"""Share of the tool radius: way over which sectors are put together, as short moves meet few places of the stock."""
-CORNER = math.radians(30.0)
-"""Between two moves, from which on the second begins a way of its own."""
-RESOLUTION = 2 * math.pi / SECTORS
+RESOLUTION = 2 * math.pi / FRONT
 """rad: sectors at both ends of an engaged arc are counted whole."""
 
 
 def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
-    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``.
-
-    Sectors count from the way of a move, so those of a way before a corner are not put together with those after it.
-    """
-    way = moves.end - moves.start
-    length = np.linalg.norm(way, axis=1)
-    ahead = way / np.maximum(length, 1e-12)[:, None]
-    begins = np.ones(len(way), np.bool_)
-    begins[1:] = ((ahead[1:] * ahead[:-1]).sum(axis=1) < math.cos(CORNER)) | (moves.tool[1:] != moves.tool[:-1])
-    stretch = (np.cumsum(begins) - 1).astype(np.int32)
-    window = WINDOW * np.array([t.radius for t in tools])[moves.tool[begins]]
-    return np.asarray(window_angles(bits, length, stretch, moves.feed, window))
+    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``."""
+    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    radius = np.array([t.radius for t in tools])
+    return np.asarray(window_angles(bits, start, end, *sector_frames(moves.axes, len(moves)), moves.tool, moves.feed,
+                                    radius))
 
 
 def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int, Engagement]:

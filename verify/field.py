@@ -26,7 +26,7 @@ from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
 from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
-from verify.toolaxes import ToolAxes
+from verify.toolaxes import ToolAxes, sector_frames
 
 F32 = NDArray[np.float32]
 MOST_NODES = 24_000_000
@@ -169,14 +169,16 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     axes = moves.axes or ToolAxes.upright(len(moves))
     reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
     start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
+    x, y = sector_frames(moves.axes, len(moves))
+    twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
     sums, spare = tables_for(threads, (len(moves), 5))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
             events, taken = event_table(), spare.get()
             n = field_tile(field.values, tile, field.origin, field.step, field.band, start, end, axes.axis,
-                           axes.about, axes.angle, moves.feed, free, steep, moves.tool, cutters, ends, bodies.rows,
-                           bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
+                           axes.about, axes.angle, twists, moves.feed, free, steep, moves.tool, cutters, ends,
+                           bodies.rows, bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
             spare.put(taken)
             return noted(events), n
         return work

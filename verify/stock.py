@@ -33,11 +33,21 @@ from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import UNDER, stock_tile
+from verify.kernels.stock import stock_tile
 from verify.model import ProofSetup, StockKind
 from verify.progress import Stages
 from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
-from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
+from verify.stockpass import (
+    StockPass,
+    descents,
+    end_radii,
+    event_table,
+    free_rapids,
+    gather,
+    noted,
+    tables_for,
+    ways_before,
+)
 
 MAX_LINES = 6_000_000
 BLOCK = 32
@@ -106,7 +116,8 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
-    (steep, earned), cut = descents(moves, setup.ramp_angle), np.zeros(len(moves), np.uint8)
+    (steep, earned), ways = descents(moves, setup.ramp_angle), ways_before(moves)
+    cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     skins, free = setup.plunge_skin * 2.0 * cutters[:, 0], free_rapids(moves)
     nx, ny = field.height.shape
     tables, spare = tables_for(threads, (len(moves),))
@@ -115,17 +126,16 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
         def work() -> object:
             events, engaged = event_table(), spare.get()
             n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
-                           moves.start, moves.end, moves.feed, free, steep, earned, moves.tool, cutters,
+                           moves.start, moves.end, moves.feed, free, steep, earned, ways, moves.tool, cutters,
                            end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
-                           setup.gouge_tolerance, cut, engaged, events)
+                           setup.gouge_tolerance, cut, under, engaged, events)
             spare.put(engaged)
             return noted(events), n
         return work
 
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
     events, lost = gather(run_tiles([job(*b) for b in blocks], threads, progress))
-    seen = np.bitwise_or.reduce(tables)
-    return StockPass(events, lost, cut.astype(bool), seen & ~UNDER, under=(seen & UNDER) != 0)
+    return StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables), under=under.astype(bool))
 
 
 def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,

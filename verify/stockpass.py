@@ -45,6 +45,16 @@ def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
     return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
 
 
+def ways_before(moves: Moves) -> F64:
+    """(m,) float64, mm: sideways way of all upright feed moves before each; ``ANOTHER_TOOL`` mm more after each rapid
+    and each change of the tool."""
+    d = moves.end - moves.start
+    cuts = ~moves.feed
+    cuts[1:] |= moves.tool[1:] != moves.tool[:-1]
+    aside = np.where(moves.feed, np.hypot(d[:, 0], d[:, 1]), 0.0)
+    return np.asarray(np.cumsum(aside) - aside + ANOTHER_TOOL * np.cumsum(cuts))
+
+
 @dataclass(frozen=True, eq=False)
 class StockPass:
     """What one pass over the stock found.

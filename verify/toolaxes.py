@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from verify.kernels.engaged import carried_frames
 
 STILL = 1e-9  # rad, below which an axis does not turn: 1e-7 mm at 100 mm
 
@@ -64,3 +65,14 @@ def square_to(axis: F64) -> F64:
     least = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     out = least - np.einsum("ij,ij->i", least, axis)[:, None] * axis
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+
+def sector_frames(axes: ToolAxes | None, count: int) -> tuple[F64, F64]:
+    """X and Y, (m, 3) float64 unit vectors square to the tool axis half way along each of ``count`` moves.
+
+    Setup X and Y for a tool along +Z; from there on as little turned about the axis as may be.
+    """
+    axis = np.tile([0.0, 0.0, 1.0], (count, 1)) if axes is None else np.ascontiguousarray(axes.middle)
+    x = square_to(axis)
+    carried_frames(axis, x)
+    return x, np.asarray(np.cross(axis, x))

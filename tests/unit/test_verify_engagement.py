@@ -9,7 +9,7 @@ import pytest
 from tests.pocket_case import OTHER, SETUP, TOOL, block, program, scored, text
 from verify.engagement import RESOLUTION, engaged_angles, engagements
 from verify.field import run_field, stock_field
-from verify.kernels.engaged import sector_bits
+from verify.kernels.engaged import SECTORS, edge_radius, sector_bits
 from verify.model import FindingKind, ProofSetup, StockKind
 from verify.prove import prove
 from verify.removal import Moves
@@ -53,14 +53,77 @@ def test_what_a_finishing_pass_skims_is_no_engagement():
     assert not angle.any() and engagements(angle, moves, [tool]) == {}
 
 
-def test_sectors_are_counted_from_the_left():
-    def bits(b, over=5.0, corner=0.0, wide=1e-9):
-        return int(sector_bits(0.0, b, 1.0, 0.0, 1.0, over, 2.0, corner, wide))
+def test_sectors_are_counted_all_round_from_x():
+    def bits(b, over=5.0, corner=0.0, wide=1e-9, way=(1.0, 0.0), twist=0.0):
+        dx, dy = way
+        rho = edge_radius(over, 2.0, corner)
+        return int(sector_bits(-b * dy, b * dx, dx, dy, 1.0, rho, rho, wide, twist)) & 2**64 - 1
 
-    assert [bits(b) for b in (1.9999, 1e-6, -1e-6, -1.9999, 2.001)] == [1, 1 << 15, 1 << 16, 1 << 31, 0]
-    assert bits(0.0, wide=4.0) == 2**32 - 1 and bits(1.0, wide=2.0) == 2**16 - 1 | 1 << 16
+    assert [bits(b) for b in (1.9999, 1e-6, -1e-6, -1.9999, 2.001)] == [1 << 15, 1, 1 << 63, 1 << 48, 0]
+    assert bits(1e-6, way=(0.0, 1.0)) == bits(1e-6, twist=0.5 * math.pi) == 1 << 16
+    assert bits(0.0, wide=4.0) == (2**16 - 1) | (2**64 - 2**48) | 1 << 16
+    assert bits(1.0, wide=0.5) == sum(1 << k for k in range(3, 7))
+    assert bits(1.0, wide=1.1) == sum(1 << k for k in range(2, 17))
     # under its equator a ball is thinner
     assert bits(1.5, over=0.2, corner=2.0) == 0
+    # what it leaves of a place beside the way it takes until it is past it
+    assert int(sector_bits(0.0, 1.0, 1.0, 0.0, 1.0, 2.0, 1.0, 1e-9, 0.0)) == sum(1 << k for k in range(5, 17))
+
+
+def slot(points, tool, depth=3.0, lean=0.0):
+    """Engaged angles along a way (n, 2) through the block, ``depth`` mm deep, where all of the cutter is in it."""
+    points = np.column_stack([points, np.full(len(points), 0.5 - depth)])
+    moves = Moves(points[:-1], points[1:], np.ones(len(points) - 1, bool), np.zeros(len(points) - 1, np.int32))
+    if lean == 0.0:
+        run = run_stock(blank(PART.mesh, 0.15 * tool.radius, BLANK), moves, [tool], BLANK)
+    else:
+        u = np.tile([math.sin(lean), 0.0, math.cos(lean)], (len(moves), 1))
+        moves = replace(moves, axes=ToolAxes.between(u, u))
+        run = run_field(stock_field(PART.mesh, BLANK, 0.15), moves, [tool], BLANK)
+    inside = np.any([(np.abs(p[:, :2]) < [14.0, 9.0]).all(axis=1) for p in (moves.start, moves.end)], axis=0)
+    if not inside.any():
+        inside[:] = True
+    return engaged_angles(run.engaged, moves, [tool])[inside]
+
+
+def straight(cut, jog=0.0):
+    x = np.arange(-24.0, -24.0 + 30.0 + 1e-9, cut)
+    return np.column_stack([x, jog * (np.arange(len(x)) % 2)])
+
+
+def stairs(cut):
+    k = np.arange(int(28.0 / cut) + 1)
+    return np.column_stack([-18.0 + cut * ((k + 1) // 2), -13.0 + cut * (k // 2)])
+
+
+BALL = replace(TOOL, corner_radius=TOOL.radius)
+
+
+@pytest.mark.parametrize("lean", [0.0, 1e-4])
+@pytest.mark.parametrize("cut", [30.0, 0.5, 0.1, 0.02])
+@pytest.mark.parametrize(("tool", "depth"), [(TOOL, 3.0), (TOOL, 0.3), (BALL, 1.2)])
+def test_a_slot_is_a_slot_however_it_is_cut_into_moves(tool, depth, cut, lean):
+    """All of the front of a flat is in a slot, and of a ball all but what it takes off in skims beside its way."""
+    if lean and (cut < 0.1 or depth < 1.0):
+        pytest.skip("slow on the grid")
+    angle = slot(straight(cut), tool, depth, lean)
+    assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(170 if tool is TOOL else 160)
+
+
+@pytest.mark.parametrize("tool", [TOOL, BALL])
+def test_turns_that_are_but_steps_of_one_way_hide_nothing(tool):
+    for way in (straight(0.02, jog=5e-4), stairs(0.05), stairs(0.02), np.repeat(straight(0.1), 2, axis=0)):
+        angle = slot(way, tool, 1.2)
+        assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(150)
+
+
+def test_what_lies_behind_after_a_corner_is_not_in_front():
+    """The tool goes along a side 1 mm in, and turns off it: no more than the side it goes along is in stock."""
+    y = -15.0 - TOOL.radius + 1.0
+    way = np.array([[-24.0, y], [0.0, y], [0.0, y - 0.2], [0.0, y - 2.0]])
+    angle = slot(way, TOOL)
+    assert angle[0] == pytest.approx(math.acos(1.0 - 1.0 / TOOL.radius), abs=RESOLUTION + 0.1)
+    assert (angle[1:] <= angle[0]).all()
 
 
 def test_a_slot_above_the_limit_is_a_finding_on_its_line():
@@ -74,13 +137,15 @@ def test_a_slot_above_the_limit_is_a_finding_on_its_line():
     assert first <= 14 and "limit 120 deg" in proof.findings[0].message
 
 
-@pytest.mark.parametrize(("turn", "joined"), [(0.0, True), (25.0, True), (40.0, False), (90.0, False)])
-def test_sectors_of_a_way_before_a_corner_are_not_put_together_with_those_after_it(turn, joined):
-    """The left quarter of the front is met on one short move, the right one on the next."""
+@pytest.mark.parametrize(("turn", "front"), [(0.0, 90.0), (45.0, 90.0), (90.0, 90.0), (135.0, 45.0), (180.0, 0.0)])
+def test_of_what_was_met_before_a_corner_what_is_in_front_counts(turn, front):
+    """The left half of the front, 0 to 90 degrees, is met on a move, and one sector ahead on the next, to the left."""
     a = math.radians(turn)
-    places = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.2 + 0.2 * math.cos(a), 0.2 * math.sin(a), 0]])
+    places = np.array([[0.0, 0, 0], [0.3, 0, 0], [0.3 + 0.9 * math.cos(a), 0.9 * math.sin(a), 0]])
     moves = Moves(places[:-1], places[1:], np.ones(2, bool), np.zeros(2, np.int32))
-    bits = np.array([0xFF, 0xFF << 24], np.int64)
-    quarter, second = engaged_angles(bits, moves, [TOOL])
-    assert quarter == pytest.approx(math.pi / 4)
-    assert second == pytest.approx(math.pi / 2 if joined else math.pi / 4)
+    ahead = int(turn / 360.0 * SECTORS) % SECTORS
+    bits = np.array([2**16 - 1, 1 << ahead], np.uint64).view(np.int64)
+    first, second = engaged_angles(bits, moves, [TOOL])
+    assert first == pytest.approx(math.pi / 2)
+    own = 0.0 if turn < 90.0 else math.pi / (SECTORS // 2)
+    assert second == pytest.approx(math.radians(front) + own)

@@ -22,7 +22,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.engaged import LEAST_DEPTH, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, edge_radius, sector_bits
 from verify.kernels.frustum import contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
@@ -79,7 +79,7 @@ def _box(p, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, totals):
+def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, twist, totals):
     """Lower the nodes of one brick by piece p.
 
     totals : added to: volume, volume by the end, 1 where stock was touched, the end's volume times the square of
@@ -129,7 +129,8 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             totals[2] = 1.0
                             plan = math.sqrt(dx * dx + dy * dy)
                             if d <= 0.0 and plan > 0.0 and qz - 0.5 * dz > LEAST_DEPTH * cutter[0]:
-                                sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h)
+                                rho = edge_radius(qz - 0.5 * dz, cutter[0], r)
+                                sectors |= sector_bits(qx, qy, dx, dy, plan, rho, rho, h, twist)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
@@ -145,7 +146,7 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
 
 
 @njit(**KERNEL)
-def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, totals):
+def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist, totals):
     """Lower the nodes of a tile by a cutting part on piece p; returns the sectors of it that met stock."""
     sectors = np.int64(0)
     box = _box(p, 0.0, cutter[2], cutter[0] + band)
@@ -166,7 +167,7 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, total
                 if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter[0], cutter[1], cutter[2]) - half >= top:
                     continue
                 tops[bi, bj, bk], met = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep,
-                                                   end_radius, totals)
+                                                   end_radius, twist, totals)
                 sectors |= met
     return sectors
 
@@ -266,11 +267,12 @@ def _look(field, tops, solid, tile, h, origin, p, bodies, first, stop, cutter, s
 
 
 @njit(**KERNEL)
-def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, feeds, free, steep, tool, cutters,
-               ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
+def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, twists, feeds, free, steep, tool,
+               cutters, ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
+    twists : (m,) float64, rad, of the X that a tool sees a move in, row w, in the frame of the sectors
     free  : (m,) bool, rapids that no clearance is asked of
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
@@ -323,7 +325,8 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, f
             seen = _seen_tile(piece, cx, cy, cz, rad + band)
             near = not _beside(seen, 0.0, cutters[k, 2], cutters[k, 0] + grow)
             if near and feed:
-                sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], totals)
+                sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k],
+                                twists[m], totals)
             elif near:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
             _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1], cutters[k], seen,

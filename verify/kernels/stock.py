@@ -13,13 +13,12 @@ import math
 import numpy as np
 from numba import njit
 
-from verify.kernels.engaged import LEAST_DEPTH, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, WINDOW, edge_radius, sector_bits
 from verify.kernels.frustum import contact
 from verify.kernels.heights import INF, _cells, entered, lowest, lowest_within
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
-UNDER = 1 << 40  # beside the sectors of ``engaged``
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 
 
@@ -71,8 +70,12 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, best):
+def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, gone_on, come, begun,
+           best):
     """Lower the lines under one feed move.
+
+    gone_on     : mm of way before the move
+    come, begun : (nx, ny) of the block, height of a line before the cutter began to lower it, mm, and mm of way then
 
     Returns whether any stock went, the sectors of the cutter that met it, and whether the flutes were under stock.
     """
@@ -110,10 +113,16 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                 continue
             height[i, j] = low
             cut = cut or gone > 1e-6
-            if gone > LEAST_DEPTH * radius and plan > 0.0:
-                over = low + gone - a[2] - s * d[2]
-                engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan, over, radius, corner,
-                                       step)
+            if plan > 0.0:
+                # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it
+                way = gone_on + s * plan
+                if way - begun[i - i0, j - j0] > WINDOW * radius:
+                    begun[i - i0, j - j0], come[i - i0, j - j0] = way, low + gone
+                tip = a[2] + s * d[2]
+                if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
+                    engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan,
+                                           edge_radius(low + gone - tip, radius, corner),
+                                           edge_radius(max(low - tip, LEAST_DEPTH * radius), radius, corner), step, 0.0)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
@@ -190,21 +199,23 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
 
 
 @njit(cache=True, nogil=True)
-def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, tool, cutters,
-               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, engaged, events):
+def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, ways, tool, cutters,
+               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, under, engaged, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
 
     steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
     rapid_grow : mm around everything in a rapid, but in those that are ``free`` (m,) bool
+    ways  : (m,) float64, mm, sideways way of feed moves before each; far off after a rapid or another tool
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
-    engaged : (m,) int64, sectors of the cutter that met stock, added to, and UNDER where the flutes were under stock,
-              of which lines of one height cannot tell
+    under : (m,) uint8, set where the flutes were under stock, of which lines of one height cannot tell
+    engaged : (m,) int64, sectors of the cutter that met stock, added to
 
     Returns the number of events found, which may exceed the table.
     """
     box = (i0, i1, j0, j1)
     since = np.zeros((i1 - i0, j1 - j0))
     dug = np.zeros((i1 - i0, j1 - j0))
+    come, begun = np.zeros((i1 - i0, j1 - j0)), np.full((i1 - i0, j1 - j0), -INF)
     best = np.zeros((16, 5))
     top = _top(height, i0, i1, j0, j1)
     x0, x1 = origin[0] + i0 * step, origin[0] + i1 * step
@@ -226,10 +237,10 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            went, sectors, under = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
-                                   earned[m], since, dug, best)
-            if under:
-                engaged[m] |= UNDER
+            went, sectors, below = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
+                                          earned[m], since, dug, ways[m], come, begun, best)
+            if below:
+                under[m] = 1
             if went:
                 cut[m] = 1
                 engaged[m] |= sectors
@@ -238,7 +249,7 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
                     top = _top(height, i0, i1, j0, j1)
         else:
             if _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
-                engaged[m] |= UNDER
+                under[m] = 1
         for b in range(body_first[k], body_first[k + 1]):
             if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
                 # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
