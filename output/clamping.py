@@ -60,7 +60,8 @@ class Leg:
 class Section:
     """A step with the ways to it and, before a tool is put away, from it.
 
-    fresh, last : its tool is put in before it, and the way to it begins at ``home`` then; it is put away after it
+    fresh, last : its tool is put in before it, and the way to it begins at ``home`` then; it is put away after it.
+                  Where the plan has restart points all steps are both, though the tool stays
     before, legs, after : the way to its start, the step itself, back to ``home``
     """
 
@@ -90,8 +91,8 @@ def sections(plan: Workplan) -> list[Section]:
         raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
     walk, out, steps = _Walk(plan.clamping), [], plan.steps
     for k, step in enumerate(steps):
-        fresh = k == 0 or step.tool != steps[k - 1].tool or step.fresh
-        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool or steps[k + 1].fresh
+        fresh = k == 0 or step.tool != steps[k - 1].tool or step.fresh or plan.restart
+        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool or steps[k + 1].fresh or plan.restart
         grid_path(step)
         before = walk.enter(step, fresh)
         legs = walk.through(step)

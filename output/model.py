@@ -56,6 +56,7 @@ class Workplan:
     clamping        : of a machine with rotary axes: steps are in the frame of their access; None: all in the setup's
     labels          : passed through to headers
     comments        : header lines for the machinist (ASCII, no parentheses)
+    restart         : every step begins as after a tool change, so that a program can be started at each of them
     """
 
     name: str
@@ -71,6 +72,7 @@ class Workplan:
     labels: dict[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
     clamping: Clamping | None = None
+    restart: bool = False
 
 
 __all__ = ["Clamping", "Frame", "Motion", "StockBox", "Trajectory", "Workingstep", "Workplan"]

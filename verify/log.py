@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
@@ -48,6 +49,7 @@ class Log:
         self.blend = 0.0
         self.turned = TurnLog()
         self._remedy: str | None = None
+        self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]
 
     @property
     def count(self) -> int:
@@ -98,6 +100,17 @@ class Log:
         """Note that a tool turns at ``speed``, 1/min."""
         if speed > self.speeds.get(tool, (0.0, 0))[0]:
             self.speeds[tool] = speed, self.line
+
+    def runs(self, speed: float, coolant: bool) -> None:
+        """Note that from the next move on the spindle turns at ``speed``, 1/min, 0 where it stands, and the coolant."""
+        if (speed, coolant) != self._states[-1][1:]:
+            self._states.append((self.count, speed, coolant))
+
+    def states(self) -> tuple[F64, NDArray[np.bool_]]:
+        """(m,) float64, 1/min, and (m,) bool: speed and coolant of all moves."""
+        begun, speed, coolant = zip(*self._states, strict=True)
+        row = np.searchsorted(np.array(begun), np.arange(self.count), side="right") - 1
+        return np.array(speed)[row], np.array(coolant)[row]
 
     def room(self, moves: float) -> None:
         """Refuse a block of ``moves`` moves that would be too long, before it is written out.

@@ -57,6 +57,9 @@ class Modes(Rotary):
         self._spindle(block.ms)
         if s.turning:
             self.log.turns(s.tool, s.speed)
+        if not {7, 8, 9}.isdisjoint(block.ms):
+            s.coolant = 9 not in block.ms
+        self.log.runs(s.speed if s.turning else 0.0, s.coolant)
         if not {428, 429}.isdisjoint(block.ms):
             self._control(s.tcp_word, 428 in block.ms)
         for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it

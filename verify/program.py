@@ -72,6 +72,8 @@ class Program:
     remarks : what should not be run
     poses   : None where the tool stands along Z throughout: no rotary axis ever leaves 0
     notes   : what was done and should be known
+    speed   : (m,) float64, 1/min, at which the spindle turns, 0 where it stands
+    coolant : (m,) bool
     """
 
     name: str
@@ -92,6 +94,8 @@ class Program:
     minutes: F64
     poses: Poses | None = None
     notes: tuple[str, ...] = ()
+    speed: F64 = field(default_factory=lambda: np.zeros(0))
+    coolant: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -123,6 +127,7 @@ class State:
     feed: float = NAN
     speed: float = NAN
     spindle: bool = False
+    coolant: bool = False
     selected: int = 0
     tool: int = 0
     offset: int | None = None

@@ -1,8 +1,9 @@
 """NC text to moves of the tool tip: a LinuxCNC / Fanuc reader of its own for three to five axes.
 
 A program is read line by line by one modal machine; parameters, expressions and O-words of
-LinuxCNC are worked out in a stage before it (``flow``). The common line, one straight move in modal
-coordinates, is taken by one regular expression; everything else goes through the full block (``words``).
+LinuxCNC are worked out in a stage before it (``flow``), words of other controls are spelt in its own
+there (``dialects``). The common line, one straight move in modal coordinates, is taken by one regular
+expression; everything else goes through the full block (``words``).
 What the reader does not know it names with its line (``ProgramError``): nothing is skipped in silence.
 What it understands but a machinist should not run (length offset off, another work offset, spindle
 standing, path blending beyond the tolerance, a word no code takes) becomes a ``Remark`` and the reading goes on.
@@ -19,8 +20,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
-from geometry.errors import ProgramError
+from geometry.errors import ProgramError, VerificationError
 from verify.cycles import FEED, RAPID
+from verify.dialects import DIALECTS, LINUXCNC, spelt
 from verify.flow import Flow, has_flow
 from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
@@ -37,10 +39,14 @@ TOLD = 4096  # lines between two reports of how far the reading is
 class Reader(Motion):
     """One reading of one program; use ``read_program``."""
 
-    def read(self, text: str, report: Report = silent) -> Program:
+    def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
         log, lines = self.log, text.split("\n")
-        blocks = Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1)
+        blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
+        if dialect != LINUXCNC:
+            blocks = spelt(lines, dialect, log)
+        elif has_flow(text):
+            blocks = Flow(lines, self).blocks()
         percents = self._scan(_told(blocks, len(lines), report))
         self.stop("end of the program")
         if not self.s.ended and percents < 2 and not log.errors:
@@ -53,12 +59,13 @@ class Reader(Motion):
             log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps that "
                        "for the next run: take it back with G92.1")
         table = log.table()
+        speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
                        table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
-                       log.turned.poses(len(table), self.machine), tuple(log.notes))
+                       log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control keeps by itself (``verify.served``)."""
@@ -170,7 +177,7 @@ def _told(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> Iter
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
-                 report: Report = silent) -> Program:
+                 report: Report = silent, dialect: str = LINUXCNC) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -182,6 +189,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                   tool centre point control
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     report      : called with the share read, 0 to 1, every 4096 lines; what it raises ends the reading
+    dialect     : whose words they are, one of ``verify.dialects.DIALECTS``
 
     Returns
     -------
@@ -196,8 +204,12 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         that breaks off, a move of the joints off rotary zero where no pivots are known. Without a line:
         ``spindle_tool`` is not in the table.
     VerificationError
-        Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000.
+        Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000;
+        unknown_dialect.
     """
+    if dialect not in DIALECTS:
+        raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
+                                limit=sorted(DIALECTS), remedy="name one of them")
     if "\x00" in text:
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:
@@ -205,7 +217,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="name a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
-    return reader.read(text, report)
+    return reader.read(text, report, dialect)
 
 
 __all__ = ["FEED", "RAPID", "Program", "Reader", "Remark", "read_program"]

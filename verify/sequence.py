@@ -83,7 +83,7 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
             nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
             blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
             gauge_length=setup.gauge_length, spindle_tool=spindle_tool,
-            report=stages.span(done / total, (done + len(nc.text)) / total))
+            report=stages.span(done / total, (done + len(nc.text)) / total), dialect=nc.dialect)
         read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read

@@ -1,0 +1,163 @@
+"""What a control has to be told, and in which words: those of RS-274 where a dialect does not say otherwise.
+
+A dialect is asked by ``output.walker`` and keeps nothing between two questions. What it answers are lines of a
+program; lengths come as whole steps of the grid or as text, speeds and feeds as text.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from geometry.errors import OutputError
+from output.grid import PER_MM
+from output.text import ascii_text, decimal
+
+ZEROS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+"""How a setup names the zeros of a control, from the first on."""
+
+
+@dataclass(frozen=True)
+class Switches:
+    """What shops set differently on machines of one control.
+
+    high_speed : say the word for fast contouring (G05.1 Q1, CYCLE832) where the control has it as an option
+    haas_tcp   : the word by which a Haas keeps the tip: 'G234' or 'G43.4'
+    """
+
+    high_speed: bool = False
+    haas_tcp: str = "G234"
+
+
+class Dialect:
+    """One control. Methods return lines unless they say otherwise.
+
+    name    : in ``machine.dialects`` and in file names;  title : in headers;  ending : of files, without the point
+    line    : longest line, characters
+    zeros   : words for the zeros of ``ZEROS``, in that order
+    path    : 'Path mode ...', what the header says of how far the control may leave the path; None where no word of
+              the program bounds it
+    """
+
+    name = title = ending = ""
+    line = 100
+    zeros: tuple[str, ...] = ZEROS
+    length_words = "G43 H is the tool number"
+    tcp_words = ""
+
+    def __init__(self, switches: Switches) -> None:
+        self.switches = switches
+
+    # words
+
+    def number(self, value: int) -> str:
+        """A grid value, 0.0001 mm or deg, with its decimal point: 12.5, -0.01, 3."""
+        whole, rest = divmod(abs(value), PER_MM)
+        sign = "-" if value < 0 else ""
+        return f"{sign}{whole}.{rest:04d}".rstrip("0") if rest else f"{sign}{whole}."
+
+    def feed(self, value: str) -> str:
+        """The feed word for mm/min."""
+        return f"F{value}"
+
+    def zero(self, work_offset: str) -> str:
+        """The word for the zero that a setup calls ``work_offset``; OutputError where the control has none such."""
+        try:
+            return self.zeros[ZEROS.index(work_offset)]
+        except (ValueError, IndexError):
+            raise OutputError(f"{self.title} has no work offset '{work_offset}'", code="bad_work_offset",
+                              subjects=(work_offset,), remedy="use one of " + ", ".join(ZEROS)) from None
+
+    def comment(self, text: str) -> list[str]:
+        """``text`` as comments, ASCII, wrapped to the longest line."""
+        plain = self.plain(ascii_text(text))
+        parts = textwrap.wrap(plain, self.line - 4, break_on_hyphens=False) or [""]
+        return [f"({p})" for p in parts]
+
+    def plain(self, text: str) -> str:
+        """One line of ASCII without what the control does not take in a comment."""
+        return text.replace("(", "[").replace(")", "]")
+
+    def path(self, tolerance: str) -> str:
+        """What the header says of the way between two points."""
+        return f"Path mode G64 P{tolerance}: the control may leave the written path by that much, in mm"
+
+    # the whole
+
+    def opening(self, name: str, low: Sequence[float], high: Sequence[float]) -> list[str]:
+        """Before the header; corners of the stock box (3,), mm."""
+        return ["%"]
+
+    def closing(self, name: str) -> list[str]:
+        """After the last tool is put away."""
+        return ["M30", "%"]
+
+    def text(self, lines: list[str]) -> str:
+        """All lines as the file holds them."""
+        return "\n".join(lines) + "\n"
+
+    # states
+
+    def label(self, step: str, number: int) -> list[str]:
+        """Where a step can be started: lines before it."""
+        return [f"N{number}"]
+
+    def modes(self, tolerance: str) -> list[str]:
+        """Units, plane, absolute coordinates, feed by the minute, everything else off; mm of path tolerance."""
+        return [f"G21 G17 G90 G94 G40 G49 G80 G64 P{tolerance}"]
+
+    def state_zero(self, zero: str) -> list[str]:
+        """Count from a zero, a word of ``zeros``."""
+        return [zero]
+
+    def aloft(self, letters: str) -> list[str]:
+        """The spindle to machine zero, then the rotary axes (two letters) to 0."""
+        return ["G53 G0 Z0.", "G0 " + " ".join(f"{letter}0." for letter in letters)]
+
+    def take(self, number: int, speed: str) -> list[str]:
+        """Put a tool in, its length counted from here on or from ``arrive``; speed in 1/min."""
+        return [f"T{number} M6", f"G43 H{number}"]
+
+    def fresh(self, number: int) -> list[str]:
+        """Stop for a fresh cutter in the place of the tool that is in the spindle, which stands still."""
+        return [*self.comment(f"Fresh cutter in T{number}: change it and set its length"), "M0"]
+
+    def spindle(self, speed: str, first: bool) -> list[str]:
+        """Turn clockwise at 1/min; ``first``: with the coolant, after a tool was taken."""
+        return [f"S{speed} M3 M8" if first else f"S{speed} M3"]
+
+    def rise(self) -> list[str]:
+        """Before a step that can be started, where ``stop`` leaves the spindle low: up to machine zero."""
+        return []
+
+    def stop(self) -> list[str]:
+        """Spindle and coolant off, and the tool to where it can be changed."""
+        return ["M5", "M9"]
+
+    def tcp_on(self, number: int, zero: str) -> list[str]:
+        """From here on the control keeps the tip while rotary axes turn; they stand at 0, the tip over the part."""
+        return []
+
+    def tcp_off(self) -> list[str]:
+        """It does not any more; rotary axes stand at 0, the tip over the part."""
+        return []
+
+    # moves
+
+    def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
+        """The first way down after a tool was taken, Z alone; tcp: on a control that will keep the tip."""
+        return [f"G0 {row}"]
+
+    def straight(self, rows: list[str], rapid: bool, first: bool, feed: str) -> list[str]:
+        """Straight blocks.
+
+        rows  : words of the coordinates that change, one row a block
+        first : the block before was of another kind;  feed : mm/min where it changes, else ''
+        """
+        words = [*(["G0" if rapid else "G1"] if first else []), rows[0], *([self.feed(feed)] if feed else [])]
+        return [" ".join(words), *rows[1:]]
+
+    def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
+        """Feed blocks that say how often each would fit into a minute (inverse time)."""
+        return ["G93", *(f"G1 {row} F{decimal(f, 4)}" for row, f in zip(rows, per_minute, strict=True)), "G94"]

@@ -1,0 +1,64 @@
+"""Fanuc 0i, 30i and their kin.
+
+The length is counted by G43 in the block of the first way down, and on machines
+that turn by G43.4 there, which keeps the tip too: G43 alone may move Z by the
+length of the tool (parameter 5006). For the same reason G49 stands after the
+way home (G28), never above the part. No word of a program bounds what the
+control rounds corners by: parameters do, and G05.1 Q1 where the option is
+there. Numbers have a decimal point, for X10 may mean 0.010 mm (parameter 3401).
+"""
+
+from __future__ import annotations
+
+from output.dialects.base import Dialect
+
+
+class Fanuc(Dialect):
+    """Comments in capitals, of the characters that all of them show."""
+
+    name, title, ending = "fanuc", "Fanuc", "nc"
+    line = 72
+    zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G54.1 P1", "G54.1 P2", "G54.1 P3")
+    tcp_words = "G43.4: the control keeps the tool tip on the part while axes turn; G49: it does not any more"
+    tcp_word = "G43.4"
+
+    def plain(self, text: str) -> str:
+        """% would end the file and ; the block, on a way of transfer or another."""
+        return super().plain(text).upper().replace("%", "PCT").replace(";", ",")
+
+    def feed(self, value: str) -> str:
+        """With its decimal point."""
+        return f"F{value}" if "." in value else f"F{value}."
+
+    def path(self, tolerance: str) -> str:
+        """Bounded by parameters."""
+        mode = "G05.1 Q1" if self.switches.high_speed else "G64"
+        return f"Path mode {mode}: parameters of the machine say how far the control may leave the written path"
+
+    def opening(self, name: str, low: object, high: object) -> list[str]:
+        """A program number of its own folder; % before it."""
+        return ["%", "O1000"]
+
+    def modes(self, tolerance: str) -> list[str]:
+        """The unit has a block of its own, and the length is given up at home."""
+        return ["G21", "G17 G90 G94 G40 G80 G64", *self.home(), "G49"]
+
+    def home(self) -> list[str]:
+        """The spindle to its reference point, no other axis."""
+        return ["G91 G28 Z0.", "G90"]
+
+    def aloft(self, letters: str) -> list[str]:
+        """``modes`` has sent the spindle home."""
+        return ["G0 " + " ".join(f"{letter}0." for letter in letters)]
+
+    def take(self, number: int, speed: str) -> list[str]:
+        """Its length is counted in ``arrive``."""
+        return [f"T{number} M6", *(["G05.1 Q1"] if self.switches.high_speed else [])]
+
+    def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
+        """With the word that counts the length."""
+        return [f"G0 {self.tcp_word if tcp else 'G43'} {row} H{number}"]
+
+    def stop(self) -> list[str]:
+        """Home before the length is given up."""
+        return ["M5", "M9", *self.home(), "G49", *(["G05.1 Q0"] if self.switches.high_speed else [])]

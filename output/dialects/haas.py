@@ -1,0 +1,31 @@
+"""Haas mills.
+
+Like Fanuc, but for the word that keeps the tip (G234 on a UMC; G43.4 on controls that were set up so), further work
+offsets (G154 P) and the rounding of corners, which the program bounds itself (G187 E).
+"""
+
+from __future__ import annotations
+
+from output.dialects.base import Switches
+from output.dialects.fanuc import Fanuc
+
+
+class Haas(Fanuc):
+    """Next Generation Control."""
+
+    name, title = "haas", "Haas"
+    zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G154 P1", "G154 P2", "G154 P3")
+
+    def __init__(self, switches: Switches) -> None:
+        super().__init__(Switches(False, switches.haas_tcp))  # G187 is no option
+        self.tcp_word = switches.haas_tcp
+        self.tcp_words = (f"{self.tcp_word}: the control keeps the tool tip on the part while axes turn; G49: it does "
+                          "not any more")
+
+    def path(self, tolerance: str) -> str:
+        """Bounded by E."""
+        return f"Path mode G187 E{tolerance}: the control may leave the written path by that much, in mm"
+
+    def modes(self, tolerance: str) -> list[str]:
+        """P3 is the smoothness for finishing."""
+        return ["G21", "G17 G90 G94 G40 G80", *self.home(), "G49", f"G187 P3 E{tolerance}"]

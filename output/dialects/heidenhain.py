@@ -1,0 +1,120 @@
+"""Heidenhain TNC, conversational.
+
+Every block has its number, from 0 on. A rapid says FMAX in every block, for FMAX holds for one block alone. Zeros are
+rows of the preset table (cycle 247), corners are rounded by no more than the tolerance of cycle 32. The tip is kept
+by M128, which is off (M129) before the spindle goes to machine zero (M91) and before a tool is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from geometry.errors import OutputError
+from output.dialects.base import Dialect
+from output.text import decimal
+
+
+class Heidenhain(Dialect):
+    """TNC 320 to 640, TNC7."""
+
+    name, title, ending = "heidenhain", "Heidenhain TNC", "h"
+    zeros = tuple(f"preset {n}" for n in range(1, 10))
+    length_words = "TOOL CALL counts the length of the tool table"
+    tcp_words = "M128: the control keeps the tool tip on the part while axes turn; M129: it does not any more"
+
+    def number(self, value: int) -> str:
+        """With its sign."""
+        text = super().number(value).removesuffix(".")
+        return text if value < 0 else f"+{text}"
+
+    def comment(self, text: str) -> list[str]:
+        """From a semicolon on."""
+        return [f"; {c[1:-1]}" for c in super().comment(text)]
+
+    def plain(self, text: str) -> str:
+        """A ~ at the end of a line would go on in the next."""
+        return text.replace("~", "-")
+
+    def path(self, tolerance: str) -> str:
+        """Bounded by cycle 32."""
+        return f"Path mode cycle 32 T{tolerance}: the control may leave the written path by that much, in mm"
+
+    def opening(self, name: str, low: Sequence[float], high: Sequence[float]) -> list[str]:
+        """The name and the blank, from which the control draws its picture."""
+        corner = [" ".join(f"{a}{self.number(round(v * 1000) * 10)}" for a, v in zip("XYZ", p, strict=True))
+                  for p in (low, high)]
+        return [f"BEGIN PGM {_name(name)} MM", f"BLK FORM 0.1 Z {corner[0]}", f"BLK FORM 0.2 {corner[1]}"]
+
+    def closing(self, name: str) -> list[str]:
+        """The name again."""
+        return ["M30", f"END PGM {_name(name)} MM"]
+
+    def text(self, lines: list[str]) -> str:
+        """Numbered; lines that go on from the one before stand aside."""
+        out, count = [], 0
+        for line in lines:
+            if line.startswith(" "):
+                out.append(line)
+            elif line:
+                out.append(f"{count} {line}")
+                count += 1
+        return "\n".join(out) + "\n"
+
+    def label(self, step: str, number: int) -> list[str]:
+        """A label by name."""
+        return [f'LBL "{step}"']
+
+    def modes(self, tolerance: str) -> list[str]:
+        """Units, plane and absolute coordinates are what they are; cycle 32 for the path."""
+        return ["CYCL DEF 32.0 TOLERANCE", f"CYCL DEF 32.1 T{tolerance}"]
+
+    def state_zero(self, zero: str) -> list[str]:
+        """The row of the preset table."""
+        return ["CYCL DEF 247 DATUM SETTING ~", f"    Q339=+{zero.split()[1]} ;DATUM NUMBER"]
+
+    def aloft(self, letters: str) -> list[str]:
+        """In coordinates of the machine."""
+        return ["L Z+0 R0 FMAX M91", "L " + " ".join(f"{letter}+0" for letter in letters) + " R0 FMAX"]
+
+    def take(self, number: int, speed: str) -> list[str]:
+        """With its speed."""
+        return [f"TOOL CALL {number} Z S{speed}"]
+
+    def spindle(self, speed: str, first: bool) -> list[str]:
+        """The tool was called with its speed; another one is a call without a tool."""
+        return ["M3", "M8"] if first else [f"TOOL CALL S{speed}"]
+
+    def stop(self) -> list[str]:
+        """Up in coordinates of the machine."""
+        return ["M5", "M9", "L Z+0 R0 FMAX M91"]
+
+    def tcp_on(self, number: int, zero: str) -> list[str]:
+        """From its own block on."""
+        return ["M128"]
+
+    def tcp_off(self) -> list[str]:
+        """Before M91 and TOOL CALL."""
+        return ["M129"]
+
+    def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
+        """A rapid like any other."""
+        return self.straight([row], True, True, "")
+
+    def straight(self, rows: list[str], rapid: bool, first: bool, feed: str) -> list[str]:
+        """FMAX in every block; F until the next."""
+        if rapid:
+            return [f"L {row} R0 FMAX" for row in rows]
+        out = [f"L {row}" for row in rows]
+        return [f"{out[0]} R0 F{feed}" if feed else out[0], *out[1:]]
+
+    def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
+        """There is no word for it."""
+        raise OutputError("Heidenhain has no inverse-time feed, and the joints of a turning cut have no even one",
+                          code="no_inverse_time", subjects=("machine.tcp",), measured=decimal(per_minute[0]),
+                          remedy="say machine.tcp true and let the control keep the tip (M128), or set "
+                                 "machine.simultaneous false")
+
+
+def _name(text: str) -> str:
+    """Letters, digits, - and _ of a name, 1 to 24 of them."""
+    return "".join(c if c.isascii() and c.isalnum() else "_" for c in text)[:24] or "zonemill"

@@ -1,0 +1,43 @@
+"""LinuxCNC.
+
+Path mode: G64 P, not G61. G61 brakes at every corner of a polyline with
+thousands of short segments and leaves dwell marks; G64 without P would round
+corners as far as the acceleration needs. Tool centre point control is a switch
+of the kinematics (M428, M429). A tool that is in the spindle is not changed by
+its own T and M6, so a fresh cutter is taken by putting the old one away.
+"""
+
+from __future__ import annotations
+
+import re
+
+from output.dialects.base import Dialect
+
+_ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;]", re.IGNORECASE)
+
+
+class LinuxCnc(Dialect):
+    """LinuxCNC 2.8 and later; its interpreter rs274 reads what is written here (``tests/contract``)."""
+
+    name, title, ending = "linuxcnc", "LinuxCNC", "ngc"
+    tcp_words = "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"
+
+    def comment(self, text: str) -> list[str]:
+        """Never one of the comments that act."""
+        return [f"(- {c[1:]}" if _ACTIVE.match(c[1:]) else c for c in super().comment(text)]
+
+    def fresh(self, number: int) -> list[str]:
+        """The tool is put away first, as the control takes no tool that it has."""
+        return ["T0 M6", *super().fresh(number)]
+
+    def rise(self) -> list[str]:
+        """The control itself goes up to change a tool, but not for one that it has."""
+        return ["G53 G0 Z0."]
+
+    def tcp_on(self, number: int, zero: str) -> list[str]:
+        """A switch of the kinematics."""
+        return ["M428"]
+
+    def tcp_off(self) -> list[str]:
+        """A switch of the kinematics."""
+        return ["M429"]

@@ -1,0 +1,74 @@
+"""Siemens Sinumerik 840D.
+
+Tool 1 is T1 of the magazine, its first cutting edge D1 holds the length. Corners are rounded by no more than ADIS
+(G641), or as CYCLE832 is told where the shop has it. The tip is kept by TRAORI; rotary words are angles of the
+machine's axes, which go evenly (ORIAXES, ORIMKS). Frames of the program are off before: the zero is stated again
+after every change of the transformation.
+"""
+
+from __future__ import annotations
+
+from output.dialects.base import Dialect
+
+
+class Siemens(Dialect):
+    """840D sl and ONE."""
+
+    name, title, ending = "siemens", "Siemens 840D", "mpf"
+    zeros = ("G54", "G55", "G56", "G57", "G505", "G506", "G507", "G508", "G509")
+    length_words = "D1 holds the length of its tool"
+    tcp_words = "TRAORI: the control keeps the tool tip on the part while axes turn; TRAFOOF: it does not any more"
+
+    def number(self, value: int) -> str:
+        """Without a point at the end."""
+        return super().number(value).removesuffix(".")
+
+    def comment(self, text: str) -> list[str]:
+        """From a semicolon on."""
+        return [f"; {c[1:-1]}" for c in super().comment(text)]
+
+    def plain(self, text: str) -> str:
+        """Everything is taken."""
+        return text
+
+    def path(self, tolerance: str) -> str:
+        """Bounded either way."""
+        word = f"CYCLE832 {tolerance}" if self.switches.high_speed else f"G641 ADIS={tolerance}"
+        return f"Path mode {word}: the control may leave the written path by that much, in mm"
+
+    def opening(self, name: str, low: object, high: object) -> list[str]:
+        """Nothing: the name of the file is that of the program."""
+        return []
+
+    def closing(self, name: str) -> list[str]:
+        """End of the program."""
+        return ["M30"]
+
+    def label(self, step: str, number: int) -> list[str]:
+        """A label begins with two letters; the search for a block finds it by its name."""
+        return [f"STEP_{step}:"]
+
+    def modes(self, tolerance: str) -> list[str]:
+        """1 is finishing, 1 the tolerance of the orientation in degrees, which has to be there."""
+        way = f"CYCLE832({tolerance},1,1)" if self.switches.high_speed else f"G641 ADIS={tolerance} ADISPOS={tolerance}"
+        return ["G710 G17 G90 G94 G40", way]
+
+    def aloft(self, letters: str) -> list[str]:
+        """Past all frames and lengths."""
+        return ["SUPA G0 Z0 D0", "G0 " + " ".join(f"{letter}0" for letter in letters)]
+
+    def take(self, number: int, speed: str) -> list[str]:
+        """With its first cutting edge."""
+        return [f"T{number} M6", "D1"]
+
+    def stop(self) -> list[str]:
+        """Up past all frames and lengths."""
+        return ["M5", "M9", "SUPA G0 Z0 D0"]
+
+    def tcp_on(self, number: int, zero: str) -> list[str]:
+        """The zero and the length are stated again behind it."""
+        return ["TRAORI", "ORIMKS ORIAXES", f"{zero} D1"]
+
+    def tcp_off(self) -> list[str]:
+        """The transformation off."""
+        return ["TRAFOOF"]

@@ -1,0 +1,365 @@
+"""Programs for any control: the order of what is said and done, in the words of a dialect.
+
+The shape of a program: header comments for the machinist, the modes, then
+per tool the change and per workingstep a comment and its moves. Nothing is
+added to a planned path and nothing is taken from it but points that are equal
+on the grid of ``output.grid``. Between steps that do not join, the writer goes
+up to the clearance plane, across, and down, one after the other.
+
+Rotary axes. A job of one clamping is one program: XYZ stay the tip in the setup
+frame, the control keeps it there from before the way down to the part until the
+tool is back above it, and rotary words stand in the rapids that turn. A control
+that cannot do that gets the linear joints instead, with the pivots they were
+computed from in the header; what turns in the cut is then timed block by block.
+Tools are changed with both rotary axes at zero.
+
+Restart points. Where the plan wants them every step begins as after a tool
+change: tool, length, zero, speed, coolant and the keeping of the tip are stated
+again behind a label, from above the clearance plane, or on a machine that turns
+from above the ball its parts lie in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from output.clamping import Leg, Section, home_of, sections
+from output.dialects.base import Dialect
+from output.grid import GRID, I64, check_plan, grid_path, link, to_grid
+from output.model import Clamping, Workplan
+from output.text import decimal, face_words, height_word, step_title, tool_name
+from toolpath.motion import Motion, Trajectory, Workingstep
+
+LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
+
+
+def write_program(plan: Workplan, dialect: Dialect) -> str:
+    """The program of one access direction, or of one clamping.
+
+    plan    : lengths in mm, setup frame or those of its clamping; rapids move Z alone or XY alone there
+    dialect : of the control
+
+    Returns the text, ASCII, no line longer than ``dialect.line``, newline at the end; every point reads back within
+    0.00005 mm of the plan on each axis.
+    Raises OutputError for an empty plan, a work offset the control has not, a rapid that moves XY and Z together,
+    a path with a gap, a coordinate, feed or speed that is none, rotary axes that cannot stand as a step wants, a
+    turning cut of joints where the control has no inverse-time feed.
+    """
+    check_plan(plan)
+    zero = dialect.zero(plan.work_offset)
+    tolerance = decimal(path_tolerance(plan))
+    walked = [] if plan.clamping is None else sections(plan)
+    low, high = plan.stock.lower.tolist(), plan.stock.upper.tolist()
+    head = [*dialect.opening(plan.name, low, high), *_header(plan, dialect, zero, tolerance)]
+    if plan.clamping is not None:
+        turning = _Turning(plan, dialect, zero, tolerance, plan.clamping)
+        turning.run(walked)
+        return dialect.text([*head, *turning.lines])
+    program = _Upright(plan, dialect, zero, tolerance)
+    for step in plan.steps:
+        program.add_step(step)
+    program.end()
+    return dialect.text([*head, *program.lines])
+
+
+def path_tolerance(plan: Workplan) -> float:
+    """How far a control may leave the path, mm: 0.001, less where half of the finest chordal tolerance is less."""
+    chords = [s.chordal_tolerance for s in plan.steps if s.chordal_tolerance > 0.0]
+    return max(GRID, min([0.001, *(0.5 * c for c in chords)]))
+
+
+class _Walk:
+    """Lines so far and the modal state they leave the control in."""
+
+    letters = "XYZ"
+
+    def __init__(self, plan: Workplan, dialect: Dialect, zero: str, tolerance: str) -> None:
+        self.plan, self.dialect, self.zero, self.tolerance = plan, dialect, zero, tolerance
+        self.lines: list[str] = []
+        self.position: I64 | None = None
+        self.tool: ToolBody | None = None
+        self.rapid: bool | None = None
+        self.feed = self.speed = ""
+
+    def _put_in(self, step: Workingstep) -> None:
+        """The tool of a step, fresh from the magazine or in the place of a worn one."""
+        tool, d = step.tool, self.dialect
+        self.lines += d.comment(tool_name(tool))
+        if step.fresh:
+            self.lines += d.fresh(tool.number)
+        self.lines += d.take(tool.number, decimal(step.spindle_rpm, 0))
+        self.tool, self.position, self.rapid, self.feed, self.speed = tool, None, None, "", ""
+
+    def _set_speed(self, step: Workingstep) -> None:
+        speed = decimal(step.spindle_rpm, 0)
+        if speed != self.speed:
+            self.lines += self.dialect.spindle(speed, not self.speed)
+            self.speed = speed
+
+    def _arrive(self, step: Workingstep, place: Sequence[int], tcp: bool) -> None:
+        """After a tool change only the control knows where the tool is: Z first, then across."""
+        height = self.letters[2] + self.dialect.number(place[2])
+        self.lines += self.dialect.arrive(step.tool.number, height, tcp)
+        self.rapid = True
+        self._say([" ".join(a + self.dialect.number(v) for a, v in zip("XY", place, strict=False))], True)
+
+    def _say(self, rows: list[str], rapid: bool, feed: float = 0.0) -> None:
+        """Straight blocks of one kind, with what changes."""
+        word = "" if rapid else decimal(feed, 1 if feed >= 1.0 else 4)
+        changed = bool(word) and word != self.feed
+        self.lines += self.dialect.straight(rows, rapid, rapid is not self.rapid, word if changed else "")
+        self.rapid = rapid
+        if changed:
+            self.feed = word
+
+    def _rows(self, points: I64) -> list[str]:
+        """Coordinate words of points[1:], only those that differ from the point before."""
+        moved = np.diff(points, axis=0) != 0
+        columns, number = [], self.dialect.number
+        for axis, letter in enumerate(self.letters):
+            words = [""] * len(moved)
+            where = np.flatnonzero(moved[:, axis])
+            for i, value in zip(where.tolist(), points[1:, axis][where].tolist(), strict=True):
+                words[i] = letter + number(value)
+            columns.append(words)
+        return [" ".join(filter(None, row)) for row in zip(*columns, strict=True)]
+
+    def _label(self, step: Workingstep) -> None:
+        if self.plan.restart:
+            self.lines += self.dialect.label(step.id, label_number(self.plan, step))
+
+
+class _Upright(_Walk):
+    """A program of three axes."""
+
+    def __init__(self, plan: Workplan, dialect: Dialect, zero: str, tolerance: str) -> None:
+        super().__init__(plan, dialect, zero, tolerance)
+        self.clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
+        if not plan.restart:  # else every step states them
+            self.lines += self._modes()
+
+    def _modes(self) -> list[str]:
+        return [*self.dialect.modes(self.tolerance), *self.dialect.state_zero(self.zero)]
+
+    def add_step(self, step: Workingstep) -> None:
+        """A step with the way to it."""
+        path = grid_path(step)
+        start = path[0][1][0]
+        self.lines.append("")
+        if self.tool is None or step.tool != self.tool or step.fresh or self.plan.restart:
+            if self.tool is not None:
+                self._retract()
+                self.lines += self.dialect.stop()
+            if self.plan.restart:
+                self._label(step)
+                self.lines += [*self._modes(), *self.dialect.rise()]
+            self._put_in(step)
+        self.lines += self.dialect.comment(step_words(step))
+        self._set_speed(step)
+        self._go_to(step, start)
+        for trajectory, points in path:
+            self._follow(trajectory, points)
+        self.position = path[-1][1][-1]
+
+    def end(self) -> None:
+        """Up, and off."""
+        self._retract()
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(self.plan.name)]
+
+    def _retract(self) -> None:
+        """Up to the clearance plane; never down to it."""
+        if self.position is not None and self.position[2] < self.clearance:
+            self._say([self.letters[2] + self.dialect.number(self.clearance)], True)
+            self.position = np.array([*self.position[:2], self.clearance])
+
+    def _go_to(self, step: Workingstep, start: I64) -> None:
+        """To the first point of a step: Z to the clearance plane, XY, Z."""
+        if self.position is None:
+            place = [int(start[0]), int(start[1]), max(self.clearance, int(start[2]))]
+            self._arrive(step, place, False)
+            self.position = np.array(place)
+        points = link(self.position, start, self.clearance)
+        if len(points) > 1:
+            self._say(self._rows(points), True)
+        self.position = start
+
+    def _follow(self, trajectory: Trajectory, points: I64) -> None:
+        """One line a point, with the words that change; the first point is where the tool stands."""
+        if len(points) > 1:
+            self._say(self._rows(points), trajectory.motion is Motion.RAPID, trajectory.feed)
+
+
+class _Turning(_Walk):
+    """A program whose columns are X, Y, Z and the two rotary axes, grid units, 0.0001 mm and 0.0001 deg."""
+
+    def __init__(self, plan: Workplan, dialect: Dialect, zero: str, tolerance: str, clamping: Clamping) -> None:
+        super().__init__(plan, dialect, zero, tolerance)
+        self.clamping, self.machine = clamping, clamping.machine
+        self.letters = "XYZ" + self.machine.letters
+        self.home = home_of(clamping)
+
+    def run(self, walked: list[Section]) -> None:
+        """All lines after the header."""
+        self.lines += self.dialect.comment("The spindle goes up to machine zero before the rotary axes turn to 0")
+        if not self.plan.restart:
+            self.lines += self._modes()
+        for section in walked:
+            self._add(section)
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(self.plan.name)]
+
+    def _modes(self) -> list[str]:
+        d = self.dialect
+        return [*d.modes(self.tolerance), *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero),
+                *d.aloft(self.machine.letters)]
+
+    def _add(self, section: Section) -> None:
+        step = section.step
+        self.lines.append("")
+        if section.fresh:
+            if self.tool is not None:
+                self.lines += self.dialect.stop()
+            if self.plan.restart:
+                self._label(step)
+                self.lines += self._modes()
+            self._put_in(step)
+        self.lines += self.dialect.comment(step_words(step))
+        self._set_speed(step)
+        if section.fresh:
+            at = to_grid(self.home).tolist()
+            self._arrive(step, at, self.machine.tcp)
+            if self.machine.tcp:
+                self.lines += self.dialect.tcp_on(step.tool.number, self.zero)
+                self.rapid = None
+            self.position = np.array([*at, 0, 0], dtype=np.int64)
+        for leg in (*section.before, *section.legs, *section.after):
+            self._leg(leg)
+        if section.last and self.machine.tcp:
+            self.lines += self.dialect.tcp_off()
+            self.rapid = None
+
+    def _leg(self, leg: Leg) -> None:
+        """The blocks of a leg; it begins where the tool stands."""
+        turns = to_grid(np.degrees(leg.turns))
+        gauge = 0.0 if self.tool is None else self.clamping.gauges[self.tool.number]
+        linear = leg.tips if self.machine.tcp else self.machine.joints(leg.tips, np.radians(turns * GRID), gauge)
+        points = np.column_stack([to_grid(linear), turns])
+        if self.position is not None:
+            points[0] = self.position
+        rapid = leg.motion is Motion.RAPID
+        in_time = not self.machine.tcp and not rapid and leg.is_turning
+        self.position = points[-1]
+        moved = (points[1:] != points[:-1]).any(axis=1)
+        rows = [row for row in self._rows(points) if row]
+        if not rows:
+            return
+        if in_time:
+            length = np.maximum(np.linalg.norm(np.diff(leg.tips, axis=0), axis=1)[moved], GRID)
+            self.lines += self.dialect.timed(rows, (leg.feed / length).tolist())
+            self.rapid, self.feed = None, ""
+            return
+        self._say(rows, rapid, leg.feed)
+
+
+def label_number(plan: Workplan, step: Workingstep) -> int:
+    """The N word a step can be started at: a hundred times the number in its id, and which part of a step it is.
+
+    >>> from types import SimpleNamespace as S
+    >>> plan = S(steps=[S(id="S07"), S(id="S07b"), S(id="S08")])
+    >>> [label_number(plan, s) for s in plan.steps]
+    [700, 701, 800]
+    """
+    def number(name: str) -> str:
+        return "".join(c for c in name if c.isdigit())
+
+    same = [s.id for s in plan.steps if number(s.id) == number(step.id)]
+    return 100 * int(number(step.id) or 0) + same.index(step.id)
+
+
+def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
+    low, high = plan.stock.lower, plan.stock.upper
+    box = ", ".join(f"{a} {decimal(low[i], 3)} to {decimal(high[i], 3)}" for i, a in enumerate("XYZ"))
+    restart = ["Every step can be started at its label: it states tool, length, zero, speed and coolant again"]
+    texts = [
+        f"Program {plan.name}, zonemill {plan.version}, {d.title}, {_axes_words(plan)}",
+        f"Part sha256 {plan.part_sha256[:16]}, setup sha256 {plan.setup_sha256[:16]}",
+        *(f"Label {key}: {value}" for key, value in sorted(plan.labels.items())),
+        f"Material {plan.material}",
+        f"Units mm and mm/min. Work offset {zero}. Program zero is the origin of the setup frame",
+        f"XYZ is the tool tip{_only_at_zero(plan)}: set every tool length in the tool table, {d.length_words}",
+        f"Stock box {box}",
+        *_heights(plan, d),
+        *(restart if plan.restart else ()),
+        d.path(tolerance),
+        "Tools, all lengths in mm from the tip:",
+        *(tool_name(t) for t in _tools_in_use(plan)),
+        *plan.comments,
+    ]
+    return [line for text in texts for line in d.comment(text)]
+
+
+def _axes_words(plan: Workplan) -> str:
+    return "3 axes" if plan.clamping is None else f"5 axes {plan.clamping.machine.kind}"
+
+
+def _only_at_zero(plan: Workplan) -> str:
+    return "" if plan.clamping is None or plan.clamping.machine.tcp else " at zero of the rotary axes only"
+
+
+def _heights(plan: Workplan, d: Dialect) -> list[str]:
+    """Where rapids are free, how deep the tip goes, and what a machine with rotary axes has to know."""
+    c = plan.clamping
+    if c is None:
+        return [f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free", _lowest(plan)]
+    x, y, z = c.centre.tolist()
+    ball = f"({decimal(x, 3)}, {decimal(y, 3)}, {decimal(z, 3)}), radius {decimal(c.radius, 3)}"
+    out = [f"Part, stock and fixtures lie in the ball round {ball}: the tool turns outside it", _lowest(plan),
+           *(f"Access {name}, tool axis " + " ".join(decimal(v, 6) for v in f.rotation[2].tolist()) + ": "
+             + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
+                        zip(c.machine.letters, c.machine.follow(f.rotation[2:], np.zeros(2))[0], strict=True))
+             + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items())]
+    if c.machine.tcp:
+        return [*out, d.tcp_words]
+    pivots = "; ".join(" ".join(decimal(v, 4) for v in p) for p in c.machine.pivots or ())
+    long = ", ".join(f"T{n} {decimal(g, 4)}" for n, g in sorted(c.gauges.items()))
+    head = f" and gauge lengths {long}" if c.machine.tilts_head else ""
+    return [*out, "XYZ are linear joints where rotary axes stand off 0",
+            f"Made only for pivots {pivots} mm{head}"]
+
+
+def _lowest(plan: Workplan) -> str:
+    """How deep the tip goes, for whoever sets the part on a table."""
+    lowest = min(float((t.points @ _into_setup(plan, s.access))[:, 2].min()) for s in plan.steps
+                 for t in s.trajectories)
+    below = float(plan.stock.lower[2]) - lowest
+    more = f", {decimal(below, 3)} below the stock box: nothing may stand there" if below > LEAST_BELOW else ""
+    return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
+
+
+def _into_setup(plan: Workplan, access: str) -> F64:
+    """(3, 3): points (n, 3) of the frame of an access, times this, are in the setup frame."""
+    return np.eye(3) if plan.clamping is None else plan.clamping.frames[access].rotation
+
+
+def _tools_in_use(plan: Workplan) -> list[ToolBody]:
+    return sorted({s.tool.number: s.tool for s in plan.steps}.values(), key=lambda t: t.number)
+
+
+def step_words(step: Workingstep) -> str:
+    """What the comment before a step says: its id, zone, strategy, tool, faces and heights."""
+    zone = step.zone or "several zones"
+    faces = face_words(step) or "no faces"
+    words = [
+        f"{step.id} {zone} {step.operation} {step.strategy} T{step.tool.number}: {faces}",
+        f"{height_word(step)} {decimal(step.top, 3)} down to {decimal(step.bottom, 3)}",
+    ]
+    title = step_title(step)
+    if any(w not in words[0] for w in title.split()):
+        words.append(title)
+    return "; ".join(words)
+
+
+__all__ = ["label_number", "path_tolerance", "step_words", "write_program"]

@@ -1,0 +1,41 @@
+0 BEGIN PGM demo MM
+1 BLK FORM 0.1 Z X+0 Y+0 Z+0
+2 BLK FORM 0.2 X+30 Y+20 Z+15
+3 ; Program demo, zonemill 0.1.0, Heidenhain TNC, 3 axes
+4 ; Part sha256 abababababababab, setup sha256 cdcdcdcdcdcdcdcd
+5 ; Label order: 4711
+6 ; Material Ti-6Al-4V
+7 ; Units mm and mm/min. Work offset preset 1. Program zero is the origin of the setup frame
+8 ; XYZ is the tool tip: set every tool length in the tool table, TOOL CALL counts the length of the
+9 ; tool table
+10 ; Stock box X 0 to 30, Y 0 to 20, Z 0 to 15
+11 ; Clearance plane Z 25: above it rapids in XY are free
+12 ; Lowest Z of the tip 4.5
+13 ; Every step can be started at its label: it states tool, length, zero, speed and coolant again
+14 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm
+15 ; Tools, all lengths in mm from the tip:
+16 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+17 LBL "S01"
+18 CYCL DEF 32.0 TOLERANCE
+19 CYCL DEF 32.1 T0.001
+20 CYCL DEF 247 DATUM SETTING ~
+    Q339=+1 ;DATUM NUMBER
+21 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+22 TOOL CALL 1 Z S12000
+23 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+24 M3
+25 M8
+26 L Z+25 R0 FMAX
+27 L X+0 Y+0 R0 FMAX
+28 L Z+6 R0 FMAX
+29 L Z+5 R0 F200
+30 L X+10 R0 F600
+31 L Y+2.5
+32 L X+0 Z+4.5
+33 L Z+6
+34 L Z+25 R0 FMAX
+35 M5
+36 M9
+37 L Z+0 R0 FMAX M91
+38 M30
+39 END PGM demo MM

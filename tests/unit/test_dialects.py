@@ -1,0 +1,254 @@
+"""All five dialects: written, read back by the witness, and held against the plan and against one another."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import OutputError, ProgramError, VerificationError
+from output.dialects import DIALECTS, Switches
+from output.linuxcnc import write_linuxcnc
+from output.walker import write_program
+from tests.golden_file import assert_golden
+from tests.synthetic_plan import clamped, long_plan, plan, tiny
+from toolpath.motion import Motion
+from verify.dialects import DIALECTS as READ
+from verify.dialects import dialect_of
+from verify.kinematics import Kinematics
+from verify.likeness import difference
+from verify.reader import read_program
+
+OTHERS = ("fanuc", "haas", "siemens", "heidenhain")
+SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4")}
+TURNED = clamped("table-table-BC", swings=False)
+JOBS = {
+    "five steps": plan(), "tiny": tiny(), "further zero": replace(tiny(), work_offset="G59.2"),
+    "restart": replace(plan(), restart=True), "3+2": TURNED, "five axes": clamped(),
+    "head": clamped("head-table-BC"), "restart on five axes": replace(clamped(), restart=True),
+    "fresh cutters": replace(plan(), steps=tuple(replace(s, fresh=k > 1) for k, s in enumerate(plan().steps))),
+}
+
+
+def write(work, dialect, switches=SHOPS["plain"]):
+    return write_program(work, DIALECTS[dialect](switches))
+
+
+def read(work, text, dialect):
+    machine = work.clamping and Kinematics(work.clamping.machine.kind, work.clamping.machine.pivots)
+    return read_program(text, name=dialect, dialect=dialect, work_offset=work.work_offset, kinematics=machine or None,
+                        tools={t.number for t in work.tools}, gauge_length=work.clamping.gauges if machine else {})
+
+
+def planned(work):
+    """Feed moves of a plan in order: tips (n, 3) and (n, 3), feeds, tools, speeds, axes at both ends."""
+    rows = []
+    for s in work.steps:
+        turn = np.eye(3) if work.clamping is None else work.clamping.frames[s.access].rotation
+        for t in s.trajectories:
+            if t.motion is Motion.RAPID:
+                continue
+            axes = np.tile([0.0, 0.0, 1.0], (len(t.points), 1)) if t.axes is None else t.axes
+            p, a, n = t.points @ turn, axes @ turn, len(t.points) - 1
+            rows.append(np.hstack([p[:-1], p[1:], np.tile([t.feed, s.tool.number, s.spindle_rpm], (n, 1)), a[:-1],
+                                   a[1:]]))
+    return np.vstack(rows)
+
+
+def test_every_dialect_written_is_read():
+    assert set(DIALECTS) == set(READ)
+
+
+@pytest.mark.parametrize("shop", SHOPS)
+@pytest.mark.parametrize("job", JOBS)
+def test_all_say_the_same(job, shop):
+    work = JOBS[job]
+    first = read(work, write_linuxcnc(work), "linuxcnc")
+    assert not first.remarks
+    for dialect in OTHERS:
+        other = read(work, write(work, dialect, SHOPS[shop]), dialect)
+        assert difference(first, other) == "", dialect
+
+
+@pytest.mark.parametrize("dialect", READ)
+@pytest.mark.parametrize("job", ["five steps", "restart", "3+2", "five axes"])
+def test_what_is_read_is_the_plan(job, dialect):
+    """Every planned move is there, in order: tips within 1 um, axes within 1e-6 of a grid of 1e-4 deg, F, T and S."""
+    work = JOBS[job]
+    p = read(work, write(work, dialect), dialect)
+    cuts = np.flatnonzero(~np.isnan(p.feed))
+    wanted, at = planned(work), 0
+    up = np.array([0.0, 0.0, 1.0])
+    for row in wanted:  # a swinging pass is written in more blocks than the plan has: each planned end is met in turn
+        if np.abs(row[3:6] - row[:3]).max() < 1.5e-4:
+            continue
+        while at < len(cuts) and np.linalg.norm(p.end[cuts[at]] - row[3:6]) > 1e-3:
+            at += 1
+        assert at < len(cuts), row
+        k = cuts[at]
+        axis = up if p.poses is None else p.poses.end_axis[k]
+        assert np.linalg.norm(axis - row[12:15]) < 1e-6 + 2 * np.radians(0.5e-4)
+        assert p.feed[k] == row[6] and p.tool[k] == row[7] and p.speed[k] == row[8] and p.coolant[k]
+        at += 1
+
+
+@pytest.mark.parametrize("dialect", OTHERS)
+def test_golden(dialect):
+    assert_golden(f"tiny.{dialect}.{DIALECTS[dialect].ending}", write(replace(tiny(), restart=True), dialect))
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("job", JOBS)
+def test_lines_are_short_ascii_and_name_the_steps(job, dialect):
+    work, control = JOBS[job], DIALECTS[dialect]
+    text = write(work, dialect)
+    assert text.isascii() and text.endswith("\n")
+    room = 8 if dialect == "heidenhain" else 0  # for the number of the block
+    assert max(map(len, text.splitlines())) <= control.line + room
+    plain = re.sub(r"[^A-Z0-9.]", "", text.upper())
+    for s in work.steps:
+        assert f"{s.id}{s.zone or 'SEVERALZONES'}{s.operation}".upper() in plain
+    assert work.part_sha256[:16].upper() in plain and work.setup_sha256[:16].upper() in plain
+
+
+MUTATIONS = {
+    "fanuc": [("X2.4565", "X2.4576"), ("F240.", "F241."), ("S12000 M3 M8", "S11000 M3 M8"), ("M3 M8", "M3"),
+              ("T1 M6", "T2 M6"), ("G0 X2. Y0.", "G1 X2. Y0. F600."), ("A-3.2939", "A-3.2949"), ("G43.4", "G43"),
+              ("G90\nG49", "G49")],
+    "haas": [("X2.4565", "X2.4576"), ("G234", "G43"), ("E0.001", "E0.002"), ("G154 P2", "G154 P3"), ("M8", "M9")],
+    "siemens": [("X2.4565", "X2.4576"), ("TRAORI", "TRAFOOF"), ("ADIS=0.001", "ADIS=0.002"), ("G505", "G506"),
+                ("T1 M6\nD1", "T1 M6\nD0"), ("G1 Z8 F240", "G0 Z8"), ("C-5.9036", "C-5.9046"), ("M8", "")],
+    "heidenhain": [("X+2.4565", "X+2.4576"), ("M128", "M129"), ("32.1 T0.001", "32.1 T0.002"), ("Q339=+1", "Q339=+2"),
+                   ("F240", "FMAX"), ("L Z+9 R0 FMAX", "L Z+9 R0 F600"), ("S12000", "S12001"), (" M8", " M9")],
+}
+
+
+@pytest.mark.parametrize(("dialect", "change"), [(d, c) for d, cs in MUTATIONS.items() for c in cs],
+                         ids=lambda v: v if isinstance(v, str) else f"{v[0]} to {v[1]}")
+def test_planted_differences_are_found(dialect, change):
+    """One word of a program changed, wherever it stands first, and the comparison says so."""
+    for job in (clamped(), replace(clamped(), work_offset="G58"), replace(clamped(), work_offset="G59.2")):
+        text = write(job, dialect)
+        if change[0] in text:
+            break
+    assert change[0] in text
+    first = read(job, write_linuxcnc(job), "linuxcnc")
+    assert difference(first, read(job, text, dialect)) == ""
+    head, tools, body = re.split("(lengths in mm from the tip)", text, flags=re.IGNORECASE)
+    wrong = head + tools + body.replace(*change, 1)
+    try:
+        assert difference(first, read(job, wrong, dialect)) != ""
+    except ProgramError:
+        pass  # refused outright: found as well
+
+
+def test_a_move_left_out_or_put_in_is_found():
+    work = tiny()
+    text = write_linuxcnc(work)
+    first = read(work, text, "linuxcnc")
+    for wrong in (text.replace("Y2.5\n", ""), text.replace("Y2.5\n", "Y2.5\nX3.\n"), text.replace("M5\n", "Y9.\nM5\n"),
+                  text.replace("M5\n", "G4 P1\nM5\n")):
+        assert difference(first, read(work, wrong, "linuxcnc")) != ""
+
+
+@pytest.mark.parametrize(("dialect", "line", "said"), [
+    ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "#100=3.", "macro"), ("fanuc", "G234 H1", "unknown word"),
+    ("fanuc", "M428", "word of LinuxCNC"), ("fanuc", "G54.1 P40", "a setup names"),
+    ("fanuc", "X1.; Y2.", "ends a block"),
+    ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
+    ("siemens", "R1=5", "unknown word"), ("siemens", "GOTOF ENDE", "unknown word"), ("siemens", "G500", "switches"),
+    ("siemens", "X=IC(5)", "no plain number"), ("siemens", "CYCLE800(0)", "cycle or function"),
+    ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
+    ("heidenhain", "L IX+5", "cannot read"), ("heidenhain", "L X+5 RL F100", "cannot read"),
+    ("heidenhain", "CALL LBL 1", "cannot read"), ("heidenhain", "FN 0: Q1 = 5", "cannot read"),
+    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "cannot read"),
+    ("heidenhain", "L X+5 M140", "unknown word"),
+    ("heidenhain", "CYCL DEF 7.0 DATUM SHIFT", "cannot read"), ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
+])
+def test_what_is_not_known_is_refused_with_its_line(dialect, line, said):
+    with pytest.raises(ProgramError, match=re.escape(said)) as refused:
+        read_program(f"G17\n{line}\nM30\n" if dialect != "heidenhain" else f"0 BEGIN PGM A MM\n1 {line}\n2 M30\n",
+                     dialect=dialect)
+    assert "line 2" in refused.value.message
+
+
+def test_other_programs_of_these_controls_are_read():
+    """As shops write them: numbers, comments, words run together."""
+    fanuc = read_program("%\nO0001(PART)\nN10G21G17G90G94G40G49G80\nN20G91G28Z0\nN30G90G54\nN40T1M6\nN50S5000M3\n"
+                         "N60G0X0.Y0.\nN70G43Z50.H1M8\nN80G1Z-1.F300\nN90G2X10.Y0.I5.J0.\nG04P500\nG0Z50.\nM30\n%\n",
+                         dialect="fanuc")
+    assert fanuc.dwell == 0.5 and not fanuc.remarks and fanuc.end[-1].tolist() == [10.0, 0.0, 50.0]
+    siemens = read_program("%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\nN10 G17 G90 G710 G94 G54\nN20 T=\"1\"\nN30 M6 D1\n"
+                           "N40 S5000 M3\nG641 ADIS=0.005\nN50 G0 X=0 Y=0\nN60 Z50 M8\nN70 G1 Z-1 F300\n"
+                           "N80 G3 X10 Y0 CR=5\nN90 G0 Z50\nSUPA G0 Z0 D0\nM30\n", dialect="siemens")
+    assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0] and siemens.blend == 0.005
+    plain = read_program('BEGIN PGM T INCH\nBLK FORM 0.1 Z X+0 Y+0 Z-1\nTOOL CALL 1 Z S5000 F300 ; ball\n'
+                         "CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\n* - cut\n"
+                         "L X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
+                         dialect="heidenhain")
+    assert not plain.remarks and plain.end[-1].tolist() == pytest.approx([25.4, 0.0, 50.8])
+    assert plain.feed[2] == pytest.approx(254.0)
+
+
+def test_whose_program_a_text_is():
+    for dialect, control in DIALECTS.items():
+        text = write(tiny(), dialect)
+        assert dialect_of(text, control.ending, [dialect]) == dialect
+    assert dialect_of(write(tiny(), "heidenhain")) == "heidenhain"
+    assert dialect_of(write(tiny(), "siemens")) == "siemens"
+    assert dialect_of("G21\nM30\n", "NC", ["linuxcnc", "haas"]) == "haas"
+    assert dialect_of("G21\nM30\n", "", ["siemens", "fanuc"]) == "fanuc"
+    assert dialect_of("G21\nM30\n", "tap") == "linuxcnc"
+    with pytest.raises(VerificationError) as unknown:
+        read_program("M30\n", dialect="fagor")
+    assert unknown.value.code == "unknown_dialect"
+
+
+def test_programs_of_joints():
+    work = clamped(tcp=False)
+    first = read(work, write_linuxcnc(work), "linuxcnc")
+    for dialect in ("fanuc", "haas", "siemens"):
+        text = write(work, dialect)
+        assert "G93" in text and difference(first, read(work, text, dialect)) == ""
+    with pytest.raises(OutputError) as refused:
+        write(work, "heidenhain")
+    assert refused.value.code == "no_inverse_time" and "M128" in refused.value.remedy
+    still = clamped(tcp=False, swings=False)
+    assert difference(read(still, write_linuxcnc(still), "linuxcnc"),
+                      read(still, write(still, "heidenhain"), "heidenhain")) == ""
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("job", ["restart", "restart on five axes"])
+def test_a_program_can_be_started_at_every_step(job, dialect):
+    """From each label on, after whatever the header states, the moves are those of the whole program from there."""
+    work = JOBS[job]
+    text = write(work, dialect)
+    whole = read(work, text, dialect)
+    lines = text.splitlines(keepends=True)
+    mark = {"siemens": r"STEP_S\d+:", "heidenhain": r'\d+ LBL "S\d+"'}.get(dialect, r"N\d+$")
+    labels = [k for k, line in enumerate(lines) if re.match(mark, line.strip())]
+    assert len(labels) == len(work.steps)
+    head = lines[:1] if dialect != "siemens" else []
+    for k in labels:
+        part = read(work, "".join([*head, *lines[k:]]), dialect)
+        assert not part.remarks
+        n = len(part)  # the way down from machine zero is no move where X and Y are not known either
+        assert int((whole.line > k).sum()) - 1 <= n <= int((whole.line > k).sum())
+        assert np.array_equal(part.end, whole.end[-n:]) and np.array_equal(part.start[1:], whole.start[-n + 1:])
+        assert np.array_equal(part.speed, whole.speed[-n:]) and np.array_equal(part.tool, whole.tool[-n:])
+
+
+def test_labels_are_the_numbers_of_the_steps():
+    steps = [replace(s, id=name) for s, name in zip(plan().steps, ("S01", "S02", "S02b", "S12", "S120"), strict=True)]
+    text = write(replace(plan(), steps=tuple(steps), restart=True), "fanuc")
+    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == ["100", "200", "201", "1200", "12000"]
+
+
+@pytest.mark.parametrize("dialect", OTHERS)
+def test_a_hundred_thousand_points_in_seconds(dialect):
+    work = long_plan(50_000)
+    p = read(work, write(work, dialect), dialect)
+    assert len(p) > 49_000

@@ -1,0 +1,73 @@
+"""Programs of other controls, block by block in the words the one reader knows.
+
+``verify.reader`` runs one modal machine, whose words are those of LinuxCNC. A control with other words has a file here
+that spells each of its blocks in them, and refuses by name what it does not know or what would be read in two ways:
+nothing is dropped but what has no effect on a move. Lines keep their numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from verify.dialects.base import Control
+from verify.dialects.fanuc import Fanuc
+from verify.dialects.haas import Haas
+from verify.dialects.heidenhain import Heidenhain, is_conversational
+from verify.dialects.siemens import Siemens, is_siemens
+from verify.log import MAX_ERRORS, Log
+from verify.words import BlockError
+
+LINUXCNC = "linuxcnc"
+CONTROLS: dict[str, type[Control]] = {"fanuc": Fanuc, "haas": Haas, "siemens": Siemens, "heidenhain": Heidenhain}
+"""By name; ``LINUXCNC`` needs none."""
+
+DIALECTS = (LINUXCNC, *CONTROLS)
+"""All that can be read."""
+
+ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
+"""Of file names, without the point and in small letters, and whose programs they may be."""
+
+
+def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
+    """Blocks with the numbers of their lines, from 1; what cannot be read becomes an error of the log."""
+    control = CONTROLS[dialect]()
+    for number, raw in enumerate(lines, 1):
+        try:
+            blocks = control.blocks(raw)
+        except BlockError as problem:
+            log.error(str(problem), number, remedy=problem.remedy)
+            if len(log.errors) >= MAX_ERRORS:
+                return
+            continue
+        for note in control.notes:
+            log.note(note)
+        control.notes.clear()
+        for block in blocks:
+            yield number, block
+
+
+def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:
+    """Whose program a text is, where nobody says: by its own marks, its file name, or the controls of the machine.
+
+    ending : of the file name, without the point, '' where there is none
+    wanted : controls of the machine, likeliest first
+
+    >>> dialect_of("0 BEGIN PGM PART MM")
+    'heidenhain'
+    >>> dialect_of("G54 ; zero\\nTRAORI")
+    'siemens'
+    >>> dialect_of("G21 G90", "nc", ["haas"]), dialect_of("G21 G90", "nc", ["linuxcnc"])
+    ('haas', 'linuxcnc')
+    """
+    if is_conversational(text):
+        return "heidenhain"
+    if is_siemens(text):
+        return "siemens"
+    may = ENDINGS.get(ending.lower().removeprefix("."), DIALECTS)
+    # a text without its marks is no Siemens or Heidenhain program, unless its name says so
+    plain = [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
+    named = [d for d in wanted if d in plain]
+    return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
+
+
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "spelt"]

@@ -1,0 +1,35 @@
+"""What all files of controls share."""
+
+from __future__ import annotations
+
+from verify.words import NUMBER, WORK_OFFSETS, BlockError
+
+ZEROS = tuple(WORK_OFFSETS.values())
+"""The zeros of a control from the first on, as setups name them."""
+
+
+class Control:
+    """One control, asked line by line; what it keeps is what later lines depend on.
+
+    notes : what was understood and should be known; whoever asks takes them away
+    """
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def blocks(self, raw: str) -> list[str]:
+        """The blocks one line stands for, in the words of ``verify.words``; none for a line without effect.
+
+        Raises BlockError where the line cannot be read, or could be read in two ways.
+        """
+        raise NotImplementedError
+
+
+def zero_word(number: int, said: str) -> str:
+    """The word for a zero of the control, counted from 1; BlockError for one that no setup can name."""
+    if not 1 <= number <= len(ZEROS):
+        raise BlockError(f"{said} is zero {number} of the control, and a setup names the first {len(ZEROS)}")
+    return ZEROS[number - 1]
+
+
+__all__ = ["NUMBER", "ZEROS", "BlockError", "Control", "zero_word"]

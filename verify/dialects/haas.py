@@ -1,0 +1,42 @@
+"""Haas: Fanuc's words but for G234 (the tip is kept), G154 P (further zeros), G187 E (rounding), and P of G04.
+
+A whole P of G04 counts ms, one with a decimal point s. F without a decimal point is refused like a place. G28 gives the
+length of the tool up.
+"""
+
+from __future__ import annotations
+
+from verify.dialects.base import BlockError
+from verify.dialects.fanuc import Fanuc
+
+
+class Haas(Fanuc):
+    """Haas mills, Next Generation Control."""
+
+    title = "Haas"
+    further = 154.0
+
+    def _check(self, letter: str, digits: str) -> None:
+        super()._check(letter, digits)
+        if letter == "F" and "." not in digits and float(digits) != 0:
+            raise BlockError(f"F{digits} without a decimal point is counted in thousandths or not, as a setting has it",
+                             f"write F{digits}.")
+
+    def _in_seconds(self, digits: str) -> bool:
+        return "." in digits
+
+    def _code(self, code: float, values: dict[str, str]) -> list[str]:
+        if code == 234:
+            return ["G43.4"]
+        if code == 187:
+            if "E" not in values:
+                self.notes.append("G187 without E: a setting of the machine says how far the control rounds corners; "
+                                  "it is not in the error bound")
+                return []
+            return [f"G64 P{values['E']}"]
+        if code in (5.1, 54.1):
+            raise BlockError(f"unknown word G{code:g}: Haas has G187 and G154")
+        return super()._code(code, values)
+
+    def _after(self, codes: list[float]) -> list[str]:
+        return ["G49"] if 28 in codes and 43 not in codes else []

@@ -1,0 +1,177 @@
+"""Siemens 840D: names besides letters, = before a value, ';' before a comment, cycles with arguments.
+
+D1 is the only cutting edge whose length is known; a tool that is put in has it at once (machine data 20270). What a
+program computes (R parameters, DEF, IF, GOTO, subprograms) is refused by name, and so are frames of the program.
+"""
+
+from __future__ import annotations
+
+import re
+
+from verify.dialects.base import NUMBER, BlockError, Control, zero_word
+
+_NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
+_PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{_NUM} ?)*(?:F{_NUM} ?)?\r?")
+_TOKEN = re.compile(rf"""\s*(?:(?P<call>[A-Z_][A-Z_0-9]*)\s*\((?P<args>[^()]*)\)
+    |(?P<name>[A-Z_][A-Z_0-9]*)\s*=\s*(?P<value>"[^"]*"|[^\s;"]+)
+    |(?P<letter>[A-Z])(?P<digits>{NUMBER})(?![A-Z_0-9.])
+    |(?P<word>[A-Z_][A-Z_0-9]*))""", re.VERBOSE)
+_LABEL = re.compile(r"(?:N[0-9]+\s+)?[A-Z_]{2}[A-Z_0-9]*:")
+_MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{2}\s*\(|SUPA|G710|G700|G641|G642|G645"
+                    r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
+_SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
+_UNITS = {700: 20, 70: 20, 710: 21, 71: 21}
+_IDLE = frozenset({"ORIMKS", "ORIAXES", "FFWON", "FFWOF", "SOFT", "BRISK", "COMPOF", "DIAMOF", "CFTCP"})
+_UNBOUNDED = frozenset({64, 642, 643, 644, 645})
+_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+
+
+def is_siemens(text: str) -> bool:
+    """Whether a text has words that Siemens alone has."""
+    return bool(_MARKS.search(text.upper()))
+
+
+class Siemens(Control):
+    """840D sl, 828D and ONE."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tool = self.selected = 0
+
+    def blocks(self, raw: str) -> list[str]:
+        """A plain straight move as it is; everything else word by word."""
+        if _PLAIN.fullmatch(raw):
+            return [raw]
+        if raw.startswith("%_N_"):
+            return []
+        text = raw.split(";", 1)[0].upper().strip()
+        if label := _LABEL.match(text):
+            text = text[label.end():].strip()
+        if not text:
+            return []
+        if text.startswith(("/", "%")):
+            raise BlockError(f"cannot read '{text[:40]}'")
+        return self._words(text)
+
+    def _words(self, text: str) -> list[str]:
+        out: list[str] = []
+        values: dict[str, float] = {}
+        codes: list[int] = []
+        after: list[str] = []
+        at = 0
+        while at < len(text):
+            m = _TOKEN.match(text, at)
+            if m is None:
+                raise BlockError(f"cannot read '{text[at:at + 40].strip()}'")
+            at = m.end()
+            while at < len(text) and text[at] == " ":
+                at += 1
+            if m["call"]:
+                out += self._call(m["call"], m["args"])
+            elif m["name"]:
+                self._value(m["name"], m["value"], values, out)
+            elif m["letter"]:
+                self._letter(m["letter"], m["digits"], codes, out, after)
+            else:
+                out += self._name(m["word"])
+        out += self._path(codes, values)
+        if 4 in codes:
+            out = [f"G4 P{w[1:]}" for w in out if w[0] == "F"]
+            if not out:
+                raise BlockError("G4 without F, the seconds")
+        return [" ".join(out), *after] if out or after else []
+
+    def _path(self, codes: list[int], values: dict[str, float]) -> list[str]:
+        """Words for how far corners are rounded."""
+        if 641 in codes:
+            if "ADIS" not in values:
+                raise BlockError("G641 without ADIS in its block: how far corners are rounded is not known")
+            return [f"G64 P{max(values['ADIS'], values.get('ADISPOS', 0.0)):.6f}"]
+        if "ADIS" in values or "ADISPOS" in values:
+            raise BlockError("ADIS without G641 in its block")
+        return ["G64"] if not _UNBOUNDED.isdisjoint(codes) else []
+
+    def _letter(self, letter: str, digits: str, codes: list[int], out: list[str], after: list[str]) -> None:
+        number = float(digits)
+        if letter in "XYZABCIJKFS":
+            out.append(letter + digits)
+            return
+        if letter not in "GMTDN" or number != int(number) or number < 0:
+            raise BlockError(f"unknown word {letter}{digits}")
+        n = int(number)
+        if letter == "G":
+            codes.append(n)
+            out += self._code(n)
+        elif letter == "T":
+            self.selected = n
+            out.append(f"T{n}")
+        elif letter == "D":
+            if n > 1:
+                raise BlockError(f"D{n}: the length of the first cutting edge (D1) alone is known")
+            out.append(f"G43 H{self.tool}" if n else "G49")
+        elif letter == "M":
+            if n not in _M:
+                raise BlockError(f"unknown word M{n}")
+            out.append(f"M{n}")
+            if n == 6:
+                self.tool = self.selected
+                after.append(f"G43 H{self.tool}")
+
+    def _code(self, n: int) -> list[str]:
+        if n in _SAME:
+            return [f"G{n}"]
+        if n in _UNITS:
+            return [f"G{_UNITS[n]}"]
+        if 505 <= n <= 599:
+            return [zero_word(n - 500, f"G{n}")]
+        if n == 60:
+            return ["G61"]
+        if n == 4 or n == 641 or n in _UNBOUNDED:
+            return []
+        if n == 500:
+            raise BlockError("G500 switches the work offset off: where zero lies then is not known")
+        raise BlockError(f"unknown word G{n}")
+
+    def _value(self, name: str, text: str, values: dict[str, float], out: list[str]) -> None:
+        if name == "T":
+            digits = text.strip('"').removeprefix("T")
+            if not digits.isdigit():
+                raise BlockError(f"T={text}: a tool by its number, such as T=\"1\", is all that can be found")
+            self.selected = int(digits)
+            out.append(f"T{self.selected}")
+            return
+        if not re.fullmatch(NUMBER, text):
+            raise BlockError(f"{name}={text} is no plain number")
+        number = float(text)
+        if name in ("X", "Y", "Z", "A", "B", "C", "I", "J", "K", "F", "S"):
+            out.append(f"{name}{text}")
+        elif name == "CR":
+            out.append(f"R{text}")
+        elif name == "TURN":
+            out.append(f"P{int(number) + 1}")
+        elif name in ("ADIS", "ADISPOS"):
+            values[name] = number
+        else:
+            raise BlockError(f"unknown word {name}={text}")
+
+    def _name(self, word: str) -> list[str]:
+        if word in _IDLE:
+            return []
+        known = {"SUPA": "G53", "TRAORI": "M428", "TRAFOOF": "M429"}.get(word)
+        if known is None:
+            raise BlockError(f"unknown word {word[:40]}")
+        return [known]
+
+    def _call(self, name: str, arguments: str) -> list[str]:
+        parts = [p.strip() for p in arguments.split(",")]
+        if name == "TRAORI" and parts in ([""], ["1"]):
+            return ["M428"]
+        if name == "CYCLE832":
+            if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
+                self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
+                                  "in the error bound")
+                return []
+            if not re.fullmatch(NUMBER, parts[0]):
+                raise BlockError(f"CYCLE832({arguments}): its tolerance is no plain number")
+            return [f"G64 P{float(parts[0]):.6f}"]
+        raise BlockError(f"{name[:40]}( ): a cycle or function the reader does not know")

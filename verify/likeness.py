@@ -1,0 +1,97 @@
+"""Are two programs the same to the part? Move for move, so that the proof of one is the proof of the other.
+
+Compared is what a reading gives: where the tip goes, how the tool stands, rapid or feed, how long a feed move takes,
+the tool, its speed, the coolant, dwells, and what is unknown of a way. Moves that go nowhere are left out on both
+sides, for controls differ in how they say "home".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from verify.program import Program
+
+TIP = 1e-3
+"""mm between two tips that are one."""
+AXIS = 1e-6
+"""Between unit vectors of two tool axes that are one."""
+RATE = 1e-9
+"""Between two feeds that are one, as a share."""
+
+
+def difference(proved: Program, other: Program) -> str:
+    """What the second program does otherwise than the first, in words with lines of both; '' where nothing.
+
+    Neither program is simulated. Remarks of the second that the first has not are a difference too.
+    """
+    had = {r.message for r in proved.remarks}
+    for remark in other.remarks:
+        if remark.message not in had:
+            return f"line {remark.line} of {other.name}: {remark.message}"
+    if proved.dwell != other.dwell:
+        return f"{other.name} waits {other.dwell:g} s, {proved.name} {proved.dwell:g} s"
+    if other.blend > proved.blend + 1e-12:
+        return (f"{other.name} lets the control leave the path by {other.blend:g} mm, {proved.name} by "
+                f"{proved.blend:g} mm")
+    mine, yours = _moving(proved), _moving(other)
+    n = min(len(mine), len(yours))
+    for what, off in _compared(proved, other, mine[:n], yours[:n]):
+        if off.any():
+            k = int(np.flatnonzero(off)[0])
+            return (f"line {other.line[yours[k]]} of {other.name} and line {proved.line[mine[k]]} of {proved.name} "
+                    f"differ in {what}")
+    if len(mine) != len(yours):
+        more = proved if len(mine) > n else other
+        row = int((mine if len(mine) > n else yours)[n])
+        return f"line {more.line[row]} of {more.name} has no counterpart"
+    return ""
+
+
+def _moving(p: Program) -> NDArray[np.int64]:
+    """Rows that go somewhere, or whose way there is not known."""
+    moves = (p.start != p.end).any(axis=1)
+    if p.poses is not None:
+        moves |= (p.poses.start_turn != p.poses.end_turn).any(axis=1)
+    moves[p.unknown[:, 0]] = True
+    return np.flatnonzero(moves)
+
+
+def _compared(a: Program, b: Program, i: NDArray[np.int64],
+              j: NDArray[np.int64]) -> list[tuple[str, NDArray[np.bool_]]]:
+    """What is compared, and for which pairs of rows it differs."""
+    def far(one: F64, other: F64, limit: float) -> NDArray[np.bool_]:
+        return np.asarray(~(np.linalg.norm(one[i] - other[j], axis=1) <= limit))
+
+    def unlike(one: F64, other: F64) -> NDArray[np.bool_]:
+        x, y = one[i], other[j]
+        return np.asarray(~((np.abs(x - y) <= RATE * np.abs(x)) | (np.isnan(x) & np.isnan(y))))
+
+    out = [("rapid or feed", a.kind[i] != b.kind[j]), ("the tool", a.tool[i] != b.tool[j]),
+           ("where the move begins", far(a.start, b.start, TIP)), ("where the move ends", far(a.end, b.end, TIP)),
+           ("what is known of the way", _unknown(a)[i] != _unknown(b)[j])]
+    for what, one, other in (("the tool axis before the move", _axes(a, True), _axes(b, True)),
+                             ("the tool axis after the move", _axes(a, False), _axes(b, False))):
+        out.append((what, far(one, other, AXIS)))
+    if a.poses is not None and b.poses is not None:
+        out.append(("where the rotary axes stand", far(a.poses.end_turn, b.poses.end_turn, AXIS)))
+    # what a block of joints takes is rounded with them: 1e-6 of a minute is far below what a feed word says
+    took = ~(np.isclose(a.minutes[i], b.minutes[j], rtol=1e-6, atol=1e-9, equal_nan=True))
+    return [*out, ("the feed", unlike(a.feed, b.feed)), ("the time they take", took),
+            ("the speed of the spindle", unlike(a.speed, b.speed)), ("the coolant", a.coolant[i] != b.coolant[j])]
+
+
+def _unknown(p: Program) -> NDArray[np.int64]:
+    out = np.zeros(len(p), np.int64)
+    out[p.unknown[:, 0]] = p.unknown[:, 1]
+    return out
+
+
+def _axes(p: Program, at_start: bool) -> F64:
+    if p.poses is None:
+        return np.tile([0.0, 0.0, 1.0], (len(p), 1))
+    return p.poses.start_axis if at_start else p.poses.end_axis
+
+
+__all__ = ["AXIS", "TIP", "difference"]
