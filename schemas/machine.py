@@ -8,7 +8,9 @@ from pydantic import Field, model_validator
 
 from schemas.base import BoundedNumber, Number, Triple, WireModel
 
-BUILT_DIALECTS = ("linuxcnc",)
+DIALECT_ENDINGS = {"linuxcnc": "ngc", "fanuc": "nc", "haas": "nc", "siemens": "mpf", "heidenhain": "h"}
+"""Controls programs are written for and read from, and how the names of their files end."""
+
 AngleRange = Annotated[list[BoundedNumber], Field(min_length=2, max_length=2)]
 """Least and greatest angle, deg."""
 
@@ -30,8 +32,19 @@ class Machine(WireModel):
     tcp: Annotated[bool, Field(description="The control keeps the tool tip in rotary moves; false: programs are of "
                                            "the linear joints, and pivots_mm is needed. No effect on a 3-axis machine, "
                                            "nor on a program that is verified: that says so by G43.4 or M428.")] = True
-    dialects: Annotated[list[str], Field(min_length=1, max_length=8,
-                                         description="Controls to write for; built so far: linuxcnc.")] = ["linuxcnc"]
+    dialects: Annotated[list[str], Field(
+        min_length=1, max_length=8,
+        description=f"Controls to write for, {', '.join(DIALECT_ENDINGS)}: one program each, the first of them "
+                    "simulated, the others read back and held against it move for move.")] = ["linuxcnc"]
+    restart_points: Annotated[bool, Field(
+        description="Every step of a program begins behind a label as after a tool change, tool, length, zero, speed, "
+                    "coolant and tool centre point control stated again, so that the program can be started there. On "
+                    "a 5-axis machine the axes go back to 0 between steps.")] = False
+    high_speed: Annotated[bool, Field(
+        description="Say the word for fast contouring where a control has it as an option: G05.1 Q1 on fanuc, CYCLE832 "
+                    "on siemens.")] = False
+    haas_tcp: Annotated[Literal["G234", "G43.4"], Field(
+        description="The word by which a Haas keeps the tool tip.")] = "G234"
     travel_mm: Annotated[Triple | None, Field(
         description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
                     "counted; where on the machine is for the work offset. null: not limited.")] = None
@@ -77,9 +90,9 @@ class Machine(WireModel):
     @model_validator(mode="after")
     def _check(self) -> Machine:
         self._check_rotary()
-        if absent := [d for d in self.dialects if d not in BUILT_DIALECTS]:
+        if absent := [d for d in self.dialects if d not in DIALECT_ENDINGS]:
             raise ValueError(f"dialect {', '.join(map(repr, absent))} is not built yet; "
-                             f"use {', '.join(BUILT_DIALECTS)}")
+                             f"use {', '.join(DIALECT_ENDINGS)}")
         if len(set(self.dialects)) != len(self.dialects):
             raise ValueError("a dialect stands more than once in machine.dialects")
         if self.travel_mm is not None and min(self.travel_mm) <= 0:

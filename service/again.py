@@ -26,7 +26,7 @@ PLANS = 3  # of a job at most
 MOST = 24  # findings: more are no wrong estimates
 MOST_PACKED = 96  # those of the engaged angle, which hang on the lattice of the stock all along a pass
 MET = (FindingKind.COLLISION, FindingKind.RUBBING)
-STEP = re.compile(r"^\((S\d+[a-z]*)\b")
+STEP = re.compile(r"^[\d ]*[(;] ?(S\d+[a-z]*)\b", re.IGNORECASE)  # the comment before a step, in any dialect
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def _step_of(f: Finding, programs: Sequence[Program]) -> Workingstep | None:
     for text in reversed(program.text.splitlines()[:f.line]):
         named = STEP.match(text)
         if named is not None:
-            return next((s for s in program.work.steps if s.id == named[1]), None)
+            return next((s for s in program.work.steps if s.id.upper() == named[1].upper()), None)
     return None
 
 

@@ -77,6 +77,23 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
     return path
 
 
+def known_dialect(name: str | None) -> str | None:
+    """A control by its name, as it was given.
+
+    Raises
+    ------
+    InputError
+        ``unknown_dialect``.
+    """
+    from geometry.errors import InputError
+    from schemas.machine import DIALECT_ENDINGS
+
+    if name is not None and name not in DIALECT_ENDINGS:
+        raise InputError(f"no reader knows the dialect '{name}'", code="unknown_dialect", measured=name,
+                         limit=sorted(DIALECT_ENDINGS), remedy="name one of them, or leave it out")
+    return name
+
+
 def read_program(path: Path) -> str:
     """Text of a program.
 

@@ -16,12 +16,14 @@ from functools import lru_cache
 from pathlib import Path
 
 from geometry.errors import InputError
+from schemas.machine import DIALECT_ENDINGS
 
-RESULT_FILES = ("program.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "report.json", "zones.json", "preview.png",
-                "deviation.png", "machined.stl")
-ACCESS_FILES = ("program.*.linuxcnc.ngc", "job.*.stpnc", "machined.*.stl")  # of further accesses
+PROGRAMS = tuple(f"{d}.{e}" for d, e in DIALECT_ENDINGS.items())
+RESULT_FILES = (*(f"program.{p}" for p in PROGRAMS), "job.stpnc", "job.arm.stpnc", "report.json", "zones.json",
+                "preview.png", "deviation.png", "machined.stl")
+ACCESS_FILES = (*(f"program.*.{p}" for p in PROGRAMS), "job.*.stpnc", "machined.*.stl")  # of further accesses
 VERIFICATION_FILES = ("report.json", "deviation.png", "machined.stl")
-PLAN_MARKS = ("program.linuxcnc.ngc", "program.*.linuxcnc.ngc", "job.stpnc", "job.*.stpnc", "zones.json")
+PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.stpnc", "job.*.stpnc", "zones.json")
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
 
 

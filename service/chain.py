@@ -48,7 +48,7 @@ from service.programs import (
 )
 from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
-from service.sides import Look, Side, in_first_frame, in_setup_frame
+from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
 from service.trimmed import trimmed_faces
 from toolpath.deflection import effective_diameter
 from toolpath.family import Target
@@ -58,7 +58,9 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
-from verify.model import Proof, ProofSetup, ScoredSamples
+from verify.dialects import dialect_of
+from verify.likeness import carried
+from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.view import View
 
@@ -130,6 +132,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
+    if proof.clean:  # of every control's program one was simulated; the others are the same, or nothing is delivered
+        stated = replace(stated, notes=(*stated.notes, *_carried(ready, look, written)))
     late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
@@ -139,7 +143,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     files: Files = {}
     if report["state"] == "proved":
         for p in written:
-            files[p.name] = ("program", "linuxcnc", p.access, p.text.encode())
+            files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
             files[p.file_name("job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(p.work).encode())
             files[p.file_name("job", "arm.stpnc")] = ("stepnc-arm", "", None, write_stepnc_arm(p.work).encode())
     files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
@@ -155,6 +159,12 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     deliver(out, report, files)
     progress("done", 1.0)
     return report
+
+
+def _carried(ready: Prepared, look: Look, written: Sequence[Program]) -> list[str]:
+    """Hold the programs of further controls against those that are proved; returns notes."""
+    tools, setup = tool_bodies(ready.setup), proof_setup(ready, look)
+    return [note for p in written for note in carried(p.given(), p.twins(), look.part, tools, setup)]
 
 
 def _untold(told: Learned, more: Learned, side: Side) -> bool:
@@ -226,7 +236,8 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
 
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
-                   spindle_tool: int = 0, blank_path: Path | None = None) -> dict[str, Any]:
+                   spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
+                   ending: str = "") -> dict[str, Any]:
     """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
@@ -237,6 +248,8 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     out  : folder for the deviation map, the mesh and the report; none is written where it is None
     mesh : the machined part is wanted too; it is written into ``out``
     blank_path : as ``plan``
+    dialect : whose words the program has; None: by its own marks, by ``ending`` of its file name or by the controls of
+        the machine (``verify.dialects.dialect_of``)
 
     Raises
     ------
@@ -253,7 +266,9 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     view = ready.view(access or known[0])
     look = proof_frame(ready) if access is None else Look.of(view)
     dense = look.into(score(ready).samples, ready.views[0])
-    proof = prove([("program", program_text)], look.part, tool_bodies(setup), proof_setup(ready, look, foreign=True),
+    spoken = dialect or dialect_of(program_text, ending, setup.machine.dialects)
+    given = [NcProgram("program", program_text, dialect=spoken)]
+    proof = prove(given, look.part, tool_bodies(setup), proof_setup(ready, look, foreign=True),
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.5 * f),
                   spindle_tool=spindle_tool)
     report = reporting.verification_report(ready, in_setup_frame(look, proof), dense)
@@ -263,7 +278,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         _deviation(ready, look, dense, proof, report, out / MAP_NAME)
         files[MAP_NAME] = ("deviation", "", view.id, (out / MAP_NAME).read_bytes())
         if mesh is not None:
-            figures, data = machined_part(mesh, [("program", program_text)], look.part, tool_bodies(setup),
+            figures, data = machined_part(mesh, given, look.part, tool_bodies(setup),
                                           proof_setup(ready, look, foreign=True),
                                           lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}

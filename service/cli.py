@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.arguments import blank_file, make_folder, mesh_wish, read_program
+from service.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,6 +70,9 @@ def verify(part: Part, setup: SetupPath,
            program: Annotated[Path, typer.Option("--program", metavar="FILE.ngc", help="The NC program.")],
            access: Annotated[str | None, typer.Option(help="Access of the setup the program is for; default the "
                                                           "first.")] = None,
+           dialect: Annotated[str | None, typer.Option(help="Control the program is for: linuxcnc, fanuc, haas, "
+                                                            "siemens or heidenhain; default by its text, its name and "
+                                                            "machine.dialects.")] = None,
            spindle_tool: Annotated[int, typer.Option(min=0, help="T number of the tool in the spindle, length offset "
                                                                  "on, before the first line; 0 for none.")] = 0,
            out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for report, deviation map and "
@@ -85,7 +88,8 @@ def verify(part: Part, setup: SetupPath,
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
 
         started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
-        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank)
+        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank,
+                                known_dialect(dialect), program.suffix)
         progress.close()
         say(verification_summary(result, time.monotonic() - started))
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED

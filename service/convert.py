@@ -111,7 +111,7 @@ def check_plannable(setup: Setup) -> None:
     Raises
     ------
     SetupError
-        Code 'dogleg_rapids', 'no_gauge_length', 'no_rotary_zero',
+        Code 'dogleg_rapids', 'no_gauge_length', 'no_inverse_time', 'no_rotary_zero',
         'access_out_of_reach', 'access_from_below', 'two_clampings'; as ``rotary_machine``.
     """
     machine = rotary_machine(setup.machine)
@@ -133,6 +133,12 @@ def _check_turning(setup: Setup, machine: RotaryMachine) -> None:
             raise SetupError(f"tools {', '.join(bare)}: the head swings the tool and the program is of joints, so "
                              "every tip depends on the length from the spindle face", code="no_gauge_length",
                              subjects=tuple(bare), remedy="give gauge_length_mm as measured, tip to spindle face")
+    if "heidenhain" in setup.machine.dialects and not machine.tcp and setup.machine.simultaneous:
+        raise SetupError("cuts that turn an axis need an inverse-time feed where the program is of joints, and "
+                         "heidenhain has none", code="no_inverse_time",
+                         subjects=("machine.dialects", "machine.tcp"), measured=setup.machine.dialects,
+                         remedy="say machine.tcp true and let the control keep the tip (M128), or set "
+                                "machine.simultaneous false")
     for letter, limits in zip(machine.letters, setup.machine.rotary_deg or (), strict=False):
         if not limits[0] <= 0.0 <= limits[1]:
             raise SetupError(f"machine.rotary_deg of {letter}, {limits[0]:g} to {limits[1]:g}, leaves out 0, where the "

@@ -11,8 +11,9 @@ from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from output.clamping import SWING, home_of
-from output.linuxcnc import write_linuxcnc
+from output.dialects import DIALECTS, Switches
 from output.model import Clamping, Frame, StockBox, Workplan
+from output.walker import write_program
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import rotary_machine, tool_bodies
@@ -56,13 +57,23 @@ def programs_of(ready: Prepared, sides: Sequence[Side]) -> list[Program]:
         return []
     if ready.setup.machine.kind == "5-axis":
         work = clamped_workplan(ready, cutting)
-        return [Program(ready.views[0].id, work, write_linuxcnc(work))]
+        return [_written(ready, ready.views[0].id, work)]
     out = []
     for s in cutting:
         work, view = workplan(ready, s), s.view
         turn = None if view.is_first else view.rotation @ view.first.T
-        out.append(Program(view.id, work, write_linuxcnc(work), "" if view.is_first else f".{view.id}", turn))
+        out.append(_written(ready, view.id, work, "" if view.is_first else f".{view.id}", turn))
     return out
+
+
+def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> Program:
+    """The program of a plan for every control of the machine."""
+    machine = ready.setup.machine
+    switches = Switches(machine.high_speed, machine.haas_tcp)
+    work = replace(work, restart=machine.restart_points)
+    texts = {d: write_program(work, DIALECTS[d](switches)) for d in machine.dialects}
+    first = machine.dialects[0]
+    return Program(access, work, texts.pop(first), end, turn, first, texts)
 
 
 def workplan(ready: Prepared, side: Side) -> Workplan:

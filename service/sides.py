@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from output.model import Workplan
+from schemas.machine import DIALECT_ENDINGS
 from toolpath.motion import Workingstep
 from toolpath.plan import Plan
 from toolpath.stock import StockMap
@@ -57,6 +59,7 @@ class Program:
     """One finished program with the plan it was written from.
 
     access : id of its access where it is the program of one of several, else of the first
+    text   : of the dialect that is simulated; others : texts of the further ones, by dialect
     end    : put into the names of its files, '' for the first
     turn   : (3, 3) float64, from the frame of the proof into its own; None: the same
     """
@@ -66,11 +69,21 @@ class Program:
     text: str
     end: str = ""
     turn: F64 | None = None
+    dialect: str = "linuxcnc"
+    others: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
-        """File name of the program."""
-        return self.file_name("program", "linuxcnc.ngc")
+        """File name of the program that is simulated."""
+        return self._named(self.dialect)
+
+    def files(self) -> list[tuple[str, str, str]]:
+        """Dialect, file name and text of all, the one that is simulated first."""
+        texts = {self.dialect: self.text, **self.others}
+        return [(dialect, self._named(dialect), text) for dialect, text in texts.items()]
+
+    def _named(self, dialect: str) -> str:
+        return self.file_name("program", f"{dialect}.{DIALECT_ENDINGS[dialect]}")
 
     def file_name(self, stem: str, end: str) -> str:
         """'job.stpnc' for the first access, 'job.A2.stpnc' for a further one."""
@@ -78,7 +91,11 @@ class Program:
 
     def given(self) -> NcProgram:
         """The program as a proof takes it."""
-        return NcProgram(self.name, self.text, self.turn, self.work.work_offset)
+        return NcProgram(self.name, self.text, self.turn, self.work.work_offset, self.dialect)
+
+    def twins(self) -> list[NcProgram]:
+        """The further ones, which are held against it."""
+        return [NcProgram(self._named(d), t, self.turn, self.work.work_offset, d) for d, t in self.others.items()]
 
 
 def in_setup_frame(look: Look, proof: Proof) -> Proof:

@@ -7,11 +7,19 @@ sides, for controls differ in how they say "home".
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import InternalError, ProgramError
 from geometry.mesh import F64
+from geometry.part import Part
+from geometry.toolbody import ToolBody
+from verify.model import NcProgram, ProofSetup
 from verify.program import Program
+from verify.progress import Report, Stages, silent
+from verify.sequence import read_all
 
 TIP = 1e-3
 """mm between two tips that are one."""
@@ -94,4 +102,37 @@ def _axes(p: Program, at_start: bool) -> F64:
     return p.poses.start_axis if at_start else p.poses.end_axis
 
 
-__all__ = ["AXIS", "TIP", "difference"]
+def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+            report: Report = silent) -> list[str]:
+    """Carry the proof of a program over to others that shall be the same.
+
+    proved  : a program without a finding;  twins : the others, in the same frame
+    part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
+    report  : called with the share done, 0 to 1
+
+    Returns what should be known of the readings of the others and is no difference.
+
+    Raises
+    ------
+    InternalError
+        Code programs_differ: one of them does otherwise, or cannot be read; the message names both lines.
+    """
+    if not twins:
+        return []
+    stages, share, notes = Stages(report), 1.0 / (len(twins) + 1), []
+    (first,) = read_all([proved], part, tools, setup, 0, stages.span(0.0, share))
+    for k, twin in enumerate(twins, 1):
+        try:
+            (other,) = read_all([twin], part, tools, setup, 0, stages.span(k * share, (k + 1) * share))
+            told = difference(first.program, other.program)
+        except ProgramError as refusal:
+            told = refusal.message
+        if told:
+            raise InternalError(f"{twin.name} is not the program that was proved: {told}", code="programs_differ",
+                                subjects=(proved.name, twin.name), measured=told,
+                                remedy="please report it with part and setup; nothing is delivered")
+        notes += [f"{twin.name}: {note}" for note in other.program.notes]
+    return notes
+
+
+__all__ = ["AXIS", "TIP", "carried", "difference"]

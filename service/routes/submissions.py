@@ -45,7 +45,9 @@ def multipart(with_program: bool) -> dict[str, Any]:
     encoding = {"part": {"contentType": "model/step, application/step, application/octet-stream"},
                 "setup": {"contentType": "application/json"}}
     if with_program:
-        properties["program"] = {"type": "string", "format": "binary", "description": "The NC program."}
+        properties["program"] = {"type": "string", "format": "binary",
+                                 "description": "The NC program of a control that machine.dialects of the setup names; "
+                                                "Siemens and Heidenhain programs are known by their own words."}
         encoding["program"] = {"contentType": "text/plain, application/octet-stream"}
     required = list(properties)
     properties["stock"] = {

@@ -37,7 +37,7 @@ class FakeChain(types.ModuleType):
         return self._say(progress)
 
     def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
-                       spindle_tool=0, blank_path=None):
+                       spindle_tool=0, blank_path=None, dialect=None, ending=""):
         assert program_text.strip()
         self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
         return self._say(progress)

@@ -97,7 +97,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (setup(machine={**FIVE, "pivots_mm": [[0, 0, 0]]}), "machine.pivots_mm has 1 points, table-table-AC takes 2"),
     (setup(machine={**FIVE, "kinematics": "head-head-BC", "pivots_mm": [[0, 1, 50]]}), "begins with [0, 0, distance"),
     (setup(machine={"rotary_rate_deg_min": 100}), "5-axis machine"),
-    (setup(machine={"dialects": ["heidenhain"]}), "not built"),
+    (setup(machine={"dialects": ["fagor"]}), "not built"),
     (setup(machine={"pivots_mm": [[0, 0, 0]]}), "5-axis machine"),
     (setup(stock={"step_file": "blank.step"}), "belongs to stock.kind 'step'"),
     (setup(stock={"kind": "step", "step_file": ""}), "at least 1 character"),

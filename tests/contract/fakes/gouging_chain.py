@@ -3,14 +3,14 @@
 import service.chain as chain
 import service.programs as programs
 
-write = programs.write_linuxcnc
+write = programs.write_program
 
 
-def gouging(work):
-    text = write(work)
+def gouging(work, dialect):
+    text = write(work, dialect)
     at = text.rindex("\nM5\n")
     return f"{text[:at]}\nG0 X3 Y6\nG1 Z1.5 F100\nG1 X4\nG0 Z30{text[at:]}"
 
 
-programs.write_linuxcnc = gouging
+programs.write_program = gouging
 plan, zones_only, verify_program = chain.plan, chain.zones_only, chain.verify_program

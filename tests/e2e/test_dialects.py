@@ -1,0 +1,99 @@
+"""One small job for all five controls: each program listed, read back, proved on its own, and none of them if one lies."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from geometry.errors import InternalError
+from output.dialects import DIALECTS
+from schemas.machine import DIALECT_ENDINGS
+from service import chain, programs
+from service.artifacts import clear_results
+from service.cli import app
+from service.convert import parse_setup
+from tests.step_files import write_step
+from verify.dialects import DIALECTS as READ
+
+cq = pytest.importorskip("cadquery")
+
+FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
+SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0},
+         "operations": {"finishing": False}, "access": [{"work_offset": "G59.1"}],
+         "machine": {"dialects": ["siemens", "linuxcnc", "fanuc", "haas", "heidenhain"]}}
+NAMES = {d: f"program.{d}.{ending}" for d, ending in DIALECT_ENDINGS.items()}
+
+
+def quiet(_stage: str, _share: float) -> None:
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def part(tmp_path_factory) -> Path:
+    shape = cq.Workplane().box(16, 12, 4, centered=False).cut(cq.Workplane().box(8, 12, 2, centered=False)
+                                                              .translate((0, 0, 2)))
+    return write_step(shape, tmp_path_factory.mktemp("step") / "step.step")
+
+
+@pytest.fixture(scope="module")
+def job(part, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    return out, chain.plan(part, parse_setup(json.dumps(SETUP)), out, quiet)
+
+
+def test_what_the_wire_names_is_written_and_read():
+    assert {name: d.ending for name, d in DIALECTS.items()} == DIALECT_ENDINGS == {d: DIALECT_ENDINGS[d] for d in READ}
+
+
+def test_all_five_are_delivered_and_listed(job):
+    out, report = job
+    assert report["state"] == "proved"
+    listed = {f["dialect"]: f for f in report["files"] if f["kind"] == "program"}
+    assert {d: f["name"] for d, f in listed.items()} == NAMES
+    for f in listed.values():
+        assert hashlib.sha256((out / f["name"]).read_bytes()).hexdigest() == f["sha256"]
+
+
+@pytest.mark.parametrize("dialect", ["siemens", "heidenhain", "haas"])
+def test_each_is_proved_by_the_command_line(dialect, part, job, tmp_path):
+    """By its name alone for two of them; an .nc is a Haas's where the machine says so."""
+    setup = {**SETUP, "machine": {"dialects": ["haas"]}} if dialect == "haas" else SETUP
+    path = tmp_path / "setup.json"
+    path.write_text(json.dumps(setup))
+    got = CliRunner().invoke(app, ["verify", str(part), "--setup", str(path), "--program",
+                                   str(job[0] / NAMES[dialect])])
+    assert got.exit_code == 0, got.stdout
+    assert json.loads(got.stdout)["coverage"] == pytest.approx(job[1]["coverage"], abs=1e-6)
+
+
+def test_a_dialect_nobody_reads_is_refused(part, job, tmp_path):
+    path = tmp_path / "setup.json"
+    path.write_text(json.dumps(SETUP))
+    got = CliRunner().invoke(app, ["verify", str(part), "--setup", str(path), "--dialect", "fagor", "--program",
+                                   str(job[0] / NAMES["haas"]), "--json"])
+    assert got.exit_code == 2 and "unknown_dialect" in got.stdout
+
+
+def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypatch):
+    write = programs.write_program
+
+    def lying(work, dialect):
+        text = write(work, dialect)
+        return text.replace(" M8", " M9") if dialect.name == "haas" else text
+
+    monkeypatch.setattr(programs, "write_program", lying)
+    with pytest.raises(InternalError) as refused:
+        chain.plan(part, parse_setup(json.dumps(SETUP)), tmp_path, quiet)
+    assert refused.value.code == "programs_differ" and refused.value.subjects == (NAMES["siemens"], NAMES["haas"])
+    assert not list(tmp_path.glob("program*")) and not list(tmp_path.glob("*.stpnc"))
+
+
+def test_programs_of_an_earlier_job_are_cleared(tmp_path):
+    for name in (*NAMES.values(), "program.A2.fanuc.nc", "mine.nc"):
+        (tmp_path / name).touch()
+    clear_results(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.nc"]
