@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
-from geometry.mesh import F64
+from geometry.mesh import F64, TriangleMesh
+from geometry.nurbs import NurbsSurface
 from geometry.toolbody import ToolBody
 from output.kinematics import RotaryMachine
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -17,6 +19,38 @@ class StockBox:
 
     lower: F64
     upper: F64
+
+
+class Ap238(StrEnum):
+    """What an AP238 file is for.
+
+    CC1            : tool paths, conformance class 1
+    CC2            : class 2, with part and stock as shapes and the strategies of the operations
+    INTEGRATED_CNC : as CC1, for readers of the first edition, which know the schema by another name
+    """
+
+    CC1 = "cc1"
+    CC2 = "cc2"
+    INTEGRATED_CNC = "integrated_cnc"
+
+
+@dataclass(frozen=True, eq=False)
+class StockCylinder:
+    """A round blank: middle of its lower end (3,), mm, the way to the upper one (3,), unit, radius and height, mm."""
+
+    base: F64
+    axis: F64
+    radius: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What a tool is besides a shape: spindle face to tip, mm; number of teeth; minutes in cut its cutter lasts."""
+
+    gauge_length: float
+    teeth: int | None = None
+    life: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +91,11 @@ class Workplan:
     labels          : passed through to headers
     comments        : header lines for the machinist (ASCII, no parentheses)
     restart         : every step begins as after a tool change, so that a program can be started at each of them
+    stock_words     : what kind of blank it is, where it is no box: ``stock`` is then a box round it
+    cylinder        : the blank where it is one, or None; stock_mesh : where it is a mesh, or None
+    part_mesh       : the part, faces by number, or None where nobody wants it written
+    assemblies      : by T number; surfaces : by face number, in the frame of the plan, where strategies follow them
+    ap238           : what the AP238 file is for
     """
 
     name: str
@@ -73,6 +112,19 @@ class Workplan:
     comments: tuple[str, ...] = ()
     clamping: Clamping | None = None
     restart: bool = False
+    stock_words: str = ""
+    cylinder: StockCylinder | None = None
+    stock_mesh: TriangleMesh | None = None
+    part_mesh: TriangleMesh | None = None
+    assemblies: Mapping[int, Assembly] = field(default_factory=dict)
+    surfaces: Mapping[int, NurbsSurface] = field(default_factory=dict)
+    ap238: Ap238 = Ap238.CC1
+
+    def assembly(self, tool: ToolBody) -> Assembly:
+        """What is known of a tool; without more, it is as long as shank and holder stick out of the spindle."""
+        known = self.assemblies.get(tool.number)
+        return known or Assembly(tool.stickout + sum(h.length for h in tool.holder))
 
 
-__all__ = ["Clamping", "Frame", "Motion", "StockBox", "Trajectory", "Workingstep", "Workplan"]
+__all__ = ["Ap238", "Assembly", "Clamping", "Frame", "Motion", "StockBox", "StockCylinder", "Trajectory",
+           "Workingstep", "Workplan"]

@@ -8,28 +8,41 @@ aggregates as ``()``.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from output.grid import I64, PER_MM
 
+Write = Callable[[str], object]
+_LINES_A_PIECE = 4096
 _REFS_A_LINE = 12
 _TEXT_LIMIT = 256  # FILE_DESCRIPTION and FILE_NAME strings, ISO 10303-21 section 8.2
 
 
 class Part21:
-    """The data section being written: every ``add`` returns the number of its instance."""
+    """A file being written, instance by instance; every ``add`` returns the number of its instance.
 
-    def __init__(self) -> None:
-        self._lines: list[str] = []
+    write : takes the text in pieces, in order, so that the file is never held as a whole
+    description, name, schema, system : words of the header
+    """
+
+    def __init__(self, write: Write, *, description: Sequence[str], name: str, schema: Sequence[str],
+                 system: str) -> None:
+        limited = ",".join(quoted(d[:_TEXT_LIMIT]) for d in description)
+        self._write = write
         self._count = 0
+        self._lines = [
+            "ISO-10303-21;", "HEADER;", f"FILE_DESCRIPTION(({limited}),'2;1');",
+            f"FILE_NAME({quoted(name)},'{time_stamp()}',(''),(''),{quoted(system)},{quoted(system)},'');",
+            f"FILE_SCHEMA(({','.join(quoted(s) for s in schema)}));", "ENDSEC;", "DATA;",
+        ]
 
     def add(self, record: str) -> int:
         """Add ``NAME(...)`` or a complex ``(A() B())`` and return its number."""
         self._count += 1
-        self._lines.append(f"#{self._count}={record};")
+        self.fill(self._count, record)
         return self._count
 
     def reserve(self) -> int:
@@ -40,16 +53,20 @@ class Part21:
     def fill(self, number: int, record: str) -> None:
         """Write the instance of a reserved number."""
         self._lines.append(f"#{number}={record};")
+        if len(self._lines) >= _LINES_A_PIECE:
+            self._flush()
 
     def points(self, points: I64) -> int:
         """Add CARTESIAN_POINTs of the (n, 3) grid points; returns the number of the first, the rest follow it."""
         first = self._count + 1
-        rows = (points / PER_MM + 0.0).tolist()
-        self._lines += [
-            "#%d=CARTESIAN_POINT('',(%.4f,%.4f,%.4f));" % (i, x, y, z)  # noqa: UP031  twice as fast as format here
-            for i, (x, y, z) in enumerate(rows, start=first)
-        ]
-        self._count += len(rows)
+        for low in range(0, len(points), _LINES_A_PIECE):
+            rows = (points[low:low + _LINES_A_PIECE] / PER_MM + 0.0).tolist()
+            self._lines += [
+                "#%d=CARTESIAN_POINT('',(%.4f,%.4f,%.4f));" % (i, x, y, z)  # noqa: UP031  twice as fast as format here
+                for i, (x, y, z) in enumerate(rows, start=self._count + 1)
+            ]
+            self._count += len(rows)
+            self._flush()
         return first
 
     def vectors(self, vectors: F64) -> list[int]:
@@ -63,15 +80,14 @@ class Part21:
             out.append(number)
         return out
 
-    def text(self, *, description: Sequence[str], name: str, schema: Sequence[str], system: str) -> str:
-        """The whole exchange file, ASCII, newline at the end."""
-        limited = ",".join(quoted(d[:_TEXT_LIMIT]) for d in description)
-        head = [
-            "ISO-10303-21;", "HEADER;", f"FILE_DESCRIPTION(({limited}),'2;1');",
-            f"FILE_NAME({quoted(name)},'{time_stamp()}',(''),(''),{quoted(system)},{quoted(system)},'');",
-            f"FILE_SCHEMA(({','.join(quoted(s) for s in schema)}));", "ENDSEC;", "DATA;",
-        ]
-        return "\n".join([*head, *self._lines, "ENDSEC;", "END-ISO-10303-21;"]) + "\n"
+    def close(self) -> None:
+        """Write what is left and the end of the file."""
+        self._lines += ["ENDSEC;", "END-ISO-10303-21;"]
+        self._flush()
+
+    def _flush(self) -> None:
+        self._write("\n".join(self._lines) + "\n")
+        self._lines.clear()
 
 
 def quoted(text: str) -> str:

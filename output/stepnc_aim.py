@@ -1,24 +1,46 @@
-"""STEP-NC as AP238 (ISO 10303-238 edition 3), conformance class 1: a toolpath for every operation.
+"""STEP-NC as AP238 (ISO 10303-238): a toolpath for every operation, streamed.
 
 Every parameter of the application model is a property with a representation;
 the strings are those of clause 5.1 of the standard. Units are written in the
 file: mm, mm/min, rev/min (negative: a right-hand cutter seen from the holder).
-Rapids are toolpaths of their operation with the speed profile 'rapid'. The
-stock is a product of its own, tied to the part as 'rawpiece', with a block as
-its shape.
+Rapids are toolpaths of their operation with the speed profile 'rapid', those
+that lead to it and away from it too. Where a fresh cutter is due, a message and
+a program stop stand before the workingstep.
+
+What a file is for (``output.model.Ap238``): conformance class 1 has tool paths
+and no shape, one workplan, and, as clause 6.2 wants of explicit tool paths, no
+strategy, whose figures stand in the purpose of the operation. Class 2 has part
+and stock as shapes, the strategies and the instructions for the setup as well:
+blocks and cylinders by their sizes, all else as triangles, faces named as in
+the report. Readers of the first edition get class 1 under its schema name.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from geometry.errors import OutputError
-from geometry.mesh import F64
+from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
 from output.grid import check_plan
-from output.model import Workplan
-from output.part21 import Part21, quoted, real, reals, refs
-from output.stepnc_words import Curve, header_words, operation_words, region_name, setup_words, stock_box, ways
+from output.model import Ap238, Workplan
+from output.part21 import Part21, Write, quoted, real, reals, refs
+from output.stepnc_words import (
+    Curve,
+    fresh_words,
+    header_words,
+    operation_words,
+    pass_plane_normal,
+    region_name,
+    setup_words,
+    stock_box,
+    to_and_fro,
+    ways,
+    written_feed,
+    written_speed,
+)
 from output.text import decimal, height_word, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
@@ -27,49 +49,70 @@ _TYPE = {
     Motion.RAPID: "connect", Motion.APPROACH: "approach", Motion.CUT: "trajectory path",
     Motion.CONNECT: "connect", Motion.LIFT: "lift",
 }
+_NONE = "''"
 _CLT = "'cutter location trajectory'"
+_SCHEMA = {
+    Ap238.CC1: "model_based_integrated_manufacturing_schema",
+    Ap238.CC2: "model_based_integrated_manufacturing_schema",
+    Ap238.INTEGRATED_CNC: "integrated_cnc_schema",
+}
 
 
 def write_stepnc_aim(plan: Workplan) -> str:
-    """The job as an AP238 Part 21 file, schema MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA.
+    """The text that ``stream_stepnc_aim`` writes, as a whole; errors as there."""
+    pieces: list[str] = []
+    stream_stepnc_aim(plan, pieces.append)
+    return "".join(pieces)
 
-    plan : lengths in mm, setup frame
-    Returns the text, ASCII; points read back within 0.00005 mm of the plan on each axis.
-    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty.
+
+def stream_stepnc_aim(plan: Workplan, write: Write) -> None:
+    """Write the job as an AP238 Part 21 file, piece by piece.
+
+    plan  : lengths in mm, setup frame; ``plan.ap238`` says what the file is for
+    write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
+    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
+    written until then is no file.
     """
     check_plan(plan)
-    return _Aim(plan).text()
+    _Aim(plan, write).run()
 
 
 class _Aim:
     """One file being written; the small dictionaries keep equal instances single."""
 
-    def __init__(self, plan: Workplan) -> None:
+    def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
-        self.file = Part21()
+        self.shapes = plan.ap238 is Ap238.CC2
+        self.schema = _SCHEMA[plan.ap238]
+        words = f"AP238 freeform milling, conformance class {2 if self.shapes else 1}, cutter location paths"
+        self.file = Part21(write, description=header_words(plan, words), name=f"{plan.name}.stpnc",
+                           schema=(self.schema.upper(),), system=f"zonemill {plan.version}")
         self.symbols: dict[str, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
         self.tools: dict[int, tuple[int, ToolBody, list[int]]] = {}
+        self.elements = 0
 
-    def text(self) -> str:
-        plan = self.plan
+    def run(self) -> None:
         self._contexts()
-        self._feed_and_speed_units()
+        self._units_of_rates()
         self._project()
+        self._setup()
         self._functions()
-        self._steps()
+        for way in ways(self.plan):
+            if all(len(c.points) < 2 for c in way.path):
+                raise OutputError(f"{way.step.id} does not move", code="empty_step", subjects=(way.step.id,))
+            if way.step.fresh:
+                self._pause(way.step)
+            self._element(self._workingstep(way.step, [*way.before, *way.path, *way.after]))
         for number, tool, operations in self.tools.values():
             self._tool(number, tool, operations)
-        return self.file.text(
-            description=header_words(plan, "AP238 freeform milling, conformance class 1, cutter location paths"),
-            name=f"{plan.name}.stpnc", schema=("MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA",),
-            system=f"zonemill {plan.version}")
+        self.file.close()
 
     def _contexts(self) -> None:
         add = self.file.add
         application = add("APPLICATION_CONTEXT('Application protocol for the exchange of CNC data')")
-        add("APPLICATION_PROTOCOL_DEFINITION('international standard',"
-            f"'model_based_integrated_manufacturing_schema',2022,#{application})")
+        year = 2007 if self.plan.ap238 is Ap238.INTEGRATED_CNC else 2022
+        add(f"APPLICATION_PROTOCOL_DEFINITION('international standard','{self.schema}',{year},#{application})")
         self.product_context = add(f"PRODUCT_CONTEXT('CNC Machining',#{application},'manufacturing')")
         self.view = add(f"PRODUCT_DEFINITION_CONTEXT('CNC Machining',#{application},'manufacturing')")
         self.plain = add("REPRESENTATION_CONTEXT('','units not necessary')")
@@ -87,15 +130,16 @@ class _Aim:
     def _placement(self, name: str, point: int) -> int:
         return self.file.add(f"AXIS2_PLACEMENT_3D({quoted(name)},#{point},#{self.up},#{self.along})")
 
-    def _feed_and_speed_units(self) -> None:
+    def _units_of_rates(self) -> None:
         add = self.file.add
         second = add("(NAMED_UNIT(*) SI_UNIT($,.SECOND.) TIME_UNIT())")
         sixty = add(f"TIME_MEASURE_WITH_UNIT(TIME_MEASURE(60.),#{second})")
         time = add("DIMENSIONAL_EXPONENTS(0.,0.,1.,0.,0.,0.,0.)")
         none = add("DIMENSIONAL_EXPONENTS(0.,0.,0.,0.,0.,0.,0.)")
-        minute = add(f"(CONVERSION_BASED_UNIT('minute',#{sixty}) NAMED_UNIT(#{time}) TIME_UNIT())")
+        self.minute = add(f"(CONVERSION_BASED_UNIT('minute',#{sixty}) NAMED_UNIT(#{time}) TIME_UNIT())")
         turn = add(f"CONTEXT_DEPENDENT_UNIT(#{none},'revolution')")
-        per_minute = add(f"DERIVED_UNIT_ELEMENT(#{minute},-1.)")
+        self.count = add(f"CONTEXT_DEPENDENT_UNIT(#{none},'count')")
+        per_minute = add(f"DERIVED_UNIT_ELEMENT(#{self.minute},-1.)")
         self.mm_min = add(f"DERIVED_UNIT((#{add(f'DERIVED_UNIT_ELEMENT(#{self.mm},1.)')},#{per_minute}))")
         self.rev_min = add(f"DERIVED_UNIT((#{add(f'DERIVED_UNIT_ELEMENT(#{turn},1.)')},#{per_minute}))")
         add(f"NAME_ATTRIBUTE('millimetre/minute',#{self.mm_min})")
@@ -111,29 +155,82 @@ class _Aim:
         self.workplan = add("MACHINING_WORKPLAN('main workplan','','','')")
         process = add(f"PRODUCT_DEFINITION_PROCESS('machining','',#{self.workplan},'')")
         add(f"PROCESS_PRODUCT_ASSOCIATION('','',#{project},#{process})")
-        part = self._definition(add(f"PRODUCT('part','part',{quoted('sha256 ' + plan.part_sha256)},"
-                                    f"(#{self.product_context}))"))
-        add(f"MACHINING_PROJECT_WORKPIECE_RELATIONSHIP('','workpiece','',#{project},#{part})")
-        self.part_shape = add(f"PRODUCT_DEFINITION_SHAPE('','',#{part})")
-        stock = self._definition(add(f"PRODUCT('stock','stock',{quoted(plan.material)},(#{self.product_context}))"))
-        add(f"PRODUCT_DEFINITION_RELATIONSHIP('','rawpiece','',#{part},#{stock})")
-        self._stock_shape(stock)
+        self.part = self._definition(add(f"PRODUCT('part','part',{quoted('sha256 ' + plan.part_sha256)},"
+                                         f"(#{self.product_context}))"))
+        add(f"MACHINING_PROJECT_WORKPIECE_RELATIONSHIP('','workpiece','',#{project},#{self.part})")
+        self.part_shape = add(f"PRODUCT_DEFINITION_SHAPE('','',#{self.part})")
+        low, size = stock_box(plan)
+        box = " ".join(decimal(v) for v in (*low, *np.add(low, size)))
+        kind = plan.stock_words or "box"
+        stock = self._definition(add(f"PRODUCT('stock','stock',{quoted(f'{kind}, inside {box} mm')},"
+                                     f"(#{self.product_context}))"))
+        add(f"PRODUCT_DEFINITION_RELATIONSHIP('','rawpiece','',#{self.part},#{stock})")
+        if self.shapes:
+            shape = add(f"PRODUCT_DEFINITION_SHAPE('','',#{stock})")
+            add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{self._stock_shape()})")
+            if plan.part_mesh is not None:
+                add(f"SHAPE_DEFINITION_REPRESENTATION(#{self.part_shape},#{self._triangles('part', plan.part_mesh)})")
         if plan.material:
-            add(f"MATERIAL_DESIGNATION({quoted(plan.material)},(#{part},#{stock}))")
+            add(f"MATERIAL_DESIGNATION({quoted(plan.material)},(#{self.part},#{stock}))")
 
     def _definition(self, product: int) -> int:
         formation = self.file.add(f"PRODUCT_DEFINITION_FORMATION('','',#{product})")
         return self.file.add(f"PRODUCT_DEFINITION('','',#{formation},#{self.view})")
 
-    def _stock_shape(self, stock: int) -> None:
-        add = self.file.add
+    def _stock_shape(self) -> int:
+        """The blank: a cylinder, triangles, or a block, which is a box round it where it is neither."""
+        add, cylinder = self.file.add, self.plan.cylinder
+        if self.plan.stock_mesh is not None:
+            return self._triangles("stock", self.plan.stock_mesh)
+        if cylinder is not None:
+            base, axis = (add(f"{kind}('',{reals(v.tolist(), 9)})") for kind, v in
+                          (("CARTESIAN_POINT", cylinder.base), ("DIRECTION", cylinder.axis)))
+            aside = add(f"DIRECTION('',{reals(_square_to(cylinder.axis), 9)})")
+            items = [add(f"AXIS2_PLACEMENT_3D('orientation',#{base},#{axis},#{aside})"),
+                     self._length("length", cylinder.height), self._length("diameter", 2.0 * cylinder.radius)]
+            return add(f"CYLINDRICAL_SHAPE_REPRESENTATION('stock cylinder',{refs(items)},#{self.space})")
         low, size = stock_box(self.plan)
         corner = add(f"CARTESIAN_POINT('',{reals(low)})")
         items = [self._placement("orientation", corner)]
         items += [self._length(n, s) for n, s in zip(("length", "width", "height"), size, strict=True)]
-        shape = add(f"PRODUCT_DEFINITION_SHAPE('','',#{stock})")
-        block = add(f"BLOCK_SHAPE_REPRESENTATION('stock block',{refs(items)},#{self.space})")
-        add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{block})")
+        name = "box round the stock" if self.plan.stock_words else "stock block"
+        return add(f"BLOCK_SHAPE_REPRESENTATION('{name}',{refs(items)},#{self.space})")
+
+    def _triangles(self, name: str, mesh: TriangleMesh) -> int:
+        """A mesh with a face for every face number, named as in the report."""
+        add = self.file.add
+        rows = ",\n".join(reals(v, 6) for v in mesh.vertices.tolist())
+        places = add(f"COORDINATES_LIST('',{len(mesh.vertices)},({rows}))")
+        faces = []
+        for number in np.unique(mesh.face_ids).tolist():
+            corners = mesh.faces[mesh.face_ids == number]
+            used, local = np.unique(corners, return_inverse=True)
+            index = ",".join(map(str, (used + 1).tolist()))
+            three = ",\n".join("(%d,%d,%d)" % tuple(r) for r in (local.reshape(-1, 3) + 1).tolist())  # noqa: UP031
+            faces.append(add(f"TRIANGULATED_FACE('F{number}',#{places},{len(used)},(),$,({index}),({three}))"))
+        solid = add(f"TESSELLATED_SOLID('{name}',{refs(faces)},$)")
+        return add(f"TESSELLATED_SHAPE_REPRESENTATION('{name}',(#{solid}),#{self.space})")
+
+    def _setup(self) -> None:
+        """The setup with its security plane, and, beside shapes, what the machinist is told before all else."""
+        plan, add = self.plan, self.file.add
+        name = quoted(f"setup {plan.work_offset} sha256 {plan.setup_sha256}")
+        setup = self._definition(add(f"MACHINING_SETUP({name},{name},'',(#{self.product_context}))"))
+        height = add(f"CARTESIAN_POINT('',(0.,0.,{real(plan.clearance_plane)}))")
+        plane = add(f"PLANE('security plane',#{self._placement('security plane', height)})")
+        secure = add(f"PROPERTY_DEFINITION('security plane','',#{setup})")
+        add(f"PROPERTY_DEFINITION_REPRESENTATION(#{secure},#{add(f'REPRESENTATION({_NONE},(#{plane}),#{self.space})')})")
+        add(f"MACHINING_SETUP_WORKPIECE_RELATIONSHIP('','','',#{setup},#{self.part})")
+        process = add(f"PRODUCT_DEFINITION_PROCESS('setup','',#{self.workplan},'')")
+        add(f"PROCESS_PRODUCT_ASSOCIATION('','',#{setup},#{process})")
+        if self.shapes:
+            told = add("MACHINING_PROCESS_EXECUTABLE('setup instructions','setup instructions','','')")
+            kind = add("DOCUMENT_TYPE('setup instructions')")
+            sheet = add(f"DOCUMENT('setup','setup instructions','',#{kind})")  # one is due, though all is said here
+            for place, words in enumerate(setup_words(plan), start=1):
+                note = add(f"MACHINING_OPERATOR_INSTRUCTION('',{quoted(words)},'','',(#{sheet}))")
+                add(f"MACHINING_OPERATOR_INSTRUCTION_RELATIONSHIP('','',#{told},#{note},{place}.)")
+            self._element(told)
 
     def _length(self, name: str, value: float) -> int:
         return self.file.add(f"(LENGTH_MEASURE_WITH_UNIT() MEASURE_REPRESENTATION_ITEM() "
@@ -159,10 +256,21 @@ class _Aim:
         item = self.file.add("DESCRIPTIVE_REPRESENTATION_ITEM('','rapid')")
         self.rapid = self.file.add(f"MACHINING_TOOLPATH_SPEED_PROFILE_REPRESENTATION('',(#{item}),#{self.plain})")
 
-    def _steps(self) -> None:
-        for place, way in enumerate(ways(self.plan), start=1):
-            executable = self._workingstep(way.step, [*way.before, *way.path, *way.after])
-            self.file.add(f"MACHINING_PROCESS_SEQUENCE_RELATIONSHIP('','',#{self.workplan},#{executable},{place}.)")
+    def _element(self, executable: int) -> None:
+        """The next of the workplan."""
+        self.elements += 1
+        self.file.add(f"MACHINING_PROCESS_SEQUENCE_RELATIONSHIP('','',#{self.workplan},#{executable},"
+                      f"{self.elements}.)")
+
+    def _pause(self, step: Workingstep) -> None:
+        """Ask for a fresh cutter and stop."""
+        add = self.file.add
+        message = add(f"MACHINING_NC_FUNCTION({quoted(f'fresh cutter for {step.id}')},'display message','','')")
+        text = add(f"DESCRIPTIVE_REPRESENTATION_ITEM('message text',{quoted(fresh_words(step))})")
+        self._property("message text", "'display message'", message,
+                       add(f"REPRESENTATION('',(#{text}),#{self.plain})"))
+        self._element(message)
+        self._element(add(f"MACHINING_NC_FUNCTION({quoted(f'stop before {step.id}')},'program stop','','')"))
 
     def _workingstep(self, step: Workingstep, path: list[Curve]) -> int:
         add = self.file.add
@@ -175,6 +283,8 @@ class _Aim:
         technology = self._technology(step.spindle_rpm, step.feed)
         add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{operation},#{technology})")
         add(f"MACHINING_FUNCTIONS_RELATIONSHIP('','',#{operation},#{self.functions})")
+        if self.shapes:
+            add(f"MACHINING_STRATEGY_RELATIONSHIP('machining','machining',#{operation},#{self._strategy(step)})")
         if step.tool.number not in self.tools:
             self.tools[step.tool.number] = (self.file.reserve(), step.tool, [])
         self.tools[step.tool.number][2].append(operation)
@@ -193,7 +303,7 @@ class _Aim:
         add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{placed})")
 
     def _toolpaths(self, step: Workingstep, operation: int, path: list[Curve]) -> None:
-        first = at = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
+        at = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
         place = 0
         for curve in path:
             trajectory, count = curve.trajectory, len(curve.points)
@@ -204,11 +314,9 @@ class _Aim:
                                       range(at, at + count), curve.axes)
             at += count - 1
             self.file.add(f"MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP('','',#{operation},#{toolpath},{place}.)")
-            if trajectory.motion is not Motion.RAPID and trajectory.feed != step.feed:
+            if trajectory.motion is not Motion.RAPID and written_feed(trajectory.feed) != written_feed(step.feed):
                 technology = self._technology(step.spindle_rpm, trajectory.feed)
                 self.file.add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{toolpath},#{technology})")
-        if at == first:
-            raise OutputError(f"{step.id} does not move", code="empty_step", subjects=(step.id,))
 
     def _toolpath(self, name: str, trajectory: Trajectory, points: range, axes: F64 | None) -> int:
         add = self.file.add
@@ -225,31 +333,89 @@ class _Aim:
         return toolpath
 
     def _technology(self, rpm: float, feed: float) -> int:
-        key = (rpm, feed)
+        key = written_speed(rpm), written_feed(feed)
         if key not in self.technologies:
             add = self.file.add
             number = self.technologies[key] = add("MACHINING_TECHNOLOGY('','milling','','')")
-            turns = add(f"MEASURE_REPRESENTATION_ITEM('rotational speed',NUMERIC_MEASURE({real(-rpm)}),"
+            turns = add(f"MEASURE_REPRESENTATION_ITEM('rotational speed',NUMERIC_MEASURE({real(-key[0])}),"
                         f"#{self.rev_min})")
             self._property("spindle", "'milling'", number, add(
                 f"MACHINING_SPINDLE_SPEED_REPRESENTATION('spindle speed',(#{turns}),#{self.plain})"))
-            rate = add(f"MEASURE_REPRESENTATION_ITEM('feed speed',NUMERIC_MEASURE({real(feed)}),#{self.mm_min})")
+            rate = add(f"MEASURE_REPRESENTATION_ITEM('feed speed',NUMERIC_MEASURE({real(key[1])}),#{self.mm_min})")
             self._property("feedrate", "'milling'", number, add(
                 f"MACHINING_FEED_SPEED_REPRESENTATION('feed speed',(#{rate}),#{self.plain})"))
         return self.technologies[key]
 
-    def _tool(self, number: int, tool: ToolBody, operations: list[int]) -> None:
+    def _strategy(self, step: Workingstep) -> int:
+        """The planes or parameters the passes run along, tolerance, scallop and side step, in the setup frame."""
         add = self.file.add
+        along_faces = step.strategy == "isoparametric"
+        kind = "uv" if along_faces else "plane cutter location"
+        strategy = add(f"FREEFORM_MILLING_STRATEGY({quoted(operation_words(step))},'{kind}','','')")
+        words = {"pathmode": "zigzag" if to_and_fro(step) else "forward",
+                 "cutmode": "climb" if step.climb else "conventional"}
+        for name, value in words.items():
+            self._property(name, f"'{kind}'", strategy, self._symbol(value))
+        limits = [self._length("chordal tolerance", step.chordal_tolerance),
+                  self._length("scallop height", step.scallop_height)]
+        self._property("milling tolerances", f"'{kind}'", strategy, add(
+            f"FREEFORM_MILLING_TOLERANCE_REPRESENTATION('',{refs(limits)},#{self.plain})"))
+        if step.side_step > 0.0:
+            self._property("stepover length", f"'{kind}'", strategy, add(
+                f"REPRESENTATION('',(#{self._length('stepover length', step.side_step)}),#{self.plain})"))
+        ways = {"forward direction": (1.0, 0.0, 0.0), "sideward direction": (0.0, 1.0, 0.0)}
+        if not along_faces:
+            normal, clamping = np.array(pass_plane_normal(step)), self.plan.clamping
+            ways = {"plane normal": tuple(
+                (normal if clamping is None else normal @ clamping.frames[step.access].rotation).tolist())}
+        for name, way in ways.items():
+            self._property(name, f"'{kind}'", strategy, add(
+                f"REPRESENTATION('',(#{add(f'DIRECTION({_NONE},{reals(way, 6)})')}),#{self.space})"))
+        return strategy
+
+    def _tool(self, number: int, tool: ToolBody, operations: list[int]) -> None:
+        add, known = self.file.add, self.plan.assembly(tool)
         kind = add("ACTION_RESOURCE_TYPE('milling cutting tool')")
-        self.file.fill(number, f"MACHINING_TOOL('{tool.number}','{_KIND[tool.kind]}',{refs(operations)},#{kind})")
+        words = _KIND[tool.kind]
+        if self.plan.ap238 is Ap238.INTEGRATED_CNC and tool.kind == "ball":
+            words = "ball endmill"
+        self.file.fill(number, f"MACHINING_TOOL('{tool.number}','{words}',{refs(operations)},#{kind})")
         prop = add(f"RESOURCE_PROPERTY('tool body',{quoted(tool_name(tool))},#{number})")
         items = [self._length("effective cutting diameter", tool.diameter),
                  self._length("maximum depth of cut", tool.flute_length),
+                 self._length("overall assembly length", known.gauge_length),
                  add("DESCRIPTIVE_REPRESENTATION_ITEM('hand of cut','right')")]
+        if known.teeth is not None:
+            items.append(add(f"MEASURE_REPRESENTATION_ITEM('number of effective teeth',COUNT_MEASURE({known.teeth}.),"
+                             f"#{self.count})"))
         if tool.kind != "flat":
             items.append(self._length("edge radius", tool.corner_radius))
-        body = add(f"MACHINING_TOOL_BODY_REPRESENTATION('{_KIND[tool.kind]}',{refs(items)},#{self.plain})")
+        body = add(f"MACHINING_TOOL_BODY_REPRESENTATION('{words}',{refs(items)},#{self.plain})")
         add(f"RESOURCE_PROPERTY_REPRESENTATION('','',#{prop},#{body})")
+        if known.life is not None:
+            self._edge(number, tool, operations, known.gauge_length, known.life)
+
+    def _edge(self, tool: int, body: ToolBody, operations: list[int], gauge: float, life: float) -> None:
+        """The cutter of a tool and the minutes in cut it lasts."""
+        add = self.file.add
+        kind = add("ACTION_RESOURCE_TYPE('milling cutting edge')")
+        edge = add(f"MACHINING_CUTTING_COMPONENT({quoted(f'cutter of T{body.number}')},'',{refs(operations)},#{kind},"
+                   f"'','')")
+        add(f"ACTION_RESOURCE_RELATIONSHIP('','',#{tool},#{edge})")
+        minutes = add(f"(MEASURE_REPRESENTATION_ITEM() MEASURE_WITH_UNIT(TIME_MEASURE({real(life)}),#{self.minute}) "
+                      "REPRESENTATION_ITEM('expected life') TIME_MEASURE_WITH_UNIT())")
+        old = self.plan.ap238 is Ap238.INTEGRATED_CNC
+        for name, item in (("offset length" if old else "functional length", self._length("", gauge)),
+                           ("expected life", minutes)):
+            prop = add(f"RESOURCE_PROPERTY('{name}','',#{edge})")
+            add(f"RESOURCE_PROPERTY_REPRESENTATION('','',#{prop},"
+                f"#{add(f'REPRESENTATION({_NONE},(#{item}),#{self.plain})')})")
+
+
+def _square_to(axis: F64) -> Sequence[float]:
+    """A unit vector square to one (3,)."""
+    aside = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    return [float(v) for v in aside / np.linalg.norm(aside)]
 
 
 def _purpose(step: Workingstep) -> str:

@@ -1,4 +1,7 @@
-"""STEP-NC as ISO 14649: project, workplan, one machining workingstep for each workingstep of the plan.
+"""STEP-NC as ISO 14649: project, nested workplans, one machining workingstep for each workingstep of the plan.
+
+The main workplan holds the rapid that brings the first tool and the workplan of the setup, this on a machine that
+turns one for each tool axis. Where a fresh cutter is due, a message and a program stop stand before the workingstep.
 
 Units are the defaults of ISO 14649-10 and are not written: mm, m/s for feeds,
 1/s for the spindle (negative: a right-hand cutter seen from the holder). Paths
@@ -17,65 +20,79 @@ from collections.abc import Sequence
 import numpy as np
 
 from geometry.errors import OutputError
+from geometry.nurbs import NurbsSurface
 from geometry.toolbody import ToolBody
 from output.grid import GRID, check_plan, to_grid
 from output.model import Workplan
-from output.part21 import Part21, quoted, real, reals, refs
+from output.part21 import Part21, Write, quoted, real, reals, refs
 from output.stepnc_words import (
     Curve,
+    fresh_words,
     header_words,
+    knots_of,
     operation_words,
     pass_plane_normal,
     region_name,
     region_outline,
     setup_words,
     stock_box,
+    surfaces_of,
     to_and_fro,
     ways,
+    written_feed,
+    written_speed,
 )
 from output.text import step_title, tool_name
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.motion import Motion, Workingstep
 
 _TYPE = {
     Motion.RAPID: ".CONNECT.", Motion.APPROACH: ".APPROACH.", Motion.CUT: ".TRAJECTORY_PATH.",
     Motion.CONNECT: ".CONNECT.", Motion.LIFT: ".LIFT.",
 }
+_END = "''"
 _M_PER_S = 1.0 / 60_000.0  # of one mm/min
 
 
 def write_stepnc_arm(plan: Workplan) -> str:
-    """The job as an ISO 14649 Part 21 file, schemas MACHINING_SCHEMA and MILLING_SCHEMA.
+    """The text that ``stream_stepnc_arm`` writes, as a whole; errors as there."""
+    pieces: list[str] = []
+    stream_stepnc_arm(plan, pieces.append)
+    return "".join(pieces)
 
-    plan : lengths in mm, setup frame
-    Returns the text, ASCII; points read back within 0.00005 mm of the plan on each axis.
-    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty.
+
+def stream_stepnc_arm(plan: Workplan, write: Write) -> None:
+    """Write the job as an ISO 14649 Part 21 file, schemas MACHINING_SCHEMA and MILLING_SCHEMA, piece by piece.
+
+    plan  : lengths in mm, setup frame
+    write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
+    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
+    written until then is no file.
     """
     check_plan(plan)
-    return _Arm(plan).text()
+    _Arm(plan, write).run()
 
 
 class _Arm:
     """One file being written; the small dictionaries keep equal instances single."""
 
-    def __init__(self, plan: Workplan) -> None:
+    def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
-        self.file = Part21()
+        self.file = Part21(write, description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location "
+                                                                 "paths"),
+                           name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
+                           system=f"zonemill {plan.version}")
         self.tools: dict[int, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
-        self.clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
+        self.groups: dict[str, int] = {}
 
-    def text(self) -> str:
-        plan = self.plan
+    def run(self) -> None:
         project, workplan = self.file.reserve(), self.file.reserve()
         self._shared()
         setup = self._setup()
-        elements = self._elements()
-        self.file.fill(workplan, f"WORKPLAN('main workplan',{refs(elements)},$,#{setup},$)")
-        self.file.fill(project, f"PROJECT({quoted(plan.name)},#{workplan},(#{self.workpiece}),$,$,$)")
-        return self.file.text(
-            description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location paths"),
-            name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
-            system=f"zonemill {plan.version}")
+        elements = self._elements(setup)
+        self.file.fill(workplan, f"WORKPLAN('main workplan',{refs(elements)},#{self.channel},#{setup},$)")
+        self.file.fill(project, f"PROJECT({quoted(self.plan.name)},#{workplan},(#{self.workpiece}),$,$,$)")
+        self.file.close()
 
     def _shared(self) -> None:
         add = self.file.add
@@ -85,6 +102,7 @@ class _Arm:
         self.down = add("DIRECTION('projection',(0.,0.,-1.))")
         top = add(f"CARTESIAN_POINT('',(0.,0.,{real(self.plan.clearance_plane)}))")
         self.secplane = add(f"PLANE('security plane',#{self._placement('security plane placement', top)})")
+        self.channel = add("CHANNEL('channel 1')")
         if self.plan.clamping is None:
             self.three_axes = add("THREE_AXES()")
         self.functions = add("MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(),.F.,$,$,())")
@@ -95,12 +113,8 @@ class _Arm:
     def _setup(self) -> int:
         """Workpiece, stock and setup; returns the SETUP."""
         plan, add = self.plan, self.file.add
-        low, size = stock_box(plan)
-        corner = add(f"CARTESIAN_POINT('',{reals(low)})")
-        sides = ",".join(real(s) for s in size)
-        block = add(f"BLOCK('stock block',#{self._placement('stock corner', corner)},{sides})")
         material = add(f"MATERIAL('',{quoted(plan.material)},())")
-        raw = add(f"WORKPIECE('stock',#{material},$,$,$,#{block},())")
+        raw = add(f"WORKPIECE('stock',#{material},$,$,$,#{self._stock()},())")
         self.workpiece = add(f"WORKPIECE({quoted('part sha256 ' + plan.part_sha256)},#{material},$,#{raw},$,$,())")
         zero = self._placement("setup origin", self.origin)
         notes = [add(f"SETUP_INSTRUCTION({quoted(t)},$)") for t in setup_words(plan)]
@@ -108,24 +122,57 @@ class _Arm:
         name = quoted(f"setup {plan.work_offset} sha256 {plan.setup_sha256}")
         return add(f"SETUP({name},#{zero},#{self.secplane},(#{holding}))")
 
-    def _elements(self) -> list[int]:
-        """Executables of the workplan: a rapid before every step that the tool does not already stand at."""
-        elements, here = [], None
+    def _stock(self) -> int:
+        """The blank: a cylinder, or a block, which is a box round it where it is none."""
+        add, cylinder = self.file.add, self.plan.cylinder
+        if cylinder is not None:
+            base = add(f"CARTESIAN_POINT('',{reals(cylinder.base.tolist(), 9)})")
+            axis = add(f"DIRECTION('along the stock',{reals(cylinder.axis.tolist(), 9)})")
+            return add(f"RIGHT_CIRCULAR_CYLINDER('stock cylinder',#{add(f'AXIS1_PLACEMENT({_END},#{base},#{axis})')},"
+                       f"{real(cylinder.height)},{real(cylinder.radius)})")
+        low, size = stock_box(self.plan)
+        corner = add(f"CARTESIAN_POINT('',{reals(low)})")
+        name = "box round the stock" if self.plan.stock_words else "stock block"
+        sides = ",".join(real(s) for s in size)
+        return add(f"BLOCK('{name}',#{self._placement('stock corner', corner)},{sides})")
+
+    def _elements(self, setup: int) -> list[int]:
+        """The main workplan: the rapid from wherever the tool is, and a workplan for the setup.
+
+        On a machine that turns, that has one for each tool axis, in the order they come.
+        """
+        first: list[int] = []
+        groups: list[tuple[str, list[int]]] = []
         for way in ways(self.plan):
-            name = f"rapid to {way.step.id}"
+            access = way.step.access if self.plan.clamping is not None else ""
+            if not groups or groups[-1][0] != access:
+                groups.append((access, []))
+            mine, name = groups[-1][1], f"rapid to {way.step.id}"
+            if way.step.fresh:
+                mine += self._pause(way.step)
             if way.fresh:
-                elements.append(self._rapid(f"rapid to above all for {way.step.id}" if way.before else name, ()))
+                arrive = self._rapid(f"rapid to above all for {way.step.id}" if way.before else name, ())
+                (mine if first else first).append(arrive)
             if way.before:
-                elements.append(self._rapid(name, way.before))
-            elements.append(self._workingstep(way.step, way.path))
-            here = way.path[-1].points[-1]
+                mine.append(self._rapid(name, way.before))
+            mine.append(self._workingstep(way.step, way.path))
             if way.after:
-                elements.append(self._rapid(f"away from {way.step.id}", way.after))
-        if self.plan.clamping is None and here is not None and here[2] < self.clearance:
-            up = np.array([here, [*here[:2], self.clearance]], dtype=np.int64)
-            rapid = Curve(Trajectory(Motion.RAPID, np.asarray(up * GRID, np.float64), 0.0), up)
-            elements.append(self._rapid("retract to the clearance plane", (rapid,)))
-        return elements
+                mine.append(self._rapid(f"away from {way.step.id}", way.after))
+        inner = groups[0][1] if self.plan.clamping is None else [self._group(a, members) for a, members in groups]
+        name = quoted(f"setup {self.plan.work_offset}")
+        return [*first, self.file.add(f"WORKPLAN({name},{refs(inner)},#{self.channel},#{setup},$)")]
+
+    def _group(self, access: str, members: list[int]) -> int:
+        """The workplan of steps along one tool axis; where an axis comes again it has a number."""
+        again = self.groups[access] = self.groups.get(access, 0) + 1
+        name = f"access {access}" if again == 1 else f"access {access} again {again}"
+        return self.file.add(f"WORKPLAN({quoted(name)},{refs(members)},#{self.channel},$,$)")
+
+    def _pause(self, step: Workingstep) -> list[int]:
+        """Ask for a fresh cutter and stop."""
+        add = self.file.add
+        return [add(f"DISPLAY_MESSAGE({quoted(f'fresh cutter for {step.id}')},{quoted(fresh_words(step))})"),
+                add(f"PROGRAM_STOP({quoted(f'stop before {step.id}')})")]
 
     def _rapid(self, name: str, path: Sequence[Curve]) -> int:
         """A rapid; one without a path comes from wherever the control left the tool."""
@@ -138,7 +185,7 @@ class _Arm:
             numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,.CONNECT.,$,$,$,$,#{line},"
                                          f"{self._leaning(curve)},$)"))
         paths = self.file.add(f"TOOLPATH_LIST({refs(numbers)})")
-        return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},#{paths},$)")
+        return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},#{paths},{self._direction()})")
 
     def _leaning(self, curve: Curve) -> str:
         """Reference to the tool axes of a curve, as many as it has points; '$' where they are Z."""
@@ -154,7 +201,7 @@ class _Arm:
         paths = self._toolpaths(step, path)
         technology = self._technology(step.spindle_rpm, step.feed)
         self.file.fill(operation, (
-            f"FREEFORM_OPERATION(#{paths},{self._direction(step)},{quoted(operation_words(step))},"
+            f"FREEFORM_OPERATION(#{paths},{self._direction()},{quoted(operation_words(step))},"
             f"{real(self.plan.clearance_plane)},$,#{self._tool(step.tool)},#{technology},#{self.functions},"
             f"$,$,$,#{self._strategy(step)})"))
         return add(f"MACHINING_WORKINGSTEP({quoted(title)},#{self.secplane},#{feature},#{operation},$)")
@@ -165,12 +212,19 @@ class _Arm:
         clamping = self.plan.clamping
         return (normal if clamping is None else normal @ clamping.frames[step.access].rotation).tolist()
 
-    def _direction(self, step: Workingstep) -> str:
+    def _direction(self) -> str:
         """Three axes along Z; left open where every trajectory has its own tool axis, which overrides it."""
         return f"#{self.three_axes}" if self.plan.clamping is None else "$"
 
     def _region(self, step: Workingstep, operation: int) -> int:
-        """The area in plan and its depth; a flat one gets the depth of the grid, since the schema wants it positive."""
+        """The exact faces, or the area in plan and its depth.
+
+        A flat one gets the depth of the grid, since the schema wants it positive.
+        """
+        if faces := surfaces_of(self.plan, step):
+            surfaces = [self._surface(f"F{number}", surface) for number, surface in faces]
+            return self.file.add(f"REGION_SURFACE_LIST({quoted(region_name(step))},#{self.workpiece},(#{operation}),$,"
+                                 f"{refs(surfaces)})")
         clamping = self.plan.clamping
         rotation = None if clamping is None else clamping.frames[step.access].rotation
         outline = region_outline(step, rotation)
@@ -186,6 +240,28 @@ class _Arm:
         return self.file.add(f"REGION_PROJECTION({quoted(region_name(step))},#{self.workpiece},(#{operation}),$,"
                              f"#{curve},#{down},#{depth})")
 
+    def _surface(self, name: str, surface: NurbsSurface) -> int:
+        """A face as a B-spline surface; one without inner knots is a Bezier surface, which more readers know."""
+        add, (n, m) = self.file.add, surface.control.shape[:2]
+        first = self.file.points(to_grid(surface.control.reshape(-1, 3)))
+        net = "(" + ",\n".join(refs(range(first + i * m, first + (i + 1) * m)) for i in range(n)) + ")"
+        k, j = surface.orders
+        form = ".RULED_SURF." if (k == 2 and n == 2) or (j == 2 and m == 2) else ".UNSPECIFIED."
+        net = f"{k - 1},{j - 1},{net},{form},.F.,.F.,.U."
+        (times_u, at_u), (times_v, at_v) = knots_of(surface.knots_u), knots_of(surface.knots_v)
+        plain = surface.weights is None
+        if plain and len(at_u) == len(at_v) == 2:
+            return add(f"BEZIER_SURFACE('{name}',{net})")
+        times = ",".join("(" + ",".join(map(str, t)) + ")" for t in (times_u, times_v))
+        knots = f"{times},{reals(at_u, 9)},{reals(at_v, 9)},.UNSPECIFIED."
+        if surface.weights is None:
+            return add(f"B_SPLINE_SURFACE_WITH_KNOTS('{name}',{net},{knots})")
+        rows = ",\n".join(reals(row, 9) for row in surface.weights.tolist())
+        # the underscore before the letters, as alphabetical order is mostly read
+        return add(f"(B_SPLINE_SURFACE({net}) B_SPLINE_SURFACE_WITH_KNOTS({knots}) BOUNDED_SURFACE() "
+                   f"GEOMETRIC_REPRESENTATION_ITEM() RATIONAL_B_SPLINE_SURFACE(({rows})) "
+                   f"REPRESENTATION_ITEM('{name}') SURFACE())")
+
     def _toolpaths(self, step: Workingstep, path: Sequence[Curve]) -> int:
         first = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
         at, numbers = first, []
@@ -197,7 +273,7 @@ class _Arm:
             at += count - 1
             rapid = trajectory.motion is Motion.RAPID
             speed = "SPEED_NAME(.RAPID.)" if rapid else "$"
-            own = "$" if rapid or trajectory.feed == step.feed else \
+            own = "$" if rapid or written_feed(trajectory.feed) == written_feed(step.feed) else \
                 f"#{self._technology(step.spindle_rpm, trajectory.feed)}"
             numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,{_TYPE[trajectory.motion]},{speed},{own},"
                                          f"$,$,#{line},{self._leaning(curve)},$)"))
@@ -206,10 +282,10 @@ class _Arm:
         return self.file.add(f"TOOLPATH_LIST({refs(numbers)})")
 
     def _technology(self, rpm: float, feed: float) -> int:
-        key = (rpm, feed)
+        key = written_speed(rpm), written_feed(feed)
         if key not in self.technologies:
             self.technologies[key] = self.file.add(
-                f"MILLING_TECHNOLOGY({real(feed * _M_PER_S, 9)},.TCP.,$,{real(-rpm / 60.0, 6)},$,.F.,.F.,.F.,$)")
+                f"MILLING_TECHNOLOGY({real(key[1] * _M_PER_S, 12)},.TCP.,$,{real(-key[0] / 60.0, 9)},$,.F.,.F.,.F.,$)")
         return self.technologies[key]
 
     def _tool(self, tool: ToolBody) -> int:
@@ -219,9 +295,13 @@ class _Arm:
             size = add(f"MILLING_TOOL_DIMENSION({real(tool.diameter)},$,$,{real(tool.flute_length)},{real(edge, 6)},"
                        f"{real(edge, 6)},{real(0.0 if ball else tool.radius - edge, 6)})")
             # ENDMILL is abstract to some readers; a bull nose with edge radius 0 is a flat end mill to all
-            body = add(f"{'BALL_ENDMILL' if ball else 'BULLNOSE_ENDMILL'}(#{size},$,.RIGHT.,.F.,$)")
-            part = add(f"CUTTING_COMPONENT({real(tool.stickout)},$,$,$,$)")
-            self.tools[tool.number] = add(f"MILLING_CUTTING_TOOL({quoted(tool_name(tool))},#{body},(#{part}),$,$,$)")
+            known = self.plan.assembly(tool)
+            teeth = "$" if known.teeth is None else str(known.teeth)
+            body = add(f"{'BALL_ENDMILL' if ball else 'BULLNOSE_ENDMILL'}(#{size},{teeth},.RIGHT.,.F.,$)")
+            length, life = real(known.gauge_length), "$" if known.life is None else real(60.0 * known.life)
+            part = add(f"CUTTING_COMPONENT({length},$,$,{life},$)")
+            self.tools[tool.number] = add(f"MILLING_CUTTING_TOOL({quoted(tool_name(tool))},#{body},(#{part}),{length},"
+                                          "$,$)")
         return self.tools[tool.number]
 
     def _strategy(self, step: Workingstep) -> int:

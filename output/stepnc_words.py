@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
 from output.clamping import Leg, sections
-from output.grid import GRID, I64, grid_path, link, to_grid
+from output.grid import GRID, I64, grid_path, link, to_grid, without_repeats
+from output.kinematics import RotaryMachine
 from output.model import Workplan
 from output.text import face_words
 from toolpath.motion import Motion, Trajectory, Workingstep
@@ -40,28 +42,52 @@ class Way:
     after: tuple[Curve, ...]
 
 
-def ways(plan: Workplan) -> list[Way]:
-    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``sections``."""
+def ways(plan: Workplan) -> Iterator[Way]:
+    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``sections``.
+
+    The rapids are those of the program: to a tool change from the clearance plane, and from there to it.
+    """
     if plan.clamping is not None:
-        return [Way(s.step, s.fresh, _curves(s.before), _curves(s.legs), _curves(s.after)) for s in sections(plan)]
-    out: list[Way] = []
+        machine = plan.clamping.machine
+        for s in sections(plan):
+            yield Way(s.step, s.fresh, *(_curves(legs, machine) for legs in (s.before, s.legs, s.after)))
+        return
     clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
-    for k, step in enumerate(plan.steps):
+    here: I64 | None = None
+    for step, follower in zip(plan.steps, [*plan.steps[1:], None], strict=True):
         path = tuple(Curve(*pair) for pair in grid_path(step))
-        fresh = k == 0 or plan.steps[k - 1].tool != step.tool or step.fresh
-        before: tuple[Curve, ...] = ()
-        if not fresh:
-            points = link(out[-1].path[-1].points[-1], path[0].points[0], clearance)
-            if len(points) > 1:
-                before = (Curve(Trajectory(Motion.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
-        out.append(Way(step, fresh, before, path, ()))
-    return out
+        start, end = path[0].points[0], path[-1].points[-1]
+        fresh = False
+        if here is None or step.fresh or plan.restart:
+            fresh = True
+            above = np.array([*start[:2], max(clearance, int(start[2]))], dtype=np.int64)
+            before = _rapid(without_repeats(np.array([above, start])))
+        else:
+            before = _rapid(link(here, start, clearance))
+        after: tuple[Curve, ...] = ()
+        here = end
+        if follower is None or follower.tool != step.tool or follower.fresh or plan.restart:
+            after = _rapid(without_repeats(np.array([end, [*end[:2], max(clearance, int(end[2]))]], dtype=np.int64)))
+            here = None
+        yield Way(step, fresh, before, path, after)
 
 
-def _curves(legs: Sequence[Leg]) -> tuple[Curve, ...]:
-    """Legs on the grid, each from the point where the one before ended; C alone, round the tool, is no curve."""
+def _rapid(points: I64) -> tuple[Curve, ...]:
+    """A rapid through grid points; none where they are one."""
+    if len(points) < 2:
+        return ()
+    return (Curve(Trajectory(Motion.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
+
+
+def _curves(legs: Sequence[Leg], machine: RotaryMachine | None = None) -> tuple[Curve, ...]:
+    """Legs on the grid, each from the point where the one before ended; C alone, round the tool, is no curve.
+
+    The axes are those of the angles the program says, which are on a grid too.
+    """
     out: list[Curve] = []
     for leg in legs:
+        if machine is not None:
+            leg = replace(leg, axes=machine.axes(np.radians(to_grid(np.degrees(leg.turns)) * GRID)))
         points, axes = leg.on_grid()
         if len(points) < 2:
             continue
@@ -126,9 +152,42 @@ def setup_words(plan: Workplan) -> list[str]:
     """What belongs to the whole job: hashes, zero, clearance plane, labels, comments."""
     return [
         f"part sha256 {plan.part_sha256}", f"setup sha256 {plan.setup_sha256}", f"material {plan.material}",
+        *((f"stock {plan.stock_words}",) if plan.stock_words else ()),
         f"program zero is the origin of the setup frame, work offset {plan.work_offset}",
         *(f"label {key}: {value}" for key, value in sorted(plan.labels.items())), *plan.comments,
     ]
+
+
+def written_feed(feed: float) -> float:
+    """A feed, mm/min, as programs say it: to a tenth, slow ones to four decimals."""
+    return round(feed, 1 if feed >= 1.0 else 4)
+
+
+def written_speed(rpm: float) -> float:
+    """A spindle speed, 1/min, as programs say it: whole."""
+    return float(round(rpm))
+
+
+def fresh_words(step: Workingstep) -> str:
+    """What the machinist is asked before a step that wants a fresh cutter."""
+    return f"Fresh cutter in T{step.tool.number}: change it and set its length"
+
+
+def surfaces_of(plan: Workplan, step: Workingstep) -> list[tuple[int, NurbsSurface]]:
+    """Numbers and exact surfaces of the faces of a step; empty where its strategy does not follow them.
+
+    All of its faces or none: a feature of some would be too small.
+    """
+    if step.strategy not in ("isoparametric", "flank", "matched"):
+        return []
+    found = [(n, plan.surfaces[n]) for n in step.faces if n in plan.surfaces]
+    return found if len(found) == len(step.faces) else []
+
+
+def knots_of(knots: F64) -> tuple[list[int], list[float]]:
+    """Multiplicities of a knot vector (n,), parameters, and its different values."""
+    values, counts = np.unique(knots, return_counts=True)
+    return counts.tolist(), values.tolist()
 
 
 def operation_words(step: Workingstep) -> str:

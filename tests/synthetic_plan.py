@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from geometry.mesh import TriangleMesh
+from geometry.nurbs import NurbsSurface
 from geometry.toolbody import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine
-from output.model import Clamping, Frame, StockBox, Workplan
+from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 from zones.view import access_rotation
 
@@ -121,3 +123,34 @@ def clamped(kind: str = "table-table-AC", tcp: bool = True, swings: bool = True)
              replace(step(5, BALL, "zlevel", trajectories=leaning(4.0, 5.0) if swings else None), access="I1")]
     clamping = Clamping(machine, frames, np.array([15.0, 10.0, 7.5]), 60.0, {1: 75.0, 2: 70.0})
     return plan(*steps, clamping=clamping, labels={"order": "4711"}, comments=())
+
+
+def block_mesh() -> TriangleMesh:
+    """A block of 30 by 20 by 15 mm, a face number for each side."""
+    corners = np.array([[x, y, z] for x in (0.0, 30.0) for y in (0.0, 20.0) for z in (0.0, 15.0)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    rows = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    return TriangleMesh(corners, np.array(rows, np.int32), face_ids=np.repeat(np.arange(1, 7, dtype=np.int32), 2))
+
+
+def full(job: Workplan | None = None, **changes: object) -> Workplan:
+    """A job with all that a workplan may hold: assemblies, a fresh cutter, exact faces, meshes, a round blank."""
+    job = plan() if job is None else job
+    bowl = NurbsSurface.from_control_points(np.array([[[x, y, 0.1 * x * y] for y in (0.0, 7, 14, 20)]
+                                                      for x in (0.0, 5, 10)]), (3, 4))
+    round_ = NurbsSurface(bowl.control, np.array([0.0, 0, 0, 1, 1, 1]), np.array([0.0, 0, 0, 0.5, 1, 1, 1]), (3, 3),
+                          np.array([[1.0, 0.9, 0.9, 1.0]] * 3))
+    steps = list(job.steps)
+    steps[2] = replace(steps[2], strategy="isoparametric")
+    steps[3] = replace(steps[3], fresh=True)
+    values: dict[str, object] = dict(
+        steps=tuple(steps), stock_words="cylinder", part_mesh=block_mesh(),
+        cylinder=StockCylinder(np.array([15.0, 10, -2]), np.array([0.0, 0, 1]), 22.0, 20.0),
+        assemblies={1: Assembly(75.5, 2, 45.0), 2: Assembly(70.0), 7: Assembly(81.0, 4)},
+        surfaces={12: bowl, 13: round_})
+    return replace(job, **{**values, **changes})  # type: ignore[arg-type]
+
+
+def shaped(**changes: object) -> Workplan:
+    """``full`` with shapes in its AP238."""
+    return full(**{"ap238": Ap238.CC2, **changes})

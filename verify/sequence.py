@@ -19,6 +19,7 @@ from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.progress import Report, Stages
 from verify.reader import FEED, Program, read_program
 from verify.removal import Moves
+from verify.stepnc import is_stepnc, read_stepnc
 from verify.toolaxes import ToolAxes
 
 BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
@@ -79,11 +80,14 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
     for nc in given:
         own, bounds = _own(nc, part, setup)
         top = top_of_all(bounds, own)
-        program = read_program(
-            nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
-            blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-            gauge_length=setup.gauge_length, spindle_tool=spindle_tool,
-            report=stages.span(done / total, (done + len(nc.text)) / total), dialect=nc.dialect)
+        told = stages.span(done / total, (done + len(nc.text)) / total)
+        if is_stepnc(nc.text):
+            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=told)
+        else:
+            program = read_program(
+                nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
+                blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
+                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=told, dialect=nc.dialect)
         read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read

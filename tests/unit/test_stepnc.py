@@ -8,7 +8,7 @@ import pytest
 
 from geometry.errors import OutputError
 from output.grid import grid_path
-from output.model import StockBox
+from output.model import Ap238, StockBox
 from output.part21 import quoted, real, time_stamp
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
@@ -122,7 +122,10 @@ def test_arm_workplan_starts_with_a_rapid_and_ids_are_unique():
     data = instances(text)
     elements = re.search(r"WORKPLAN\('main workplan',\(([^)]*)\)", text).group(1).split(",")
     kinds = [data[int(e[1:])].split("(")[0] for e in elements]
-    assert kinds[0] == "RAPID_MOVEMENT" and kinds.count("MACHINING_WORKINGSTEP") == 5
+    assert kinds == ["RAPID_MOVEMENT", "WORKPLAN"]
+    inside = re.search(r"WORKPLAN\('setup G54',\(([^)]*)\)", text).group(1).split(",")
+    kinds = [data[int(e.strip()[1:])].split("(")[0] for e in inside]
+    assert kinds.count("MACHINING_WORKINGSTEP") == 5 and kinds.count("RAPID_MOVEMENT") == 4
     ids = re.findall(r"(?:RAPID_MOVEMENT|MACHINING_WORKINGSTEP|WORKPLAN)\('((?:[^']|'')*)'", text)
     assert len(ids) == len(set(ids))
 
@@ -146,8 +149,9 @@ def test_steps_with_one_tool_that_do_not_join_are_linked_over_the_clearance_plan
         assert any(x.shape == wanted.shape and (x == wanted).all() for x in lines)
 
 
-def test_aim_tools_list_their_operations_and_stock_is_a_block():
-    text = write_stepnc_aim(plan())
+def test_aim_tools_list_their_operations_and_stock_is_a_block_in_class_two():
+    assert "SHAPE_REPRESENTATION('stock" not in write_stepnc_aim(plan())  # class 1 has no shape
+    text = write_stepnc_aim(plan(ap238=Ap238.CC2))
     data = instances(text)
     tools = dict(re.findall(r"MACHINING_TOOL\('(\d+)','([^']*)'", text))
     assert tools == {"7": "bullnose endmill", "2": "endmill", "1": "ballnose endmill"}

@@ -1,0 +1,197 @@
+"""Two readings of one job held against each other: do they make the tool do the same.
+
+Moves are compared one by one, after what is no move has been left out: ways that neither reading knows, blocks that
+turn the tool about itself, and pieces a reading cut a turning block into. Where one of the two leaves the way to the
+control, as STEP-NC does from a tool change to the next path, the rapids of the other up to the same place are not
+looked at. A stretch of one feed that has another number of points on both sides, as arcs for chords, is compared as a
+line in space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.errors import VerificationError
+from geometry.mesh import F64
+from verify.program import Program
+
+TIP = 1e-3  # mm
+AXIS = 1e-6  # of unit vectors, per component
+FEED = 1e-6  # share; words of feeds are decimal, so equal ones come back with rounding errors alone
+INVERSE = 1e-4  # 1/min, rounding of the words of inverse time, which turning blocks of joints are timed by
+STILL_TIP, STILL_AXIS = 5e-5, 3e-6  # mm and of unit vectors: what moves less does not move
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far two readings are apart: moves compared, and the largest difference, mm and of unit vectors."""
+
+    moves: int
+    tip: float
+    axis: float
+
+
+class _Rows:
+    """The moves of one reading as they are compared.
+
+    at    : (n, 12) start and end of the tip, mm, and of the axis
+    """
+
+    def __init__(self, p: Program, *, arrivals: bool) -> None:
+        up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
+        first, last = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
+        at = np.hstack([p.start, p.end, first, last])
+        rapid = np.isnan(p.feed)
+        unknown = np.zeros(len(p), np.bool_)
+        unknown[p.unknown[:, 0]] = True
+        turning = np.abs(last - first).max(axis=1, initial=0.0) > 0.0
+        on = np.zeros(len(p), np.bool_)  # goes on with the turning block before it
+        on[1:] = (turning[1:] & turning[:-1] & (p.line[1:] == p.line[:-1]) & (rapid[1:] == rapid[:-1])
+                  & (p.tool[1:] == p.tool[:-1]) & ~unknown[1:] & ~unknown[:-1])
+        begins = np.flatnonzero(~on)
+        ends = np.r_[begins[1:], len(p)] - 1 if len(p) else begins
+        at = np.hstack([at[begins, :3], at[ends, 3:6], at[begins, 6:9], at[ends, 9:]])
+        moves = ((np.abs(at[:, 3:6] - at[:, :3]).max(axis=1, initial=0.0) > STILL_TIP)
+                 | (np.abs(at[:, 9:] - at[:, 6:9]).max(axis=1, initial=0.0) > STILL_AXIS))
+        keep = np.where(unknown[begins], arrivals, moves)
+        rows = begins[keep.astype(np.bool_)]
+        self.at, self.name = at[keep.astype(np.bool_)], p.name
+        self.rapid, self.feed, self.tool, self.line = rapid[rows], p.feed[rows].copy(), p.tool[rows], p.line[rows]
+        self.arrival, self.turning = unknown[rows], turning[rows]
+        took = np.add.reduceat(p.minutes, begins)[keep.astype(np.bool_)] if len(begins) else p.minutes
+        tip = np.linalg.norm(self.at[:, 3:6] - self.at[:, :3], axis=1) / np.where(took > 0.0, took, np.inf)
+        # turning joints are fed by time: what the tip does follows from that, as rounded as both are
+        other = np.abs(tip - self.feed) > FEED * np.nan_to_num(self.feed)
+        self.timed = self.turning & ~self.rapid & other & (tip > 0.0)
+        self.feed[self.timed] = tip[self.timed]
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+def check_agreement(nc: Program, stepnc: Program) -> Agreement:
+    """Hold a STEP-NC file against the NC program of the same job.
+
+    nc, stepnc : as read, both in the frame of the program
+
+    Returns
+    -------
+    Agreement
+        What was compared, and how near they are.
+
+    Raises
+    ------
+    VerificationError
+        Code stepnc_differs: the tip is more than 0.001 mm apart, the axis more than 1e-6, feed, tool or kind of a move
+        is another, or one of them has moves that the other has not. The message names the lines of both.
+    """
+    a, b = _Rows(nc, arrivals=False), _Rows(stepnc, arrivals=True)
+    i, moves, tip, axis = 0, 0, 0.0, 0.0
+    marks = [*np.flatnonzero(b.arrival).tolist(), len(b)]
+    for k, end in enumerate(marks):
+        begin = marks[k - 1] + 1 if k else 0
+        if k:
+            place = b.at[marks[k - 1], 3:6]
+            while i < len(a) and a.rapid[i] and np.abs(a.at[i, :3] - place).max() > TIP:
+                i += 1
+        count = end - begin
+        if i + count <= len(a) and _same_words(a, i, b, begin, count) is None:
+            apart = np.abs(a.at[i:i + count] - b.at[begin:end])
+            tip, axis = max(tip, float(apart[:, :6].max(initial=0.0))), max(axis, float(apart[:, 6:].max(initial=0.0)))
+            bad = np.flatnonzero((apart[:, :6].max(axis=1, initial=0.0) > TIP)
+                                 | (apart[:, 6:].max(axis=1, initial=0.0) > AXIS))
+            if len(bad):
+                _differ(a, i + int(bad[0]), b, begin + int(bad[0]), "go to different places, or with different axes")
+            i += count
+        else:
+            i, far = _by_stretches(a, i, b, begin, end)
+            tip = max(tip, far)
+        moves += count
+    while i < len(a) and a.rapid[i]:
+        i += 1  # to where nothing follows
+    if i < len(a):
+        _differ(a, i, b, len(b) - 1, "do not end together")
+    return Agreement(moves, tip, axis)
+
+
+def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
+    """The first of ``count`` moves whose tool, kind or feed differ; None where none does."""
+    mine, theirs = slice(i, i + count), slice(j, j + count)
+    rapid = a.rapid[mine]
+    way = np.linalg.norm(a.at[mine, 3:6] - a.at[mine, :3], axis=1)
+    feed, other = (np.where(rapid, 0.0, np.nan_to_num(f)) for f in (a.feed[mine], b.feed[theirs]))
+    slack = FEED * other + np.where(a.timed[mine], INVERSE * way + other * TIP / np.maximum(way, TIP), 0.0)
+    bad = np.flatnonzero((rapid != b.rapid[theirs]) | (a.tool[mine] != b.tool[theirs])
+                         | (np.abs(feed - other) > slack))
+    return int(bad[0]) if len(bad) else None
+
+
+def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int, float]:
+    """Compare stretches of one tool, kind and feed as lines in space; returns where ``a`` goes on, and the distance."""
+    far = 0.0
+    while begin < end:
+        last_b = _stretch(b, begin, end)
+        if i >= len(a):
+            _differ(a, len(a) - 1, b, begin, "do not end together")
+        last_a = _stretch(a, i, len(a))
+        if _same_words(a, i, b, begin, 1) is not None:
+            _differ(a, i, b, begin, "have different feeds, tools or kinds of move")
+        if last_a - i == last_b - begin:
+            apart = float(np.abs(a.at[i:last_a, :6] - b.at[begin:last_b, :6]).max(initial=0.0))
+            leaning = float(np.abs(a.at[i:last_a, 6:] - b.at[begin:last_b, 6:]).max(initial=0.0))
+        else:
+            one, other = (np.vstack([r.at[k, :3], r.at[k:m, 3:6]]) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
+            apart, leaning = max(_along(one, other), _along(other, one)), 0.0
+            axis = np.tile(a.at[i, 6:9], 2)  # of stretches with other points it must not turn
+            leaning = max(float(np.abs(r.at[k:m, 6:] - axis).max()) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
+        if apart > TIP or leaning > AXIS:
+            _differ(a, i, b, begin, f"are {apart:.4f} mm apart behind there, or have different axes")
+        far, i, begin = max(far, apart), last_a, last_b
+    return i, far
+
+
+def _stretch(r: _Rows, begin: int, end: int) -> int:
+    """Where the moves from ``begin`` on that have its tool, kind and feed end."""
+    feed = np.nan_to_num(r.feed[begin:end])
+    other = np.flatnonzero((r.rapid[begin:end] != r.rapid[begin]) | (r.tool[begin:end] != r.tool[begin])
+                           | (np.abs(feed - feed[0]) > FEED * feed[0]))
+    return begin + (int(other[0]) if len(other) else end - begin)
+
+
+def _along(points: F64, way: F64) -> float:
+    """mm, the farthest of points (n, 3) from a way (m, 3), gone along in its order: none is behind the one before."""
+    at, far = 0, 0.0
+    for p in points:
+        best, place = np.inf, at
+        for k in range(at, len(way) - 1):
+            d = way[k + 1] - way[k]
+            share = min(max(float((p - way[k]) @ d) / max(float(d @ d), 1e-30), 0.0), 1.0)
+            distance = float(np.linalg.norm(p - way[k] - share * d))
+            if distance < best:
+                best, place = distance, k
+            elif best <= TIP:
+                break
+        at, far = place, max(far, best)
+        if far > TIP:
+            return far
+    return far
+
+
+def _differ(a: _Rows, i: int, b: _Rows, j: int, how: str) -> None:
+    """Raise the error that names the moves of both."""
+    words = []
+    for r, k in ((a, i), (b, j)):
+        if 0 <= k < len(r):
+            kind = "rapid" if r.rapid[k] else f"F{r.feed[k]:.6g}"
+            place = " ".join(f"{v:.4f}" for v in (*r.at[k, 3:6], *r.at[k, 9:]))
+            words.append(f"{r.name} line {r.line[k]}: T{r.tool[k]} {kind} to {place}")
+        else:
+            words.append(f"{r.name}: no move")
+    raise VerificationError(f"the STEP-NC file and the program of the job {how}: {'; '.join(words)}",
+                            code="stepnc_differs", subjects=(a.name, b.name), measured=words,
+                            remedy="please report it with part and setup")
+
+
+__all__ = ["Agreement", "check_agreement"]

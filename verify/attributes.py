@@ -1,0 +1,290 @@
+"""What attributes of instances have to be, and the words in which one that is not is refused.
+
+A form of STEP-NC is read with a table: by entity its attributes in order, each with the kind of its value. Every
+instance of the table is held against it before anything is made of it, so that a reader may take what it finds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.mesh import F64
+from verify.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
+
+UNIT = 1e-3  # what the length of a tool axis may be off one
+
+
+class Kind:
+    """What a value has to be; ``problem`` says what it is instead, or None where it is right."""
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        """Words for the error, or None."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """A string."""
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        right = isinstance(value, str) and not isinstance(value, Word)
+        return None if right else f"a string expected, not {shown(value)}"
+
+
+@dataclass(frozen=True)
+class Real(Kind):
+    """A real number, with a decimal point; over ``above`` and up to ``most`` where they say so."""
+
+    above: float = -math.inf
+    most: float = math.inf
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        if not isinstance(value, float) or not math.isfinite(value):
+            return f"a real number expected, not {shown(value)}"
+        return None if self.above < value <= self.most else f"a number over {self.above:g} expected, not {value:g}"
+
+
+@dataclass(frozen=True)
+class Whole(Kind):
+    """A whole number."""
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        right = isinstance(value, int) and not isinstance(value, Ref | bool)
+        return None if right else f"a whole number expected, not {shown(value)}"
+
+
+@dataclass(frozen=True)
+class OneOf(Kind):
+    """An enumeration item of a few."""
+
+    items: tuple[str, ...]
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        if isinstance(value, Word) and value in self.items:
+            return None
+        return f"one of {', '.join(f'.{i}.' for i in self.items)} expected, not {shown(value)}"
+
+
+FLAG = OneOf(("T", "F"))
+LOGICAL = OneOf(("T", "F", "U"))
+
+
+@dataclass(frozen=True)
+class To(Kind):
+    """A reference to an instance of one of some entities; of any where none is named."""
+
+    entities: tuple[str, ...] = ()
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        wanted = " or ".join(self.entities) or "an instance"
+        if not isinstance(value, Ref):
+            return f"a reference to {wanted} expected, not {shown(value)}"
+        if not file.has(value):
+            return f"{value!r}, to be {wanted}, is not in the file"
+        names = file.names(value)
+        if self.entities and not set(names) & set(self.entities):
+            return f"a reference to {wanted} expected, but {value!r} is {' '.join(names)}"
+        return None
+
+
+@dataclass(frozen=True)
+class Many(Kind):
+    """A list of values of one kind, from ``least`` to ``most`` of them."""
+
+    of: Kind
+    least: int = 0
+    most: int | None = None
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        if not isinstance(value, list):
+            return f"a list expected, not {shown(value)}"
+        if len(value) < self.least or (self.most is not None and len(value) > self.most):
+            return f"a list of {self.least} or more expected, not of {len(value)}" if self.most is None else \
+                f"a list of {self.least} to {self.most} expected, not of {len(value)}"
+        return next((p for v in value if (p := self.of.problem(v, file)) is not None), None)
+
+
+@dataclass(frozen=True)
+class Maybe(Kind):
+    """A value that may be left out."""
+
+    of: Kind
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        return None if value is None else self.of.problem(value, file)
+
+
+@dataclass(frozen=True)
+class Named(Kind):
+    """A value with the name of its type before it."""
+
+    types: tuple[tuple[str, Kind], ...]
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        wanted = " or ".join(f"{name}(...)" for name, _ in self.types)
+        if not isinstance(value, Typed) or value.name not in dict(self.types):
+            return f"{wanted} expected, not {shown(value)}"
+        return dict(self.types)[value.name].problem(value.value, file)
+
+
+@dataclass(frozen=True)
+class Nothing(Kind):
+    """``*``: the value follows from others."""
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        return None if value is DERIVED else f"* expected, not {shown(value)}"
+
+
+@dataclass(frozen=True)
+class Either(Kind):
+    """Whatever suits one of several kinds."""
+
+    kinds: tuple[Kind, ...]
+
+    def problem(self, value: Value, file: Part21) -> str | None:
+        problems = [kind.problem(value, file) for kind in self.kinds]
+        return None if None in problems else problems[0]
+
+
+Attributes = tuple[tuple[str, Kind], ...]
+Table = Mapping[str, Attributes]
+
+
+def shown(value: Value) -> str:
+    """A value for an error, cut short."""
+    text = "$, nothing," if value is None else repr(value)
+    return text if len(text) <= 50 else text[:47] + "..."
+
+
+class Checked:
+    """The instances of a file, each held against the tables of its form.
+
+    table   : by entity; records : by the names of the records of complex instances, which hold no inherited attributes
+
+    Raises
+    ------
+    ProgramError
+        Subjects name the instance: one whose values are not what the tables say.
+    """
+
+    def __init__(self, file: Part21, table: Table, records: Table | None = None) -> None:
+        self.file, self._table, self._records = file, table, records or {}
+        for entity, numbers in sorted(file.entities().items()):
+            if entity in self._table or entity in self._records:
+                for number in numbers:
+                    if entity != "POLYLINE" or file.plain_polyline(number) is None:
+                        self._check(number, entity)
+
+    def of(self, entity: str) -> list[int]:
+        """Numbers of the instances of an entity."""
+        return self.file.of(entity)
+
+    def get(self, number: int, *entities: str) -> Record:
+        """Name and values of an instance, which is of one of some entities; ProgramError where it is of none."""
+        for record in self.file.records(number):
+            if record[0] in entities:
+                return record
+        raise self.file.error(number, f"is to be {' or '.join(entities)}")
+
+    def one(self, number: int, entity: str, attribute: str) -> Value:
+        """One attribute of an instance."""
+        names = [name for name, _ in self._kinds(number, entity)]
+        return self.get(number, entity)[1][names.index(attribute)]
+
+    def ref(self, number: int, entity: str, attribute: str) -> int:
+        """The number of the instance that an attribute refers to; ProgramError where it refers to none."""
+        value = self.one(number, entity, attribute)
+        if not isinstance(value, Ref):
+            raise self.file.error(number, f", {attribute}: a reference expected, not {shown(value)}")
+        return int(value)
+
+    def maybe(self, number: int, entity: str, attribute: str) -> int | None:
+        """As ``ref``; None where the attribute is left out."""
+        return None if self.one(number, entity, attribute) is None else self.ref(number, entity, attribute)
+
+    def refs(self, number: int, entity: str, attribute: str) -> list[int]:
+        """The numbers a list refers to."""
+        value = self.one(number, entity, attribute)
+        return [int(v) for v in value if isinstance(v, Ref)] if isinstance(value, list) else []
+
+    def real(self, number: int, entity: str, attribute: str) -> float | None:
+        """A real attribute; None where it is left out."""
+        value = self.one(number, entity, attribute)
+        return value if isinstance(value, float) else None
+
+    def placement(self, number: int, scale: float = 1.0) -> F64:
+        """(4, 4) float64, mm: from an AXIS2_PLACEMENT_3D to what it is placed in; ``scale`` is mm in its unit."""
+        entity = "AXIS2_PLACEMENT_3D"
+        out = np.eye(4)
+        out[:3, 3] = scale * self.file.points(np.array([self.ref(number, entity, "location")], np.int64))[0]
+        up, along = (self.maybe(number, entity, a) for a in ("axis", "ref_direction"))
+        z = np.array([0.0, 0.0, 1.0]) if up is None else self.vector(up)
+        x = np.array([1.0, 0.0, 0.0]) if along is None else self.vector(along)
+        x = x - (x @ z) * z
+        if (length := float(np.linalg.norm(x))) < 1e-9:
+            raise self.file.error(number, ", ref_direction: a direction that is not along the axis expected")
+        x = x / length
+        out[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+        return out
+
+    def vector(self, number: int) -> F64:
+        """(3,) float64, unit: a DIRECTION."""
+        ratios = self.one(number, "DIRECTION", "direction_ratios")
+        out = np.array([v for v in ratios if isinstance(v, float)] if isinstance(ratios, list) else [])
+        length = float(np.linalg.norm(out))
+        if len(out) != 3 or length < 1e-12:
+            raise self.file.error(number, ", direction_ratios: three numbers that are not all 0 expected")
+        return out / length
+
+    def unit_axes(self, number: int, words: str, axes: F64, count: int) -> F64:
+        """Tool axes (n, 3) of a path of ``count`` points made exactly unit; ProgramError where they cannot be axes."""
+        if len(axes) != count:
+            raise self.file.error(number, f", {words}: {count} points expected, as the path has, not {len(axes)}")
+        size = np.linalg.norm(axes, axis=1)
+        if (bad := np.flatnonzero(np.abs(size - 1.0) > UNIT)).size:
+            raise self.file.error(number, f", {words}: unit vectors expected, but point {bad[0] + 1} has length "
+                                          f"{size[bad[0]]:.6g}")
+        return axes / size[:, None]
+
+    def _kinds(self, number: int, entity: str) -> Attributes:
+        return self._records[entity] if len(self.file.records(number)) > 1 else self._table[entity]
+
+    def curve(self, number: int) -> tuple[F64, F64]:
+        """Points (n, 3) of a polyline, and the lines (n,) of the file they stand in, as floats."""
+        numbers = self.file.plain_polyline(number)
+        if numbers is None:
+            self._check(number, "POLYLINE")
+            numbers = np.array(self.one(number, "POLYLINE", "points"), np.int64)
+        points = self.file.points(numbers)
+        bad = np.flatnonzero(np.isnan(points).any(axis=1))
+        if len(bad):
+            target = int(numbers[bad[0]])
+            if not self.file.has(target):
+                raise self.file.error(number, f", points: #{target}, to be CARTESIAN_POINT, is not in the file")
+            self.get(target, "CARTESIAN_POINT")
+            self._check(target, "CARTESIAN_POINT")
+        return points, self.file.lines_of(numbers).astype(np.float64)
+
+    def _check(self, number: int, entity: str) -> None:
+        records = self.file.records(number)
+        record = next((r for r in records if r[0] == entity), None)
+        if record is None:
+            raise self.file.error(number, f"is to be {entity}")
+        kinds = (self._records if len(records) > 1 else self._table).get(entity)
+        if kinds is None:
+            return
+        if len(record[1]) != len(kinds):
+            raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are due")
+        for (name, kind), value in zip(kinds, record[1], strict=True):
+            problem = kind.problem(value, self.file)
+            if problem is not None:
+                raise self.file.error(number, f", {name}: {problem}")
+
+
+def attributes(**kinds: Kind) -> Attributes:
+    """The attributes of an entity, in order."""
+    return tuple(kinds.items())

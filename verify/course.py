@@ -1,0 +1,285 @@
+"""What a STEP-NC file makes the tool do, whatever form it is in: moves of the tip with axis, feed, speed and cutter.
+
+The readers of both forms tell a ``Course`` what they come upon, in order; ``moves`` gives it as plain values and
+``program`` as a program for the proof. STEP-NC says where the tool stands on the part and not how the rotary axes of a
+machine get it there: for the limits of a machine they are put where they turn least from move to move.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import VerificationError
+from geometry.mesh import F64, I32
+from verify.cycles import FEED, RAPID
+from verify.dividing import MOST_TURN
+from verify.kinematics import Kinematics
+from verify.log import MOST_MOVES
+from verify.program import Poses, Program, Remark, Stop
+
+SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
+EVERY = 7  # X, Y and Z of ``Program.unknown``
+TURNED = 8
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Cutter:
+    """A tool as a file describes it; None where it does not say.
+
+    number        : of the magazine place, from the id where it opens with one
+    name          : the id of the file
+    kind          : 'ball', 'bull' or 'flat'
+    diameter, corner_radius, flute_length, assembly_length : mm
+    instance      : number of the instance it is
+    """
+
+    number: int | None
+    name: str
+    kind: str
+    diameter: float
+    corner_radius: float
+    flute_length: float | None
+    assembly_length: float | None
+    instance: int
+
+
+@dataclass(frozen=True, eq=False)
+class CutterMoves:
+    """Straight moves of the tool tip in the setup frame.
+
+    start, end : (m, 3) float64, mm; start_axis, end_axis : (m, 3) float64, unit, tip to spindle
+    rapid      : (m,) bool; feed : (m,) float64, mm/min, nan for rapids; speed : (m,) float64, 1/min, clockwise positive
+    cutter     : (m,) int32, place in ``cutters``
+    line       : (m,) int32, 1-based line of the file the end stands in
+    arrival    : (m,) bool, the way there is left to the control: start is end
+    cutters    : the tools of the file
+    """
+
+    start: F64
+    end: F64
+    start_axis: F64
+    end_axis: F64
+    rapid: NDArray[np.bool_]
+    feed: F64
+    speed: F64
+    cutter: I32
+    line: I32
+    arrival: NDArray[np.bool_]
+    cutters: tuple[Cutter, ...]
+
+
+class Course:
+    """What was come upon so far.
+
+    name : of the file; lines : how many it has
+    """
+
+    def __init__(self, name: str, lines: int) -> None:
+        self.name, self._lines = name, lines
+        self.cutters: list[Cutter] = []
+        self._chunks: list[F64] = []
+        self._count = 0
+        self._here: F64 | None = None  # (6,) tip and axis
+        self._tool: int | None = None
+        self._line = 1
+        self._stops: list[tuple[int, str, int, F64]] = []
+        self._over: tuple[F64, F64, int] | None = None
+        self.dwell = 0.0
+        self.notes: list[str] = []
+        self.remarks: list[Remark] = []
+
+    def take(self, cutter: Cutter, line: int) -> int:
+        """The place of a tool among the cutters; where it is not the one in the spindle it is changed."""
+        place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
+        if place is None:
+            place = len(self.cutters)
+            self.cutters.append(cutter)
+        if self._tool is not None and place != self._tool:
+            self._change("tool change", line)
+        self._tool = place
+        return place
+
+    def stop(self, what: str, line: int) -> None:
+        """The program stops; afterwards the tool comes from elsewhere."""
+        self._change(what, line)
+
+    def over(self, point: F64, normal: F64, line: int) -> None:
+        """The next path is got to over a plane; point (3,) mm and unit normal (3,) say which, setup frame."""
+        self._over = point, normal, line
+
+    def follow(self, tips: F64, axes: F64 | None, *, rapid: bool, feed: float, speed: float, lines: F64) -> None:
+        """Go along a path with the tool in the spindle.
+
+        tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, or None where they are Z
+        feed  : mm/min, speed : 1/min, clockwise positive; lines : (n,) float64, numbers of lines of the file
+        """
+        stood = np.tile(UP, (len(tips), 1)) if axes is None else axes
+        there = np.hstack([tips, stood])
+        self._line = int(lines[0])
+        self._arrive(there[0], speed, float(lines[0]))
+        row = (rapid, math.nan if rapid else feed, speed, float(self._tool if self._tool is not None else -1))
+        self._add(there[:-1], there[1:], row, lines[1:], False)
+        self._here, self._line = there[-1], int(lines[-1])
+
+    def moves(self) -> CutterMoves:
+        """All moves so far."""
+        rows = np.concatenate(self._chunks) if self._chunks else np.zeros((0, 18))
+        a, b = rows[:, :6], rows[:, 6:12]
+        start, end, first, last = (np.ascontiguousarray(v) for v in (a[:, :3], b[:, :3], a[:, 3:], b[:, 3:]))
+        return CutterMoves(start, end, first, last, rows[:, 12] > 0, rows[:, 13].copy(), rows[:, 14].copy(),
+                           rows[:, 15].astype(np.int32), rows[:, 16].astype(np.int32), rows[:, 17] > 0,
+                           tuple(self.cutters))
+
+    def program(self, numbers: Sequence[int], machine: Kinematics | None) -> Program:
+        """The moves as a program.
+
+        numbers : T number of each cutter
+        machine : its rotary axes; None on one without any, where a tool that leans is remarked
+        """
+        m, remarks, notes = self.moves(), list(self.remarks), list(self.notes)
+        table = np.array([*numbers, 0], np.int32)
+        tool = table[m.cutter]
+        leaning = np.maximum(np.abs(m.end_axis - UP), np.abs(m.start_axis - UP)).max(axis=1) > SAME_AXIS
+        poses = None
+        if leaning.any():
+            turns = np.zeros((len(tool), 2, 2))
+            if machine is None:
+                remarks.append(Remark(int(m.line[np.flatnonzero(leaning)[0]]),
+                                      "the tool leans, and the machine has no rotary axes"))
+            else:
+                both = np.stack([m.start_axis, m.end_axis], axis=1).reshape(-1, 3)
+                turns = least_turns(machine, both).reshape(-1, 2, 2)
+                notes.append("STEP-NC leaves it to the control where rotary axes stand; limits of the machine were "
+                             "held against the way that turns them least from move to move")
+            poses = Poses(m.start_axis, m.end_axis, turns[:, 0], turns[:, 1])
+        standing = np.flatnonzero(~m.rapid & ~(m.speed > 0))
+        if len(standing):
+            k = int(standing[0])
+            remarks.append(Remark(int(m.line[k]), f"a feed move while the spindle of T{tool[k]} does not turn "
+                                                  "clockwise, as right-hand cutters do"))
+        unknown = [(int(k), EVERY + (TURNED if leaning[k] else 0)) for k in np.flatnonzero(m.arrival)]
+        length = np.linalg.norm(m.end - m.start, axis=1)
+        minutes = np.where(m.rapid, np.nan, length / np.where(m.rapid, 1.0, m.feed))
+        speeds: dict[int, tuple[float, int]] = {}
+        for number in np.unique(tool[m.speed > 0]).tolist():
+            mine = np.flatnonzero(tool == number)
+            k = int(mine[np.argmax(m.speed[mine])])
+            speeds[number] = float(m.speed[k]), int(m.line[k])
+        stops = tuple(Stop(line, what, int(table[place]), _three(at[:3]), _three(at[3:]))
+                      for line, what, place, at in (*self._stops, *self._last()))
+        return Program(
+            name=self.name, start=m.start, end=m.end, kind=np.where(m.rapid, RAPID, FEED).astype(np.int8), feed=m.feed,
+            tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
+            unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
+            poses=poses, notes=tuple(notes))
+
+    def _last(self) -> list[tuple[int, str, int, F64]]:
+        if self._here is None or self._tool is None:
+            return []
+        return [(self._line, "end of the program", self._tool, self._here)]
+
+    def _change(self, what: str, line: int) -> None:
+        """The tool is put away: over the plane, where one was said, or from where it stands."""
+        if self._over is not None and self._here is not None:
+            self._lift(self._over)
+        if self._here is not None and self._tool is not None:
+            self._stops.append((line, what, self._tool, self._here))
+        self._here = None
+
+    def _lift(self, over: tuple[F64, F64, int]) -> None:
+        """Up to the plane."""
+        point, normal, line = over
+        here = self._here
+        if here is None or (rise := float((point - here[:3]) @ normal)) <= 0.0:
+            return
+        up = here.copy()
+        up[:3] += rise * normal
+        self._rapid(here, up, line)
+        self._here = up
+
+    def _rapid(self, here: F64, there: F64, line: float, arrival: bool = False, speed: float = 0.0) -> None:
+        row = (True, math.nan, speed, float(self._tool if self._tool is not None else -1))
+        self._add(here[None], there[None], row, np.array([float(line)]), arrival)
+
+    def _arrive(self, there: F64, speed: float, line: float) -> None:
+        """Come to the first place of a path from wherever the tool is."""
+        over, here = self._over, self._here
+        if here is not None and np.abs(there[:3] - here[:3]).max() <= SAME_PLACE \
+                and np.abs(there[3:] - here[3:]).max() <= SAME_AXIS:
+            self._over = None  # it is there already
+            return
+        if over is not None:
+            self._lift(over)
+            point, normal, _ = over
+            rise = float((point - there[:3]) @ normal)
+            above = there.copy()
+            above[:3] += max(rise, 0.0) * normal
+            self._rapid(above, above, line, True, speed)
+            if rise > 0.0:
+                self._rapid(above, there, line, False, speed)
+        else:
+            self._rapid(there, there, line, True, speed)
+        self._over = None
+
+    def _add(self, start: F64, end: F64, row: tuple[bool, float, float, float], lines: F64, arrival: bool) -> None:
+        """Write moves (n, 6); one that turns the tool far is cut into pieces."""
+        angle = np.arccos(np.clip((start[:, 3:] * end[:, 3:]).sum(axis=1), -1.0, 1.0))
+        pieces = np.maximum(np.ceil(angle / MOST_TURN), 1.0).astype(np.int64)
+        if (pieces > 1).any():
+            which = np.repeat(np.arange(len(start)), pieces)
+            step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+            start, end = (_between(start[which], end[which], (step + k) / pieces[which]) for k in (0, 1))
+            lines = lines[which]
+        self._count += len(start)
+        if self._count > MOST_MOVES:
+            raise VerificationError(f"{self.name} makes too many moves, {MOST_MOVES} are allowed",
+                                    code="program_too_long", measured=self._count, limit=MOST_MOVES,
+                                    remedy="split the job")
+        tail = np.tile([float(v) for v in row], (len(start), 1))
+        self._chunks.append(np.hstack([start, end, tail, lines[:, None], np.full((len(start), 1), float(arrival))]))
+
+
+def _between(start: F64, end: F64, share: F64) -> F64:
+    out = start + share[:, None] * (end - start)
+    out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
+    return np.where(share[:, None] >= 1.0, end, out)
+
+
+def _three(values: F64) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def least_turns(machine: Kinematics, axes: F64) -> F64:
+    """Where the rotary axes stand along a way, turning least from place to place, from 0.
+
+    axes : (n, 3) float64, unit, tip to spindle, setup frame
+
+    Returns (n, 2) float64, rad, the tilting axis first.
+    """
+    changed = np.ones(len(axes), np.bool_)
+    changed[1:] = np.abs(np.diff(axes, axis=0)).max(axis=1) > 1e-12
+    rows = axes[changed]
+    tilt = np.arctan2(np.hypot(rows[:, 0], rows[:, 1]), rows[:, 2])
+    zero = np.zeros(len(rows))
+    spins = []
+    for sign in (1.0, -1.0):
+        level = machine.axis(np.column_stack([sign * tilt, zero]))
+        spin = np.arctan2(rows[:, 1], rows[:, 0]) - np.arctan2(level[:, 1], level[:, 0])
+        spins.append((spin if machine.turns_head else -spin).tolist())
+    out, here, free = [], (0.0, 0.0), tilt < 1e-9
+    for k, t in enumerate(tilt.tolist()):
+        if free[k]:
+            here = 0.0, here[1]
+        else:
+            choices = [(s * t, spins[j][k] + 2.0 * math.pi * round((here[1] - spins[j][k]) / (2.0 * math.pi)))
+                       for j, s in enumerate((1.0, -1.0))]
+            here = min(choices, key=lambda c: max(abs(c[0] - here[0]), abs(c[1] - here[1])))
+        out.append(here)
+    return np.array(out).reshape(-1, 2)[np.cumsum(changed) - 1]

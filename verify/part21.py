@@ -1,0 +1,416 @@
+"""STEP Part 21 text (ISO 10303-21) as instances, each with the line it begins in; a reader of its own.
+
+Comments may stand wherever blanks may, statements may be split into lines as they like, strings hold doubled quotes and
+the directives ``\\X\\``, ``\\X2\\``, ``\\X4\\``, ``\\S\\``. Instances are parsed when they are asked for; points of
+three coordinates, of which paths have millions, are read all at once. What the grammar does not allow is refused by
+its place, what an instance lacks by its number and name: ``#123 POLYLINE, points: ...``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import ProgramError
+from geometry.mesh import F64, I32
+
+SHOWN = 60  # characters of a text that an error quotes
+_CHUNK = 65_536
+_NUMBER = r"[-+]?[0-9]+\.[0-9]*(?:E[-+]?[0-9]+)?"
+_SKIP = re.compile(r"(?:\s++|/\*.*?\*/)*+", re.DOTALL)
+_BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
+_INSTANCE = re.compile(
+    rf"(?:\s++|/\*.*?\*/)*+\#([0-9]+)\s*+=\s*+(?:CARTESIAN_POINT\s*\(\s*'[^'\\]*+'\s*,\s*\(\s*({_NUMBER})\s*,\s*"
+    rf"({_NUMBER})\s*,\s*({_NUMBER})\s*\)\s*\)\s*;|({_BODY});)", re.DOTALL)
+_STATEMENT = re.compile(rf"({_BODY});", re.DOTALL)
+_TOKEN = re.compile(
+    rf"(?:\s++|/\*.*?\*/)*+(?:(?P<ref>\#[0-9]+)|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]+)|'(?P<text>(?:[^']|'')*+)'"
+    r"|\.(?P<word>[A-Z][A-Z0-9_]*)\.|(?P<name>!?[A-Z][A-Z0-9_]*)|(?P<sign>[(),$*])|\"(?P<bits>[0-9A-F]+)\")", re.DOTALL)
+_NAME = re.compile(r"[A-Z][A-Z0-9_]*")
+_BRACKETS = re.compile(r"'[^']*'|/\*.*?\*/|([A-Z][A-Z0-9_]*)\s*\(|([()])", re.DOTALL)
+_POLYLINE = re.compile(r"POLYLINE\s*\(\s*'[^'\\]*'\s*,\s*\(((?:\s*\#[0-9]+\s*,)+\s*\#[0-9]+\s*)\)\s*\)\s*;")
+_DIRECTIVE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X4\\((?:[0-9A-F]{8})*)\\X0\\|\\X\\([0-9A-F]{2})|\\S\\(.)"
+                        r"|\\P[A-I]\\|(\\\\)", re.DOTALL)
+
+
+class Ref(int):
+    """The number of an instance that a value refers to."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"#{int(self)}"
+
+
+class Word(str):
+    """An enumeration item, without its dots."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f".{self!s}."
+
+
+@dataclass(frozen=True)
+class Typed:
+    """A value with the name of its type before it."""
+
+    name: str
+    value: object
+
+
+class Derived:
+    """What stands for a value that follows from others, ``*``."""
+
+    def __repr__(self) -> str:
+        return "*"
+
+
+DERIVED = Derived()
+Value = object
+"""float, int, str, Word, Ref, Typed, DERIVED, None for ``$``, or a list of these."""
+Record = tuple[str, list[Value]]
+
+
+class Part21:
+    """An exchange file.
+
+    name    : of the file, for errors
+    header  : values of the header by entity name
+    schemas : of FILE_SCHEMA, in capitals, without the object identifiers in braces
+    """
+
+    def __init__(self, text: str, name: str) -> None:
+        self.name, self._text = name, text
+        self._records: dict[int, list[Record]] = {}
+        self._spans: dict[int, tuple[int, int]] = {}
+        self._named: dict[str, list[int]] = {}
+        begin = self._frame()
+        self._scan(begin)
+        newlines = np.flatnonzero(np.frombuffer(text.encode("ascii", "replace"), np.uint8) == 10)
+        self._breaks: NDArray[np.int64] = newlines
+        self.lines = len(newlines) + (0 if text.endswith("\n") else 1)
+
+    def of(self, entity: str) -> list[int]:
+        """Numbers of the instances of an entity, in the order they stand; of complex ones those it is a record of."""
+        return self._named.get(entity, [])
+
+    def entities(self) -> Mapping[str, Sequence[int]]:
+        """Numbers of all instances but plain points, by the names of their records."""
+        return self._named
+
+    def has(self, number: int) -> bool:
+        """Whether there is an instance of a number."""
+        return number in self._spans or self._point(number) >= 0
+
+    def names(self, number: int) -> tuple[str, ...]:
+        """The entity names of an instance: one, or those of the records of a complex one."""
+        if self._point(number) >= 0:
+            return ("CARTESIAN_POINT",)
+        return tuple(name for name, _ in self.records(number))
+
+    def records(self, number: int) -> list[Record]:
+        """Names and values of an instance; ProgramError where its text breaks the grammar, or there is none."""
+        if number not in self._records:
+            row = self._point(number)
+            if row >= 0:
+                return [("CARTESIAN_POINT", ["", self._points[row].tolist()])]
+            if number not in self._spans:
+                raise self.error(number, "is not in the file")
+            self._records[number] = self._parse(number)
+        return self._records[number]
+
+    def line(self, number: int) -> int:
+        """1-based line that an instance begins in."""
+        return int(self.lines_of(np.array([number], np.int64))[0])
+
+    def lines_of(self, numbers: NDArray[np.int64]) -> I32:
+        """(n,) int32: 1-based lines that instances (n,), by their numbers, begin in; 0 where there is none."""
+        row = self._rows(numbers)
+        at = np.where(row >= 0, self._point_at[row], -1) if len(self._point_at) else np.full(len(numbers), -1)
+        for k in np.flatnonzero(row < 0).tolist():
+            span = self._spans.get(int(numbers[k]))
+            at[k] = -1 if span is None else span[0]
+        return np.where(at < 0, 0, np.searchsorted(self._breaks, at) + 1).astype(np.int32)
+
+    def points(self, numbers: NDArray[np.int64]) -> F64:
+        """(n, 3) float64: coordinates of points (n,) by their numbers, nan where one is no point of three."""
+        row = self._rows(numbers)
+        out = np.full((len(numbers), 3), np.nan)
+        out[row >= 0] = self._points[row[row >= 0]]
+        return out
+
+    def plain_polyline(self, number: int) -> NDArray[np.int64] | None:
+        """(n,) int64: what a POLYLINE of two or more references refers to; None where it is not plainly that."""
+        span = self._spans.get(number)
+        found = None if span is None else _POLYLINE.match(self._text, span[1])
+        return None if found is None else np.fromstring(found.group(1).replace("#", ""), np.int64, sep=",")
+
+    def error(self, number: int, problem: str) -> ProgramError:
+        """The error that names an instance."""
+        span = self._spans.get(number)
+        entity = ""
+        if self._point(number) >= 0:
+            entity = " CARTESIAN_POINT"
+        elif span is not None:
+            words = re.match(r"\s*\(?\s*([A-Z][A-Z0-9_]*)", self._text[span[1]:span[1] + 200])
+            entity = f" {words.group(1)}" if words else ""
+        subjects = (f"#{number}", *((f"line {self.line(number)}",) if self.has(number) and self._breaks.size else ()))
+        return ProgramError(f"{self.name}, #{number}{entity}{'' if problem.startswith(',') else ' '}{problem}",
+                            subjects=subjects, remedy="correct the instance named")
+
+    def _broken(self, at: int, problem: str) -> ProgramError:
+        line = self._text.count("\n", 0, at) + 1
+        return ProgramError(f"{self.name}, line {line}: {problem}", subjects=(f"line {line}",),
+                            measured=self._text[at:at + SHOWN], remedy="send the whole STEP-NC file as it was written")
+
+    def _point(self, number: int) -> int:
+        k = int(np.searchsorted(self._point_ids, number))
+        return k if k < len(self._point_ids) and self._point_ids[k] == number else -1
+
+    def _rows(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        if not len(self._point_ids):
+            return np.full(len(numbers), -1, np.int64)
+        k = np.minimum(np.searchsorted(self._point_ids, numbers), len(self._point_ids) - 1)
+        return np.where(self._point_ids[k] == numbers, k, -1).astype(np.int64)
+
+    def _frame(self) -> int:
+        """Read the header; returns where the instances begin."""
+        self.header: dict[str, list[Value]] = {}
+        at = 0
+        sections: list[str] = []
+        while True:
+            at = _SKIP.match(self._text, at).end()  # type: ignore[union-attr]
+            found = _STATEMENT.match(self._text, at)
+            if found is None:
+                raise self._broken(at, "the text breaks off before the data section")
+            words = " ".join(re.sub(r"/\*.*?\*/", " ", found.group(1), flags=re.DOTALL).split())
+            if not sections and words != "ISO-10303-21":
+                raise self._broken(at, "a STEP file begins with ISO-10303-21;")
+            if words.startswith("DATA"):
+                break
+            if "(" in words:
+                (record,) = self._values(found.group(1), at)
+                self.header[record[0]] = record[1]
+            sections.append(words)
+            at = found.end()
+        self.schemas = tuple(str(s).split("{")[0].strip().upper() for s in self._schema_list())
+        return found.end()
+
+    def _schema_list(self) -> list[Value]:
+        given = self.header.get("FILE_SCHEMA", [[]])
+        return given[0] if given and isinstance(given[0], list) else []
+
+    def _scan(self, at: int) -> None:
+        """Find all instances up to the end of the section, points with their coordinates."""
+        text, match = self._text, _INSTANCE.match
+        numbers: list[int] = []
+        words: list[str] = []
+        places: list[int] = []
+        chunks: list[tuple[NDArray[np.int64], F64, NDArray[np.int64]]] = []
+
+        def pack() -> None:
+            chunks.append((np.array(numbers, np.int64), np.array(words, dtype=object).astype(np.float64).reshape(-1, 3),
+                           np.array(places, np.int64)))
+            for gathered in (numbers, words, places):
+                gathered.clear()
+
+        while (found := match(text, at)) is not None:
+            body = found.group(5)
+            number = int(found.group(1))
+            if body is None:
+                numbers.append(number)
+                words += found.group(2, 3, 4)
+                places.append(found.start(1))
+                if len(numbers) >= _CHUNK:
+                    pack()
+            else:
+                if number in self._spans:
+                    raise self._broken(found.start(1), f"#{number} stands twice")
+                self._spans[number] = found.start(1), found.start(5)
+                for name in _entity_names(body):
+                    self._named.setdefault(name, []).append(number)
+            at = found.end()
+        pack()
+        self._points = np.concatenate([c[1] for c in chunks])
+        ids, places_ = (np.concatenate([c[k] for c in chunks]) for k in (0, 2))
+        order = np.argsort(ids, kind="stable")
+        self._point_ids, self._point_at, self._points = ids[order], places_[order], self._points[order]
+        twice = self._point_ids[1:][self._point_ids[1:] == self._point_ids[:-1]].tolist()
+        twice += [n for n in self._spans if self._point(n) >= 0]
+        if twice:
+            raise self._broken(self._spans.get(twice[0], (0, 0))[0], f"#{twice[0]} stands twice")
+        self._end(at)
+
+    def _end(self, at: int) -> None:
+        at = _SKIP.match(self._text, at).end()  # type: ignore[union-attr]
+        tail = re.compile(r"ENDSEC\s*;(?:\s++|/\*.*?\*/)*+(END-ISO-10303-21\s*;)?", re.DOTALL).match(self._text, at)
+        if tail is None:
+            raise self._broken(at, "an instance, #number=NAME(...);, or the end of the section was expected")
+        if tail.group(1) is None:
+            raise self._broken(tail.end(), "END-ISO-10303-21; was expected: the text breaks off, or holds a further "
+                                           "section, which is not read")
+
+    def _parse(self, number: int) -> list[Record]:
+        span = self._spans[number]
+        found = _STATEMENT.match(self._text, span[1])
+        if found is None:
+            raise self.error(number, "breaks off")
+        return self._values(found.group(1), span[1], number)
+
+    def _values(self, text: str, at: int, number: int | None = None) -> list[Record]:
+        """The records of a statement."""
+        tokens = _Tokens(text)
+        try:
+            return tokens.records()
+        except _Grammar as problem:
+            if number is not None:
+                raise self.error(number, str(problem)) from None
+            raise self._broken(at, str(problem)) from None
+
+
+def _entity_names(body: str) -> list[str]:
+    """Names of the records of an instance."""
+    at = _SKIP.match(body).end()  # type: ignore[union-attr]
+    if body[at:at + 1] != "(":
+        found = _NAME.match(body, at)
+        return [found.group()] if found else []
+    out, depth = [], 0
+    for m in _BRACKETS.finditer(body):
+        if m.group(1):
+            if depth == 1:
+                out.append(m.group(1))
+            depth += 1
+        elif m.group(2):
+            depth += 1 if m.group(2) == "(" else -1
+    return out
+
+
+class _Grammar(Exception):
+    """What the text of one statement breaks."""
+
+
+class _Tokens:
+    """The values of one statement, left to right."""
+
+    def __init__(self, text: str) -> None:
+        self._tokens = list(self._split(text))
+        self._at = 0
+
+    @staticmethod
+    def _split(text: str) -> Iterator[tuple[str, str]]:
+        at = 0
+        while at < len(text):
+            found = _TOKEN.match(text, at)
+            if found is None:
+                rest = _SKIP.match(text, at)
+                if rest is not None and rest.end() == len(text):
+                    return
+                raise _Grammar(f"holds {text[at:at + SHOWN].strip()!r}, which is no value")
+            yield str(found.lastgroup), found.group(str(found.lastgroup))
+            at = found.end()
+
+    def records(self) -> list[Record]:
+        """One record, or those in the brackets of a complex instance."""
+        out: list[Record] = []
+        if self._peek() == ("sign", "("):
+            self._at += 1
+            while self._peek() != ("sign", ")"):
+                out.append(self._record())
+            self._at += 1
+        else:
+            out.append(self._record())
+        if self._at < len(self._tokens) or not out:
+            raise _Grammar("has more or less than one record")
+        return out
+
+    def _record(self) -> Record:
+        kind, name = self._next()
+        if kind != "name":
+            raise _Grammar(f"has {name!r} where the name of an entity was expected")
+        return name, self._list()
+
+    def _list(self) -> list[Value]:
+        if self._next() != ("sign", "("):
+            raise _Grammar("lacks an opening bracket")
+        out: list[Value] = []
+        if self._peek() == ("sign", ")"):
+            self._at += 1
+            return out
+        while True:
+            out.append(self._value())
+            sign = self._next()
+            if sign == ("sign", ")"):
+                return out
+            if sign != ("sign", ","):
+                raise _Grammar(f"has {sign[1]!r} where a comma or a closing bracket was expected")
+
+    def _value(self) -> Value:
+        kind, word = self._peek()
+        if kind == "sign" and word == "(":
+            return self._list()
+        self._at += 1
+        if kind == "ref":
+            return Ref(word[1:])
+        if kind == "real":
+            return float(word)
+        if kind == "whole":
+            return int(word)
+        if kind == "text":
+            return decoded(word)
+        if kind == "word":
+            return Word(word)
+        if kind == "bits":
+            return Typed("BINARY", word)
+        if kind == "name":
+            inner = self._list()
+            if len(inner) != 1:
+                raise _Grammar(f"gives {word} {len(inner)} values, where a type has one")
+            return Typed(word, inner[0])
+        if word == "$":
+            return None
+        if word == "*":
+            return DERIVED
+        raise _Grammar(f"has {word!r} where a value was expected")
+
+    def _peek(self) -> tuple[str, str]:
+        if self._at >= len(self._tokens):
+            raise _Grammar("breaks off")
+        return self._tokens[self._at]
+
+    def _next(self) -> tuple[str, str]:
+        token = self._peek()
+        self._at += 1
+        return token
+
+
+def decoded(text: str) -> str:
+    """A string of the file, between its quotes, as it is meant: doubled quotes single, directives carried out."""
+    text = text.replace("''", "'")
+    if "\\" not in text:
+        return text.replace("\n", "").replace("\r", "")
+
+    def meant(m: re.Match[str]) -> str:
+        wide, wider, byte, shifted, slash = m.groups()
+        if wide is not None:
+            return bytes.fromhex(wide).decode("utf-16-be", "replace")
+        if wider is not None:
+            return bytes.fromhex(wider).decode("utf-32-be", "replace")
+        if byte is not None:
+            return chr(int(byte, 16))
+        if shifted is not None:
+            return chr(ord(shifted) + 128)
+        return "\\" if slash else ""
+
+    return _DIRECTIVE.sub(meant, text.replace("\n", "").replace("\r", ""))
+
+
+def is_exchange_file(text: str) -> bool:
+    """Whether a text begins as a STEP Part 21 file does, comments and blanks before it left aside."""
+    start = _SKIP.match(text.lstrip("\ufeff")[:100_000])
+    rest = text.lstrip("\ufeff")[start.end() if start else 0:][:40]
+    return re.match(r"ISO-10303-21\s*;", rest) is not None

@@ -1,0 +1,584 @@
+"""STEP-NC as AP238 (ISO 10303-238, both schema names), read: what its workplan makes the tool do.
+
+The application model stands in the file as methods, relationships between them and properties with representations;
+which parameter a property is, its name says. A name or a value that the reader does not know is refused by instance,
+and so is what could move the tool and is not read: strategies without a path, contact trajectories, splines, branches.
+Lengths, feeds and speeds are taken in the units the file gives them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+import numpy as np
+
+from geometry.errors import ProgramError
+from geometry.mesh import F64
+from verify.attributes import (
+    FLAG,
+    Attributes,
+    Checked,
+    Either,
+    Many,
+    Maybe,
+    Named,
+    Nothing,
+    OneOf,
+    Real,
+    Table,
+    Text,
+    To,
+    Whole,
+    attributes,
+    shown,
+)
+from verify.course import Course, Cutter
+from verify.part21 import Part21, Ref, Typed
+from verify.stepnc_arm import shape_of, tool_number
+
+SCHEMAS = frozenset({"MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA", "INTEGRATED_CNC_SCHEMA"})
+_METHOD = {"name": Text(), "description": Text(), "consequence": Text(), "purpose": Text()}
+_EXECUTABLES = ("MACHINING_WORKPLAN", "MACHINING_WORKINGSTEP", "MACHINING_NC_FUNCTION", "MACHINING_PROCESS_EXECUTABLE")
+_METHODS = (*_EXECUTABLES, "FREEFORM_MILLING_OPERATION", "MACHINING_TOOLPATH", "MACHINING_TECHNOLOGY",
+            "MACHINING_FUNCTIONS", "MACHINING_FEATURE_PROCESS", "FREEFORM_MILLING_STRATEGY")
+_LENGTH_TYPES = tuple((n, Real()) for n in ("LENGTH_MEASURE", "POSITIVE_LENGTH_MEASURE"))
+_MEASURES = Named((*_LENGTH_TYPES, *((n, Real()) for n in (
+    "TIME_MEASURE", "NUMERIC_MEASURE", "COUNT_MEASURE", "PLANE_ANGLE_MEASURE", "RATIO_MEASURE"))))
+_UNITS = ("SI_UNIT", "CONVERSION_BASED_UNIT", "CONTEXT_DEPENDENT_UNIT", "DERIVED_UNIT")
+_MEASURED = {"value_component": _MEASURES, "unit_component": To(_UNITS)}
+_CONTEXT = To(("REPRESENTATION_CONTEXT",))
+_REPRESENTATION = {"name": Text(), "items": Many(To(), 1), "context_of_items": _CONTEXT}
+_REPRESENTATIONS = ("REPRESENTATION", "MACHINING_TOOLPATH_SPEED_PROFILE_REPRESENTATION",
+                    "MACHINING_SPINDLE_SPEED_REPRESENTATION", "MACHINING_FEED_SPEED_REPRESENTATION",
+                    "FREEFORM_MILLING_TOLERANCE_REPRESENTATION", "MACHINING_TOOL_BODY_REPRESENTATION")
+_SHAPES = ("SHAPE_REPRESENTATION_WITH_PARAMETERS", "BLOCK_SHAPE_REPRESENTATION", "CYLINDRICAL_SHAPE_REPRESENTATION",
+           "TESSELLATED_SHAPE_REPRESENTATION", "SHAPE_REPRESENTATION", "ADVANCED_BREP_SHAPE_REPRESENTATION")
+_PRODUCTS = ("PRODUCT", "MACHINING_PROJECT", "MACHINING_SETUP")
+_PRODUCT = {"id": Text(), "name": Text(), "description": Maybe(Text()),
+            "frame_of_reference": Many(To(("PRODUCT_CONTEXT",)), 1)}
+_DEFINITION = To(("PRODUCT_DEFINITION",))
+
+
+def _between(relating: tuple[str, ...], related: tuple[str, ...], *, ordered: bool = False) -> Attributes:
+    """Attributes of a relationship between methods."""
+    place = {"sequence_position": Real()} if ordered else {}
+    return attributes(name=Text(), description=Maybe(Text()), relating_method=To(relating), related_method=To(related),
+                      **place)
+
+
+def _of_products(relating: To, related: To) -> Attributes:
+    """Attributes of a relationship between products."""
+    return attributes(id=Text(), name=Text(), description=Maybe(Text()), relating_product_definition=relating,
+                      related_product_definition=related)
+
+
+TABLE: Table = {
+    **{name: attributes(**_METHOD) for name in _METHODS},
+    **{name: attributes(**_PRODUCT) for name in _PRODUCTS},
+    **{name: attributes(**_REPRESENTATION) for name in (*_REPRESENTATIONS, *_SHAPES)},
+    "APPLICATION_CONTEXT": attributes(application=Text()),
+    "APPLICATION_PROTOCOL_DEFINITION": attributes(
+        status=Text(), application_interpreted_model_schema_name=Text(), application_protocol_year=Whole(),
+        application=To(("APPLICATION_CONTEXT",))),
+    "PRODUCT_CONTEXT": attributes(name=Text(), frame_of_reference=To(("APPLICATION_CONTEXT",)), discipline_type=Text()),
+    "PRODUCT_DEFINITION_CONTEXT": attributes(name=Text(), frame_of_reference=To(("APPLICATION_CONTEXT",)),
+                                             life_cycle_stage=Text()),
+    "PRODUCT_DEFINITION_FORMATION": attributes(id=Text(), description=Maybe(Text()), of_product=To(_PRODUCTS)),
+    "PRODUCT_DEFINITION": attributes(id=Text(), description=Maybe(Text()),
+                                     formation=To(("PRODUCT_DEFINITION_FORMATION",)),
+                                     frame_of_reference=To(("PRODUCT_DEFINITION_CONTEXT",))),
+    "PRODUCT_DEFINITION_PROCESS": attributes(name=Text(), description=Maybe(Text()), chosen_method=To(_METHODS),
+                                             identification=Text()),
+    "PROCESS_PRODUCT_ASSOCIATION": attributes(name=Text(), description=Text(), defined_product=_DEFINITION,
+                                              process=To(("PRODUCT_DEFINITION_PROCESS",))),
+    "MACHINING_PROJECT_WORKPIECE_RELATIONSHIP": _of_products(_DEFINITION, _DEFINITION),
+    "MACHINING_SETUP_WORKPIECE_RELATIONSHIP": _of_products(_DEFINITION, _DEFINITION),
+    "PRODUCT_DEFINITION_RELATIONSHIP": _of_products(_DEFINITION, _DEFINITION),
+    "PRODUCT_DEFINITION_SHAPE": attributes(name=Text(), description=Maybe(Text()),
+                                           definition=To(("PRODUCT_DEFINITION", "INSTANCED_FEATURE"))),
+    "PROPERTY_DEFINITION": attributes(name=Text(), description=Maybe(Text()), definition=To()),
+    "PROPERTY_DEFINITION_REPRESENTATION": attributes(definition=To(("PROPERTY_DEFINITION",)),
+                                                     used_representation=To(_REPRESENTATIONS)),
+    "SHAPE_DEFINITION_REPRESENTATION": attributes(definition=To(("PRODUCT_DEFINITION_SHAPE",)),
+                                                  used_representation=To(_SHAPES)),
+    "MATERIAL_DESIGNATION": attributes(name=Text(), definitions=Many(To(), 1)),
+    "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP": _between(("MACHINING_WORKPLAN",), _EXECUTABLES, ordered=True),
+    "MACHINING_OPERATION_RELATIONSHIP": _between(("MACHINING_WORKINGSTEP",), ("FREEFORM_MILLING_OPERATION",)),
+    "MACHINING_FEATURE_RELATIONSHIP": _between(("MACHINING_WORKINGSTEP",), ("MACHINING_FEATURE_PROCESS",)),
+    "MACHINING_TECHNOLOGY_RELATIONSHIP": _between(("FREEFORM_MILLING_OPERATION", "MACHINING_TOOLPATH"),
+                                                  ("MACHINING_TECHNOLOGY",)),
+    "MACHINING_FUNCTIONS_RELATIONSHIP": _between(("FREEFORM_MILLING_OPERATION", "MACHINING_TOOLPATH"),
+                                                 ("MACHINING_FUNCTIONS",)),
+    "MACHINING_STRATEGY_RELATIONSHIP": _between(("FREEFORM_MILLING_OPERATION",), ("FREEFORM_MILLING_STRATEGY",)),
+    "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP": _between(("FREEFORM_MILLING_OPERATION",), ("MACHINING_TOOLPATH",),
+                                                         ordered=True),
+    "MACHINING_OPERATOR_INSTRUCTION": attributes(**_METHOD, documents=Many(To(("DOCUMENT",)), 1)),
+    "MACHINING_OPERATOR_INSTRUCTION_RELATIONSHIP": _between(
+        ("MACHINING_PROCESS_EXECUTABLE",), ("MACHINING_OPERATOR_INSTRUCTION",), ordered=True),
+    "DOCUMENT": attributes(id=Text(), name=Text(), description=Maybe(Text()), kind=To(("DOCUMENT_TYPE",))),
+    "DOCUMENT_TYPE": attributes(product_data_type=Text()),
+    "PROPERTY_PROCESS": attributes(name=Text(), description=Maybe(Text()),
+                                   chosen_method=To(("MACHINING_FEATURE_PROCESS",)), identification=Text()),
+    "PROCESS_PROPERTY_ASSOCIATION": attributes(name=Text(), description=Text(), process=To(("PROPERTY_PROCESS",)),
+                                               property_or_shape=To(("INSTANCED_FEATURE",))),
+    "INSTANCED_FEATURE": attributes(name=Text(), description=Maybe(Text()), shape_name=Text(),
+                                    shape_description=Maybe(Text()), of_shape=To(("PRODUCT_DEFINITION_SHAPE",)),
+                                    product_definitional=FLAG),
+    "ACTION_PROPERTY": attributes(name=Text(), description=Text(), definition=To(_METHODS)),
+    "ACTION_PROPERTY_REPRESENTATION": attributes(name=Text(), description=Text(), property=To(("ACTION_PROPERTY",)),
+                                                 representation=To(_REPRESENTATIONS)),
+    "DESCRIPTIVE_REPRESENTATION_ITEM": attributes(name=Text(), description=Text()),
+    "MEASURE_REPRESENTATION_ITEM": attributes(name=Text(), **_MEASURED),
+    "MACHINING_TOOL": attributes(name=Text(), description=Text(), usage=Many(To(("FREEFORM_MILLING_OPERATION",)), 1),
+                                 kind=To(("ACTION_RESOURCE_TYPE",))),
+    "MACHINING_CUTTING_COMPONENT": attributes(
+        name=Text(), description=Maybe(Text()), usage=Many(To(("FREEFORM_MILLING_OPERATION",)), 1),
+        kind=To(("ACTION_RESOURCE_TYPE",)), object_name=Text(), object_description=Maybe(Text())),
+    "ACTION_RESOURCE_TYPE": attributes(name=Text()),
+    "ACTION_RESOURCE_RELATIONSHIP": attributes(
+        name=Text(), description=Maybe(Text()), relating_resource=To(("MACHINING_TOOL",)),
+        related_resource=To(("MACHINING_CUTTING_COMPONENT",))),
+    "RESOURCE_PROPERTY": attributes(name=Text(), description=Text(),
+                                    resource=To(("MACHINING_TOOL", "MACHINING_CUTTING_COMPONENT"))),
+    "RESOURCE_PROPERTY_REPRESENTATION": attributes(name=Text(), description=Text(), property=To(("RESOURCE_PROPERTY",)),
+                                                   representation=To(_REPRESENTATIONS)),
+    "DERIVED_UNIT": attributes(elements=Many(To(("DERIVED_UNIT_ELEMENT",)), 1)),
+    "DERIVED_UNIT_ELEMENT": attributes(unit=To(_UNITS), exponent=Real()),
+    "CONTEXT_DEPENDENT_UNIT": attributes(dimensions=To(("DIMENSIONAL_EXPONENTS",)), name=Text()),
+    "DIMENSIONAL_EXPONENTS": attributes(**{n: Real() for n in (
+        "length", "mass", "time", "current", "temperature", "amount", "intensity")}),
+    "NAME_ATTRIBUTE": attributes(attribute_value=Text(), named_item=To()),
+    **{name: attributes(**_MEASURED) for name in (
+        "TIME_MEASURE_WITH_UNIT", "LENGTH_MEASURE_WITH_UNIT", "PLANE_ANGLE_MEASURE_WITH_UNIT")},
+    "REPRESENTATION_CONTEXT": attributes(context_identifier=Text(), context_type=Text()),
+    "PLANE": attributes(name=Text(), position=To(("AXIS2_PLACEMENT_3D",))),
+    "AXIS2_PLACEMENT_3D": attributes(name=Text(), location=To(("CARTESIAN_POINT",)), axis=Maybe(To(("DIRECTION",))),
+                                     ref_direction=Maybe(To(("DIRECTION",)))),
+    "DIRECTION": attributes(name=Text(), direction_ratios=Many(Real(), 3, 3)),
+    "CARTESIAN_POINT": attributes(name=Text(), coordinates=Many(Real(), 3, 3)),
+    "POLYLINE": attributes(name=Text(), points=Many(To(("CARTESIAN_POINT",)), 2)),
+    "COORDINATES_LIST": attributes(name=Text(), npoints=Whole(), position_coords=Many(Many(Real(), 3, 3), 1)),
+    "TRIANGULATED_FACE": attributes(
+        name=Text(), coordinates=To(("COORDINATES_LIST",)), pnmax=Whole(), normals=Many(Many(Real(), 3, 3)),
+        geometric_link=Maybe(To()), pnindex=Many(Whole()), triangles=Many(Many(Whole(), 3, 3), 1)),
+    "TESSELLATED_SOLID": attributes(name=Text(), items=Many(To(("TRIANGULATED_FACE",)), 1), geometric_link=Maybe(To())),
+}
+RECORDS: Table = {
+    "NAMED_UNIT": attributes(dimensions=Either((Nothing(), To(("DIMENSIONAL_EXPONENTS",))))),
+    "SI_UNIT": attributes(
+        prefix=Maybe(OneOf(("EXA", "PETA", "TERA", "GIGA", "MEGA", "KILO", "HECTO", "DECA", "DECI", "CENTI", "MILLI",
+                            "MICRO", "NANO", "PICO", "FEMTO", "ATTO"))),
+        name=OneOf(("METRE", "SECOND", "RADIAN", "STERADIAN", "GRAM"))),
+    "CONVERSION_BASED_UNIT": attributes(name=Text(), conversion_factor=To((
+        "TIME_MEASURE_WITH_UNIT", "LENGTH_MEASURE_WITH_UNIT", "PLANE_ANGLE_MEASURE_WITH_UNIT"))),
+    "MEASURE_WITH_UNIT": attributes(**_MEASURED),
+    "REPRESENTATION_ITEM": attributes(name=Text()),
+    "GEOMETRIC_REPRESENTATION_CONTEXT": attributes(coordinate_space_dimension=Whole()),
+    "GLOBAL_UNIT_ASSIGNED_CONTEXT": attributes(units=Many(To(_UNITS), 1)),
+    "REPRESENTATION_CONTEXT": attributes(context_identifier=Text(), context_type=Text()),
+}
+
+_PREFIX = {None: 1.0, "KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3,
+           "MICRO": 1e-6, "NANO": 1e-9}
+_BASE = {"METRE": ("length", 1000.0), "SECOND": ("time", 1.0 / 60.0), "RADIAN": ("angle", 1.0),
+         "STERADIAN": ("solid angle", 1.0)}  # mm and min
+_FEED, _SPEED = {"length": 1.0, "time": -1.0}, {"turn": 1.0, "time": -1.0}
+_SYMBOLS = {
+    "priority": ("required", "suggested"),
+    "trajectory type": ("approach", "lift", "connect", "non-contact", "contact", "trajectory path"),
+    "direction": ("beginning to end", "end to beginning"),
+    "speed profile": ("rapid",),
+    "coolant": ("coolant on", "coolant off"),
+    "mist": ("mist on", "mist off"),
+    "through spindle coolant": ("through spindle coolant on", "through spindle coolant off"),
+    "chip removal": ("chip removal on", "chip removal off"),
+    "feedrate reference": ("tool center point",),
+    "synchronize spindle with feed": ("not synchronized",),
+    "inhibit feedrate override": ("override allowed", "override not allowed"),
+    "inhibit spindle override": ("override allowed", "override not allowed"),
+    "pathmode": ("forward", "zigzag"),
+    "cutmode": ("climb", "conventional"),
+}
+_NAMES = {
+    "MACHINING_TOOLPATH": ("priority", "trajectory type", "direction", "speed profile", "basic curve", "tool axis",
+                           "surface normal", "dwell", "path maximum deviation", "tool axis maximum deviation"),
+    "MACHINING_TECHNOLOGY": ("spindle", "feedrate", "feedrate reference", "synchronize spindle with feed",
+                             "inhibit feedrate override", "inhibit spindle override"),
+    "MACHINING_FUNCTIONS": ("coolant", "mist", "through spindle coolant", "chip removal"),
+    "MACHINING_NC_FUNCTION": ("message text",),
+    "FREEFORM_MILLING_STRATEGY": ("pathmode", "cutmode", "milling tolerances", "stepover length", "plane normal",
+                                  "leading line", "forward direction", "sideward direction"),
+}
+_TOOLS = {"ballnose endmill": "ball", "ball endmill": "ball", "bullnose endmill": "bull", "endmill": "flat"}
+_NC_STOPS = ("program stop", "optional stop")
+_NC_QUIET = ("display message", "set mark")
+_ITEMS = ("effective cutting diameter", "maximum depth of cut", "overall assembly length", "hand of cut",
+          "number of effective teeth", "edge radius", "coolant through tool", "functional length")
+
+
+def read_aim(file: Part21, course: Course) -> None:
+    """Tell a course what the main workplan of a file makes the tool do.
+
+    Raises
+    ------
+    ProgramError
+        An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
+        read.
+    """
+    _Aim(file, course).run()
+
+
+class _Aim:
+    """One reading; look-ups of what refers to what."""
+
+    def __init__(self, file: Part21, course: Course) -> None:
+        self.file, self.course = file, course
+        self.data = Checked(file, TABLE, RECORDS)
+        self.properties = self._properties("ACTION_PROPERTY", "definition")
+        self._check_properties()
+        self.units: dict[int, tuple[dict[str, float], float]] = {}
+        self.scales: dict[int, float] = {}
+        self.secure = self._security_plane()
+        self.rates: dict[int, tuple[float, float]] = {}
+        self.cutters: dict[int, Cutter] = {}
+        self.tools = self._tools_by_operation()
+        self.below = {entity: self._ordered(entity) for entity in (
+            "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP", "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP")}
+        self.beside = {entity: self._related(entity) for entity in (
+            "MACHINING_OPERATION_RELATIONSHIP", "MACHINING_TECHNOLOGY_RELATIONSHIP", "MACHINING_FEATURE_RELATIONSHIP")}
+        self.placements = self._placements()
+        self.seen: set[int] = set()
+
+    def run(self) -> None:
+        projects = self.data.of("MACHINING_PROJECT")
+        plans = [self.data.ref(n, "PRODUCT_DEFINITION_PROCESS", "chosen_method")
+                 for n in self.data.of("PRODUCT_DEFINITION_PROCESS") if self._word(n, "PRODUCT_DEFINITION_PROCESS",
+                                                                                  "name", ("machining", "setup"))
+                 == "machining"]
+        for what, found in (("MACHINING_PROJECT", projects), ("main MACHINING_WORKPLAN", plans)):
+            if len(found) != 1:
+                raise ProgramError(f"{self.file.name}: one {what} expected, not {len(found)}",
+                                   subjects=tuple(f"#{n}" for n in found), measured=len(found), limit=1,
+                                   remedy="send one project a file")
+        self._execute(plans[0])
+
+    def _word(self, number: int, entity: str, attribute: str, allowed: Iterable[str]) -> str:
+        """A string that has to be one of a few."""
+        value = str(self.data.one(number, entity, attribute))
+        if value not in allowed:
+            raise self.file.error(number, f", {attribute}: one of {', '.join(map(repr, allowed))} expected, not "
+                                          f"{value!r}")
+        return value
+
+    def _properties(self, entity: str, owner: str) -> dict[int, dict[str, tuple[int, int]]]:
+        """By owner and name: a property and its representation."""
+        shown_by: dict[int, int] = {}
+        for n in self.data.of(f"{entity}_REPRESENTATION"):
+            prop = self.data.ref(n, f"{entity}_REPRESENTATION", "property")
+            if prop in shown_by:
+                raise self.file.error(n, f", property: #{prop} has a representation already")
+            shown_by[prop] = self.data.ref(n, f"{entity}_REPRESENTATION", "representation")
+        out: dict[int, dict[str, tuple[int, int]]] = defaultdict(dict)
+        for n in self.data.of(entity):
+            name, mine = str(self.data.one(n, entity, "name")), self.data.ref(n, entity, owner)
+            if n not in shown_by:
+                raise self.file.error(n, f"'{name}' has no {entity}_REPRESENTATION")
+            if name in out[mine]:
+                raise self.file.error(n, f", name: #{mine} has a property '{name}' already")
+            out[mine][name] = n, shown_by[n]
+        return out
+
+    def _check_properties(self) -> None:
+        """Refuse properties of names, and symbols of values, that the reader does not know."""
+        for owner, named in self.properties.items():
+            entity = self.file.names(owner)[0]
+            for name, (prop, representation) in named.items():
+                if name not in _NAMES.get(entity, ()):
+                    raise self.file.error(prop, f", name: '{name}' is no property of {entity} that is read; "
+                                                f"{', '.join(_NAMES.get(entity, ())) or 'none is'}")
+                if name in _SYMBOLS:
+                    self._symbol(representation, _SYMBOLS[name])
+
+    def _items(self, representation: int) -> list[int]:
+        entity = self.data.get(representation, *_REPRESENTATIONS, *_SHAPES)[0]
+        return self.data.refs(representation, entity, "items")
+
+    def _symbol(self, representation: int, allowed: tuple[str, ...]) -> str:
+        """The word a representation stands for."""
+        item = self._items(representation)[0]
+        self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
+        return self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", allowed)
+
+    def _told(self, owner: int, name: str) -> str | None:
+        found = self.properties.get(owner, {}).get(name)
+        return None if found is None else self._symbol(found[1], _SYMBOLS[name])
+
+    def _related(self, entity: str) -> dict[int, list[int]]:
+        out: dict[int, list[int]] = defaultdict(list)
+        for n in self.data.of(entity):
+            out[self.data.ref(n, entity, "relating_method")].append(self.data.ref(n, entity, "related_method"))
+        return out
+
+    def _ordered(self, entity: str) -> dict[int, list[int]]:
+        """By what is above: what is below it in the order of positions."""
+        rows: dict[int, dict[float, int]] = defaultdict(dict)
+        for n in self.data.of(entity):
+            above, place = self.data.ref(n, entity, "relating_method"), self.data.real(n, entity, "sequence_position")
+            if place is None or place in rows[above]:
+                raise self.file.error(n, f", sequence_position: {place} stands twice below #{above}")
+            rows[above][place] = self.data.ref(n, entity, "related_method")
+        return {above: [found[k] for k in sorted(found)] for above, found in rows.items()}
+
+    def _one_beside(self, entity: str, number: int) -> int:
+        found = self.beside[entity].get(number, [])
+        if len(found) != 1:
+            raise self.file.error(number, f"has {len(found)} {entity}, one is due")
+        return found[0]
+
+    def _execute(self, number: int) -> None:
+        if number in self.seen:
+            raise self.file.error(number, "stands in two places of the workplans, or in itself")
+        self.seen.add(number)
+        entity = self.data.get(number, *_EXECUTABLES)[0]
+        if entity == "MACHINING_WORKPLAN":
+            below = self.below["MACHINING_PROCESS_SEQUENCE_RELATIONSHIP"].get(number)
+            if below is None:
+                raise self.file.error(number, "has no elements: a MACHINING_PROCESS_SEQUENCE_RELATIONSHIP is due")
+            for element in below:
+                self._execute(element)
+        elif entity == "MACHINING_NC_FUNCTION":
+            if self._word(number, entity, "description", (*_NC_STOPS, *_NC_QUIET)) in _NC_STOPS:
+                self.course.stop("program stop", self.file.line(number))
+        elif entity == "MACHINING_PROCESS_EXECUTABLE":
+            self._word(number, entity, "description", ("setup instructions",))
+        else:
+            self._workingstep(number)
+
+    def _workingstep(self, number: int) -> None:
+        operation = self._one_beside("MACHINING_OPERATION_RELATIONSHIP", number)
+        line = self.file.line(number)
+        if self.secure is not None:
+            self.course.over(*self.secure, line)
+        tool = self.tools.get(operation)
+        if tool is None:
+            raise self.file.error(operation, "has no tool: a MACHINING_TOOL whose usage holds it is due")
+        self.course.take(self._cutter(tool), line)
+        technology = self._one_beside("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
+        paths = self.below["MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP"].get(operation)
+        if paths is None:
+            raise self.file.error(operation, "has no tool path: strategies without one are not read")
+        place = np.eye(4)
+        for process in self.beside["MACHINING_FEATURE_RELATIONSHIP"].get(number, []):
+            place = self.placements.get(process, place)
+        for path in paths:
+            self._path(path, place, technology)
+
+    def _path(self, number: int, place: F64, technology: int) -> None:
+        kind = self._word(number, "MACHINING_TOOLPATH", "description", ("cutter location trajectory", "feedstop"))
+        named = self.properties.get(number, {})
+        own = self.beside["MACHINING_TECHNOLOGY_RELATIONSHIP"].get(number, [])
+        if len(own) > 1:
+            raise self.file.error(number, f"has {len(own)} MACHINING_TECHNOLOGY_RELATIONSHIP, one at most is due")
+        if kind == "feedstop":
+            self.course.dwell += 60.0 * self._measure(number, "dwell", {"time": 1.0})
+            return
+        tips, lines = self._curve(number, "basic curve", lengths=True)
+        if "tool axis" in named:
+            axes, _ = self._curve(number, "tool axis", lengths=False)
+            axes = self.data.unit_axes(number, "'tool axis'", axes, len(tips))
+        else:
+            axes = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
+        if self._told(number, "direction") == "end to beginning":
+            tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
+        rapid = self._told(number, "speed profile") is not None
+        feed, speed = self._rates(own[0] if own else technology)
+        self.course.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
+                           speed=speed, lines=lines)
+
+    def _curve(self, number: int, name: str, *, lengths: bool) -> tuple[F64, F64]:
+        """Points (n, 3) of a property that is a polyline, mm where they are lengths, and their lines (n,)."""
+        found = self.properties.get(number, {}).get(name)
+        if found is None:
+            raise self.file.error(number, f"has no '{name}': an ACTION_PROPERTY of that name is due")
+        items = self._items(found[1])
+        if len(items) != 1:
+            raise self.file.error(found[1], f", items: one POLYLINE expected, not {len(items)}")
+        self.data.get(items[0], "POLYLINE")
+        points, lines = self.data.curve(items[0])
+        return points * (self._scale(found[1]) if lengths else 1.0), lines
+
+    def _scale(self, representation: int) -> float:
+        """mm in the unit of the points of a representation."""
+        entity = self.data.get(representation, *_REPRESENTATIONS, *_SHAPES)[0]
+        context = self.data.ref(representation, entity, "context_of_items")
+        if context not in self.scales:
+            self.data.get(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")
+            units = [self._unit(u) for u in self.data.refs(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT", "units")]
+            lengths = [factor for dimensions, factor in units if dimensions == {"length": 1.0}]
+            if len(lengths) != 1:
+                raise self.file.error(context, f", units: one unit of length expected, not {len(lengths)}")
+            self.scales[context] = lengths[0]
+        return self.scales[context]
+
+    def _unit(self, number: int) -> tuple[dict[str, float], float]:
+        """What a unit measures, as exponents, and how many mm, min or turns it is."""
+        if number in self.units:
+            return self.units[number]
+        entity, values = self.data.get(number, *_UNITS)
+        dimensions: dict[str, float] = {}
+        factor = 1.0
+        if entity == "SI_UNIT":
+            name, prefix = str(values[1]), None if values[0] is None else str(values[0])
+            if name not in _BASE or prefix not in _PREFIX:
+                raise self.file.error(number, f"is a unit that is not read: {shown(values[0])} {name}")
+            dimensions, factor = {_BASE[name][0]: 1.0}, _BASE[name][1] * _PREFIX[prefix]
+        elif entity == "CONVERSION_BASED_UNIT":
+            dimensions, factor = self._measured(self.data.ref(number, entity, "conversion_factor"))
+        elif entity == "CONTEXT_DEPENDENT_UNIT":
+            word = self._word(number, entity, "name", ("revolution", "count"))
+            dimensions = {"turn": 1.0} if word == "revolution" else {}
+        else:
+            for element in self.data.refs(number, entity, "elements"):
+                inner, size = self._unit(self.data.ref(element, "DERIVED_UNIT_ELEMENT", "unit"))
+                exponent = self.data.real(element, "DERIVED_UNIT_ELEMENT", "exponent") or 0.0
+                for dimension, power in inner.items():
+                    dimensions[dimension] = dimensions.get(dimension, 0.0) + power * exponent
+                factor *= size**exponent
+        self.units[number] = dimensions, factor
+        return dimensions, factor
+
+    def _measured(self, number: int) -> tuple[dict[str, float], float]:
+        """A value with a unit: what it measures, and how much, in mm, min and turns."""
+        for name, values in self.file.records(number):
+            if len(values) >= 2 and isinstance(values[-2], Typed) and isinstance(values[-1], Ref):
+                dimensions, factor = self._unit(int(values[-1]))
+                value = values[-2].value
+                if isinstance(value, float):
+                    return dimensions, value * factor
+            if name == "MEASURE_WITH_UNIT":
+                break
+        raise self.file.error(number, "is to be a measure with its unit")
+
+    def _measure(self, owner: int, name: str, wanted: dict[str, float]) -> float:
+        """A measured property of a method, in mm, min and turns."""
+        found = self.properties.get(owner, {}).get(name)
+        if found is None:
+            raise self.file.error(owner, f"has no '{name}': an ACTION_PROPERTY of that name is due")
+        item = self._items(found[1])[0]
+        dimensions, value = self._measured(item)
+        if dimensions != wanted:
+            raise self.file.error(item, f"'{name}' is in a unit of {dimensions or 'nothing'}, {wanted} is due")
+        return value
+
+    def _rates(self, technology: int) -> tuple[float, float]:
+        """mm/min and 1/min clockwise."""
+        if technology not in self.rates:
+            feed = self._measure(technology, "feedrate", _FEED)
+            if not feed > 0.0:
+                raise self.file.error(technology, f"has the feedrate {feed:g} mm/min")
+            self.rates[technology] = feed, -self._measure(technology, "spindle", _SPEED)
+        return self.rates[technology]
+
+    def _tools_by_operation(self) -> dict[int, int]:
+        out: dict[int, int] = {}
+        for tool in self.data.of("MACHINING_TOOL"):
+            for operation in self.data.refs(tool, "MACHINING_TOOL", "usage"):
+                if operation in out:
+                    raise self.file.error(tool, f", usage: #{operation} has the tool #{out[operation]} already")
+                out[operation] = tool
+        return out
+
+    def _cutter(self, tool: int) -> Cutter:
+        if tool not in self.cutters:
+            self.cutters[tool] = self._body(tool)
+        return self.cutters[tool]
+
+    def _body(self, tool: int) -> Cutter:
+        bodies = [n for n in self.data.of("RESOURCE_PROPERTY")
+                  if self.data.ref(n, "RESOURCE_PROPERTY", "resource") == tool
+                  and self._word(n, "RESOURCE_PROPERTY", "name", ("tool body",)) == "tool body"]
+        shown_by = [self.data.ref(n, "RESOURCE_PROPERTY_REPRESENTATION", "representation")
+                    for n in self.data.of("RESOURCE_PROPERTY_REPRESENTATION")
+                    if self.data.ref(n, "RESOURCE_PROPERTY_REPRESENTATION", "property") in bodies]
+        if len(shown_by) != 1:
+            raise self.file.error(tool, f"has {len(shown_by)} representations of its 'tool body', one is due")
+        self.data.get(shown_by[0], "MACHINING_TOOL_BODY_REPRESENTATION")
+        sizes: dict[str, float] = {}
+        for item in self._items(shown_by[0]):
+            name = self._item_name(item)
+            if name == "hand of cut":
+                self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
+                self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", ("right", "neutral"))
+            elif name != "coolant through tool":
+                dimensions, sizes[name] = self._measured(item)
+                wanted = {} if name == "number of effective teeth" else {"length": 1.0}
+                if dimensions != wanted:
+                    raise self.file.error(item, f"'{name}' is in a unit of {dimensions or 'nothing'}, "
+                                                f"{wanted or 'nothing'} is due")
+        kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
+        diameter = sizes.get("effective cutting diameter", 0.0)
+        if not diameter > 0.0:
+            raise self.file.error(shown_by[0], ", items: an 'effective cutting diameter' over 0 expected")
+        given = sizes.get("edge radius")
+        corner = 0.5 * diameter if kind == "ball" else 0.0 if kind == "flat" else given
+        if corner is None or not 0.0 <= corner <= 0.5 * diameter + 1e-9 or abs((given or corner) - corner) > 1e-6:
+            raise self.file.error(shown_by[0], f", items: an 'edge radius' that suits a {kind} of {diameter:g} mm "
+                                               f"expected, not {given}")
+        name = str(self.data.one(tool, "MACHINING_TOOL", "name"))
+        return Cutter(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
+                      sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool)
+
+    def _item_name(self, item: int) -> str:
+        """What an item of a tool body says it is."""
+        records = self.file.records(item)
+        entity, values = next((r for r in records if r[0] == "REPRESENTATION_ITEM"), records[0])
+        if not values or not isinstance(values[0], str):
+            raise self.file.error(item, f"is to be an item with a name, not {entity}")
+        if values[0] not in _ITEMS:
+            raise self.file.error(item, f", name: one of {', '.join(map(repr, _ITEMS))} expected, not {values[0]!r}")
+        return values[0]
+
+    def _security_plane(self) -> tuple[F64, F64] | None:
+        """Point, mm, and unit normal of the plane of the setup; None where there is no setup."""
+        planes = []
+        for n in self.data.of("PROPERTY_DEFINITION_REPRESENTATION"):
+            prop = self.data.ref(n, "PROPERTY_DEFINITION_REPRESENTATION", "definition")
+            if self.data.one(prop, "PROPERTY_DEFINITION", "name") == "security plane":
+                planes.append(self.data.ref(n, "PROPERTY_DEFINITION_REPRESENTATION", "used_representation"))
+        setups = self.data.of("MACHINING_SETUP")
+        if len(planes) > 1 or len(planes) < len(setups):
+            at = setups[0] if setups else planes[0]
+            raise self.file.error(at, f"{len(planes)} representations of a 'security plane', one a setup is due")
+        if not planes:
+            return None
+        item = self._items(planes[0])[0]
+        self.data.get(item, "PLANE")
+        place = self.data.placement(self.data.ref(item, "PLANE", "position"), self._scale(planes[0]))
+        return place[:3, 3], place[:3, 2]
+
+    def _placements(self) -> dict[int, F64]:
+        """(4, 4) by feature process: from the feature to the workpiece, where it is said."""
+        process_of = {n: self.data.ref(n, "PROPERTY_PROCESS", "chosen_method")
+                      for n in self.data.of("PROPERTY_PROCESS")}
+        feature_of = {process_of[self.data.ref(n, "PROCESS_PROPERTY_ASSOCIATION", "process")]:
+                      self.data.ref(n, "PROCESS_PROPERTY_ASSOCIATION", "property_or_shape")
+                      for n in self.data.of("PROCESS_PROPERTY_ASSOCIATION")}
+        placed: dict[int, F64] = {}
+        for n in self.data.of("SHAPE_DEFINITION_REPRESENTATION"):
+            shape = self.data.ref(n, "SHAPE_DEFINITION_REPRESENTATION", "definition")
+            owner = self.data.ref(shape, "PRODUCT_DEFINITION_SHAPE", "definition")
+            representation = self.data.ref(n, "SHAPE_DEFINITION_REPRESENTATION", "used_representation")
+            if "INSTANCED_FEATURE" not in self.file.names(owner):
+                continue
+            for item in self._items(representation):
+                if "AXIS2_PLACEMENT_3D" in self.file.names(item):
+                    placed[owner] = self.data.placement(item, self._scale(representation))
+        for feature in feature_of.values():
+            if feature not in placed:
+                raise self.file.error(feature, "has no placement: a SHAPE_DEFINITION_REPRESENTATION with an "
+                                               "AXIS2_PLACEMENT_3D is due")
+        return {process: placed[feature] for process, feature in feature_of.items()}
+
+
+__all__ = ["SCHEMAS", "read_aim"]

@@ -1,0 +1,363 @@
+"""STEP-NC as ISO 14649 (MACHINING_SCHEMA, MILLING_SCHEMA), read: what its main workplan makes the tool do.
+
+Lengths are mm, feeds m/s, spindle speeds 1/s, positive counter-clockwise, as ISO 14649-10 has it where nothing is said.
+Paths are in the system of their feature, that in the workpiece, and this as the setup places it. What the reader has no
+motion for (strategies without a path, contact trajectories, splines, branches) is refused by instance: nothing is
+passed over that could move the tool.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from geometry.errors import ProgramError
+from geometry.mesh import F64
+from verify.attributes import (
+    FLAG,
+    LOGICAL,
+    Checked,
+    Many,
+    Maybe,
+    Named,
+    OneOf,
+    Real,
+    Table,
+    Text,
+    To,
+    Whole,
+    attributes,
+)
+from verify.course import Course, Cutter
+from verify.part21 import Part21, Ref, Typed, Value
+
+SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
+MM_MIN = 60_000.0  # of one m/s
+RPM = 60.0  # of one 1/s
+_EXECUTABLES = ("WORKPLAN", "MACHINING_WORKINGSTEP", "RAPID_MOVEMENT", "RETURN_HOME", "DISPLAY_MESSAGE",
+                "PROGRAM_STOP", "OPTIONAL_STOP", "SET_MARK")
+_CUTTERS = ("BALL_ENDMILL", "BULLNOSE_ENDMILL", "ENDMILL")
+_AXES = ("THREE_AXES", "THREE_AXES_TILTED_TOOL", "FIVE_AXES_VAR_TILT_YAW")
+_TYPES = OneOf(("APPROACH", "LIFT", "CONNECT", "NON_CONTACT", "CONTACT", "TRAJECTORY_PATH"))
+_SPEED = Named((("SPEED_NAME", OneOf(("RAPID",))),))
+_PATH = {"its_priority": FLAG, "its_type": _TYPES, "its_speed": Maybe(_SPEED),
+         "its_technology": Maybe(To(("MILLING_TECHNOLOGY",))),
+         "its_machine_functions": Maybe(To(("MILLING_MACHINE_FUNCTIONS",)))}
+_FEATURE = {"its_id": Text(), "its_workpiece": To(("WORKPIECE",)),
+            "its_operations": Many(To(("FREEFORM_OPERATION",))),
+            "feature_placement": Maybe(To(("AXIS2_PLACEMENT_3D",)))}
+_STRATEGY = {"pathmode": OneOf(("FORWARD", "ZIGZAG")), "cutmode": OneOf(("CLIMB", "CONVENTIONAL")),
+             "its_milling_tolerances": To(("TOLERANCES",)), "stepover": Maybe(Real(0.0))}
+_BLADE = {"dimension": To(("MILLING_TOOL_DIMENSION",)), "number_of_teeth": Maybe(Whole()),
+          "hand_of_cut": Maybe(OneOf(("LEFT", "RIGHT", "NEUTRAL"))), "coolant_through_tool": Maybe(FLAG),
+          "pilot_length": Maybe(Real())}
+_NET = {"name": Text(), "u_degree": Whole(), "v_degree": Whole(),
+        "control_points_list": Many(Many(To(("CARTESIAN_POINT",)), 2), 2),
+        "surface_form": OneOf(("PLANE_SURF", "CYLINDRICAL_SURF", "CONICAL_SURF", "SPHERICAL_SURF", "TOROIDAL_SURF",
+                               "SURF_OF_REVOLUTION", "RULED_SURF", "GENERALISED_CONE", "QUADRIC_SURF",
+                               "SURF_OF_LINEAR_EXTRUSION", "UNSPECIFIED")),
+        "u_closed": LOGICAL, "v_closed": LOGICAL, "self_intersect": LOGICAL}
+_KNOTS = {"u_multiplicities": Many(Whole(), 2), "v_multiplicities": Many(Whole(), 2), "u_knots": Many(Real(), 2),
+          "v_knots": Many(Real(), 2),
+          "knot_spec": OneOf(("UNIFORM_KNOTS", "QUASI_UNIFORM_KNOTS", "PIECEWISE_BEZIER_KNOTS", "UNSPECIFIED"))}
+
+TABLE: Table = {
+    "PROJECT": attributes(its_id=Text(), main_workplan=To(("WORKPLAN",)), its_workpieces=Many(To(("WORKPIECE",))),
+                          its_owner=Maybe(To()), its_release=Maybe(To()), its_status=Maybe(To())),
+    "WORKPLAN": attributes(its_id=Text(), its_elements=Many(To(_EXECUTABLES)), its_channel=Maybe(To(("CHANNEL",))),
+                           its_setup=Maybe(To(("SETUP",))), its_effect=Maybe(To())),
+    "CHANNEL": attributes(its_id=Text()),
+    "MACHINING_WORKINGSTEP": attributes(its_id=Text(), its_secplane=To(("PLANE",)), its_feature=To(),
+                                        its_operation=To(("FREEFORM_OPERATION",)), its_effect=Maybe(To())),
+    "RAPID_MOVEMENT": attributes(its_id=Text(), its_secplane=To(("PLANE",)), its_toolpath=Maybe(To(("TOOLPATH_LIST",))),
+                                 its_tool_direction=Maybe(To(_AXES))),
+    "RETURN_HOME": attributes(its_id=Text(), its_secplane=To(("PLANE",)), its_toolpath=Maybe(To(("TOOLPATH_LIST",))),
+                              its_tool_direction=Maybe(To(_AXES))),
+    "DISPLAY_MESSAGE": attributes(its_id=Text(), its_text=Text()),
+    "PROGRAM_STOP": attributes(its_id=Text()),
+    "OPTIONAL_STOP": attributes(its_id=Text()),
+    "SET_MARK": attributes(its_id=Text()),
+    "SETUP": attributes(its_id=Text(), its_origin=Maybe(To(("AXIS2_PLACEMENT_3D",))), its_secplane=To(("PLANE",)),
+                        its_workpiece_setup=Many(To(("WORKPIECE_SETUP",)))),
+    "WORKPIECE_SETUP": attributes(its_workpiece=To(("WORKPIECE",)), its_origin=To(("AXIS2_PLACEMENT_3D",)),
+                                  its_offset=Maybe(To()), its_restricted_area=Maybe(To()),
+                                  its_instructions=Many(To(("SETUP_INSTRUCTION",)))),
+    "SETUP_INSTRUCTION": attributes(description=Maybe(Text()), external_document=Maybe(Text())),
+    "WORKPIECE": attributes(its_id=Text(), its_material=Maybe(To(("MATERIAL",))), global_tolerance=Maybe(Real()),
+                            its_rawpiece=Maybe(To(("WORKPIECE",))), its_geometry=Maybe(To()),
+                            its_bounding_geometry=Maybe(To()), clamping_positions=Many(To(("CARTESIAN_POINT",)))),
+    "MATERIAL": attributes(standard_identifier=Text(), material_identifier=Text(), material_property=Many(To())),
+    "BLOCK": attributes(name=Text(), position=To(("AXIS2_PLACEMENT_3D",)), x=Real(0.0), y=Real(0.0), z=Real(0.0)),
+    "RIGHT_CIRCULAR_CYLINDER": attributes(name=Text(), position=To(("AXIS1_PLACEMENT",)), height=Real(0.0),
+                                          radius=Real(0.0)),
+    "REGION_PROJECTION": attributes(**_FEATURE, proj_curve=To(), proj_dir=To(("DIRECTION",)),
+                                    depth=To(("TOLERANCED_LENGTH_MEASURE",))),
+    "REGION_SURFACE_LIST": attributes(**_FEATURE, surface_list=Many(To(), 1)),
+    "TOPOLOGICAL_REGION": attributes(**_FEATURE, name=Text(), cfs_faces=Many(To(), 1)),
+    "TOOLPATH_FEATURE": attributes(**_FEATURE, depth=To(("PLANE",))),
+    "TOLERANCED_LENGTH_MEASURE": attributes(theoretical_size=Real(), implicit_tolerance=To()),
+    "PLUS_MINUS_VALUE": attributes(upper_limit=Real(), lower_limit=Real(), significant_digits=Whole()),
+    "BEZIER_SURFACE": attributes(**_NET),
+    "FREEFORM_OPERATION": attributes(
+        its_toolpath=Maybe(To(("TOOLPATH_LIST",))), its_tool_direction=Maybe(To(_AXES)), its_id=Text(),
+        retract_plane=Maybe(Real()), start_point=Maybe(To(("CARTESIAN_POINT",))),
+        its_tool=To(("MILLING_CUTTING_TOOL",)), its_technology=To(("MILLING_TECHNOLOGY",)),
+        its_machine_functions=To(("MILLING_MACHINE_FUNCTIONS",)), overcut_length=Maybe(Real()), approach=Maybe(To()),
+        retract=Maybe(To()), its_machining_strategy=Maybe(To())),
+    "TOOLPATH_LIST": attributes(its_list=Many(To(("CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")), 1)),
+    "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(("POLYLINE",)),
+                                             its_toolaxis=Maybe(To(("POLYLINE",))),
+                                             surface_normal=Maybe(To(("POLYLINE",)))),
+    "FEEDSTOP": attributes(**_PATH, dwell=Real()),
+    "MILLING_TECHNOLOGY": attributes(
+        feedrate=Maybe(Real(0.0)), feedrate_reference=OneOf(("TCP", "CCP")), cutspeed=Maybe(Real(0.0)),
+        spindle=Maybe(Real()), feedrate_per_tooth=Maybe(Real(0.0)), synchronize_spindle_with_feed=FLAG,
+        inhibit_feedrate_override=FLAG, inhibit_spindle_override=FLAG, its_adaptive_control=Maybe(To())),
+    "MILLING_MACHINE_FUNCTIONS": attributes(
+        coolant=FLAG, coolant_pressure=Maybe(Real()), mist=Maybe(FLAG), through_spindle_coolant=FLAG,
+        through_pressure=Maybe(Real()), axis_clamping=Many(Text()), chip_removal=FLAG,
+        oriented_spindle_stop=Maybe(To(("DIRECTION",))), its_process_model=Maybe(To()), other_functions=Many(To())),
+    "MILLING_CUTTING_TOOL": attributes(
+        its_id=Text(), its_tool_body=To(_CUTTERS), its_cutting_edge=Many(To(("CUTTING_COMPONENT",)), 1),
+        overall_assembly_length=Maybe(Real(0.0)), direction_for_spindle_orientation=Maybe(To(("DIRECTION",))),
+        tool_holder_diameter_for_spindle_orientation=Maybe(Real())),
+    **{name: attributes(**_BLADE) for name in _CUTTERS},
+    "MILLING_TOOL_DIMENSION": attributes(
+        diameter=Real(0.0), tool_tip_half_angle=Maybe(Real()), tool_circumference_angle=Maybe(Real()),
+        cutting_edge_length=Maybe(Real(0.0)), edge_radius=Maybe(Real(-1e-9)), edge_center_vertical=Maybe(Real()),
+        edge_center_horizontal=Maybe(Real())),
+    "CUTTING_COMPONENT": attributes(
+        tool_offset_length=Real(), its_material=Maybe(To(("MATERIAL",))), technological_data=Maybe(To()),
+        expected_tool_life=Maybe(Real(0.0)), its_technology=Maybe(To(("MILLING_TECHNOLOGY",)))),
+    "TOLERANCES": attributes(chordal_tolerance=Real(), scallop_height=Real()),
+    "UV_STRATEGY": attributes(**_STRATEGY, forward_direction=To(("DIRECTION",)),
+                              sideward_direction=To(("DIRECTION",))),
+    "PLANE_CL_STRATEGY": attributes(**_STRATEGY, its_plane_normal=To(("DIRECTION",))),
+    "PLANE_CC_STRATEGY": attributes(**_STRATEGY, its_plane_normal=To(("DIRECTION",))),
+    "LEADING_LINE_STRATEGY": attributes(**_STRATEGY, its_line=To()),
+    "THREE_AXES": (),
+    "THREE_AXES_TILTED_TOOL": attributes(its_tool_direction=To(("DIRECTION",))),
+    "FIVE_AXES_VAR_TILT_YAW": (),
+    "PLANE": attributes(name=Text(), position=To(("AXIS2_PLACEMENT_3D",))),
+    "AXIS2_PLACEMENT_3D": attributes(name=Text(), location=To(("CARTESIAN_POINT",)), axis=Maybe(To(("DIRECTION",))),
+                                     ref_direction=Maybe(To(("DIRECTION",)))),
+    "AXIS1_PLACEMENT": attributes(name=Text(), location=To(("CARTESIAN_POINT",)), axis=Maybe(To(("DIRECTION",)))),
+    "DIRECTION": attributes(name=Text(), direction_ratios=Many(Real(), 2, 3)),
+    "CARTESIAN_POINT": attributes(name=Text(), coordinates=Many(Real(), 3, 3)),
+    "POLYLINE": attributes(name=Text(), points=Many(To(("CARTESIAN_POINT",)), 2)),
+    "B_SPLINE_SURFACE_WITH_KNOTS": attributes(**_NET, **_KNOTS),
+}
+RECORDS: Table = {
+    "B_SPLINE_SURFACE": attributes(**{k: v for k, v in _NET.items() if k != "name"}),
+    "B_SPLINE_SURFACE_WITH_KNOTS": attributes(**_KNOTS),
+    "RATIONAL_B_SPLINE_SURFACE": attributes(weights_data=Many(Many(Real(0.0), 2), 2)),
+    "REPRESENTATION_ITEM": attributes(name=Text()),
+}
+
+
+def read_arm(file: Part21, course: Course) -> None:
+    """Tell a course what the main workplan of a file makes the tool do.
+
+    Raises
+    ------
+    ProgramError
+        An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
+        read.
+    """
+    _Arm(file, course).run()
+
+
+class _Arm:
+    """One reading: where workpieces stand, and what stands in force."""
+
+    def __init__(self, file: Part21, course: Course) -> None:
+        self.file, self.course = file, course
+        self.data = Checked(file, TABLE, RECORDS)
+        self.place = np.eye(4)
+        self.elements: list[tuple[int, F64]] = []
+        self.seen: set[int] = set()
+
+    def run(self) -> None:
+        projects = self.data.of("PROJECT")
+        if len(projects) != 1:
+            raise ProgramError(f"{self.file.name}: one PROJECT expected, not {len(projects)}",
+                               subjects=tuple(f"#{n}" for n in projects), measured=len(projects), limit=1,
+                               remedy="send one project a file")
+        self._flatten(self.data.ref(projects[0], "PROJECT", "main_workplan"), np.eye(4))
+        for k, (number, place) in enumerate(self.elements):
+            self.place = place
+            self._execute(k, number)
+
+    def _flatten(self, number: int, place: F64) -> None:
+        """Note the elements of a workplan, those of workplans in it too, with the frame their workpiece is in."""
+        if number in self.seen:
+            raise self.file.error(number, "stands in two places of the workplans, or in itself")
+        self.seen.add(number)
+        if self.data.get(number, *_EXECUTABLES)[0] != "WORKPLAN":
+            self.elements.append((number, place))
+            return
+        setup = self.data.maybe(number, "WORKPLAN", "its_setup")
+        for element in self.data.refs(number, "WORKPLAN", "its_elements"):
+            self._flatten(element, place if setup is None else self._setup(setup))
+
+    def _setup(self, number: int) -> F64:
+        """(4, 4): from the workpiece to the setup frame."""
+        holdings = self.data.refs(number, "SETUP", "its_workpiece_setup")
+        if not holdings:
+            return np.eye(4)
+        if len(holdings) > 1:
+            raise self.file.error(number, ", its_workpiece_setup: one workpiece expected")
+        if self.data.one(holdings[0], "WORKPIECE_SETUP", "its_offset") is not None:
+            raise self.file.error(holdings[0], ", its_offset: an offset is not read, $ expected")
+        return self.data.placement(self.data.ref(holdings[0], "WORKPIECE_SETUP", "its_origin"))
+
+    def _execute(self, place: int, number: int) -> None:
+        entity, line = self.data.get(number, *_EXECUTABLES)[0], self.file.line(number)
+        if entity in ("PROGRAM_STOP", "OPTIONAL_STOP"):
+            self.course.stop("program stop", line)
+        elif entity == "RETURN_HOME":
+            self.course.stop("return to home", line)
+        elif entity == "RAPID_MOVEMENT":
+            self._rapid(place, number, line)
+        elif entity == "MACHINING_WORKINGSTEP":
+            feature = self._feature(self.data.ref(number, entity, "its_feature"))
+            self._operation(self.data.ref(number, entity, "its_operation"), feature)
+
+    def _rapid(self, place: int, number: int, line: int) -> None:
+        """One without a path brings the tool of the next workingstep over the security plane to where that begins."""
+        entity = "RAPID_MOVEMENT"
+        paths = self.data.maybe(number, entity, "its_toolpath")
+        if paths is not None:
+            self._paths(paths, np.eye(4), self._direction(number, entity), None, rapid=True)
+            return
+        point, normal = self._plane(self.data.ref(number, entity, "its_secplane"))
+        self.course.over(point, normal, line)
+        for later, _ in self.elements[place + 1:]:
+            if self.data.get(later, *_EXECUTABLES)[0] == "MACHINING_WORKINGSTEP":
+                operation = self.data.ref(later, "MACHINING_WORKINGSTEP", "its_operation")
+                self._take(self.data.ref(operation, "FREEFORM_OPERATION", "its_tool"), line)
+                return
+
+    def _take(self, tool: int, line: int) -> None:
+        self.course.take(self._cutter(tool), line)
+
+    def _feature(self, number: int) -> F64:
+        """(4, 4): from the feature to the workpiece."""
+        for _, values in self.file.records(number)[:1]:
+            placement: Value = values[3] if len(values) > 3 else None
+            if isinstance(placement, Ref):
+                return self.data.placement(int(placement))
+            if placement is not None:
+                raise self.file.error(number, ", feature_placement: AXIS2_PLACEMENT_3D or $ expected")
+        return np.eye(4)
+
+    def _operation(self, number: int, place: F64) -> None:
+        entity = "FREEFORM_OPERATION"
+        paths = self.data.maybe(number, entity, "its_toolpath")
+        if paths is None:
+            raise self.file.error(number, ", its_toolpath: TOOLPATH_LIST expected; strategies without one are not read")
+        for attribute in ("approach", "retract"):
+            if self.data.one(number, entity, attribute) is not None:
+                raise self.file.error(number, f", {attribute}: $ expected, as the tool path holds it")
+        self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
+        technology = self.data.ref(number, entity, "its_technology")
+        self._paths(paths, place, self._direction(number, entity), technology, rapid=False)
+
+    def _direction(self, number: int, entity: str) -> F64 | None:
+        """(3,): the tool axis where paths have none; None where they must."""
+        target = self.data.maybe(number, entity, "its_tool_direction")
+        if target is None:
+            return None
+        kind = self.data.get(target, *_AXES)[0]
+        if kind == "THREE_AXES":
+            return np.array([0.0, 0.0, 1.0])
+        if kind == "THREE_AXES_TILTED_TOOL":
+            return self.data.vector(self.data.ref(target, kind, "its_tool_direction"))
+        return None
+
+    def _paths(self, number: int, place: F64, direction: F64 | None, technology: int | None, *, rapid: bool) -> None:
+        for path in self.data.refs(number, "TOOLPATH_LIST", "its_list"):
+            if self.data.get(path, "CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")[0] == "FEEDSTOP":
+                self.course.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
+            else:
+                self._trajectory(path, place, direction, technology, rapid)
+
+    def _trajectory(self, number: int, place: F64, direction: F64 | None, technology: int | None, rapid: bool) -> None:
+        entity = "CUTTER_LOCATION_TRAJECTORY"
+        tips, lines = self.data.curve(self.data.ref(number, entity, "basiccurve"))
+        leaning = self.data.maybe(number, entity, "its_toolaxis")
+        if leaning is not None:
+            axes, _ = self.data.curve(leaning)
+            axes = self.data.unit_axes(number, "its_toolaxis", axes, len(tips))
+        elif direction is None:
+            raise self.file.error(number, ", its_toolaxis: POLYLINE expected, as nothing else says how the tool stands")
+        else:
+            axes = np.tile(direction, (len(tips), 1))
+        if self.data.one(number, entity, "its_direction") == "F":
+            tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
+        fast = rapid or isinstance(self.data.one(number, entity, "its_speed"), Typed)
+        own = self.data.maybe(number, entity, "its_technology")
+        feed, speed = self._rates(number, own if own is not None else technology, fast)
+        turn = self.place @ place
+        self.course.follow(tips @ turn[:3, :3].T + turn[:3, 3], axes @ turn[:3, :3].T, rapid=fast, feed=feed,
+                           speed=speed, lines=lines)
+
+    def _rates(self, path: int, technology: int | None, rapid: bool) -> tuple[float, float]:
+        """mm/min and 1/min clockwise."""
+        if technology is None:
+            if rapid:
+                return math.nan, 0.0
+            raise self.file.error(path, ", its_technology: MILLING_TECHNOLOGY expected")
+        entity = "MILLING_TECHNOLOGY"
+        feed, spindle = (self.data.real(technology, entity, a) for a in ("feedrate", "spindle"))
+        if feed is None and not rapid:
+            raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds a tooth are not read")
+        if spindle is None:
+            raise self.file.error(technology, ", spindle: a real number, 1/s, expected; cutting speeds are not read")
+        if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
+            raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
+        return (math.nan if feed is None else feed * MM_MIN), -RPM * spindle
+
+    def _cutter(self, number: int) -> Cutter:
+        name = str(self.data.one(number, "MILLING_CUTTING_TOOL", "its_id"))
+        body = self.data.ref(number, "MILLING_CUTTING_TOOL", "its_tool_body")
+        kind = self.data.get(body, *_CUTTERS)[0]
+        if self.data.one(body, kind, "hand_of_cut") == "LEFT":
+            raise self.file.error(body, ", hand_of_cut: .RIGHT. expected; left-hand cutters are not read")
+        size = self.data.ref(body, kind, "dimension")
+        wide, edge, long = (self.data.real(size, "MILLING_TOOL_DIMENSION", a)
+                            for a in ("diameter", "edge_radius", "cutting_edge_length"))
+        if wide is None:
+            raise self.file.error(size, ", diameter: a real number expected")
+        for angle in ("tool_tip_half_angle", "tool_circumference_angle"):
+            if self.data.one(size, "MILLING_TOOL_DIMENSION", angle) not in (None, 0.0):
+                raise self.file.error(size, f", {angle}: $ or 0. expected; tapered cutters are not read")
+        corner = 0.5 * wide if kind == "BALL_ENDMILL" else edge or 0.0
+        if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
+            raise self.file.error(size, f", edge_radius: {0.5 * wide:g} expected, half of the diameter, or less on a "
+                                        f"bull nose, not {edge}")
+        return Cutter(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
+                      self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number)
+
+    def _plane(self, number: int) -> tuple[F64, F64]:
+        """Point and unit normal of a security plane in the setup frame, mm."""
+        place = self.place @ self.data.placement(self.data.ref(number, "PLANE", "position"))
+        return place[:3, 3], place[:3, 2]
+
+
+def tool_number(name: str) -> int | None:
+    """The T number a tool's id opens with, 'T7: ball' or '7'; None where it does not."""
+    found = re.match(r"\s*T?([0-9]{1,6})(?![0-9A-Za-z.])", name)
+    return int(found.group(1)) if found else None
+
+
+def shape_of(diameter: float, corner: float) -> str:
+    """'ball', 'bull' or 'flat' by diameter and corner radius, mm."""
+    if corner <= 0.0:
+        return "flat"
+    return "ball" if corner >= 0.5 * diameter - 1e-6 else "bull"
+
+
+__all__ = ["SCHEMAS", "read_arm", "shape_of", "tool_number"]
