@@ -45,11 +45,12 @@ def difference(proved: Program, other: Program) -> str:
                 f"{proved.blend:g} mm")
     mine, yours = _moving(proved), _moving(other)
     n = min(len(mine), len(yours))
-    for what, off in _compared(proved, other, mine[:n], yours[:n]):
-        if off.any():
-            k = int(np.flatnonzero(off)[0])
-            return (f"line {other.line[yours[k]]} of {other.name} and line {proved.line[mine[k]]} of {proved.name} "
-                    f"differ in {what}")
+    compared = _compared(proved, other, mine[:n], yours[:n])
+    off = np.flatnonzero(np.any([unlike for _, unlike in compared], axis=0))
+    if len(off):
+        k = int(off[0])
+        return (f"line {other.line[yours[k]]} of {other.name} and line {proved.line[mine[k]]} of {proved.name} "
+                f"differ in {', '.join(what for what, unlike in compared if unlike[k])}")
     if len(mine) != len(yours):
         more = proved if len(mine) > n else other
         row = int((mine if len(mine) > n else yours)[n])
@@ -84,8 +85,9 @@ def _compared(a: Program, b: Program, i: NDArray[np.int64],
         out.append((what, far(one, other, AXIS)))
     if a.poses is not None and b.poses is not None:
         out.append(("where the rotary axes stand", far(a.poses.end_turn, b.poses.end_turn, AXIS)))
-    # what a block of joints takes is rounded with them: 1e-6 of a minute is far below what a feed word says
-    took = ~(np.isclose(a.minutes[i], b.minutes[j], rtol=1e-6, atol=1e-9, equal_nan=True))
+    # what a block takes is rounded with its places: to what the tip goes in TIP / 100 at least
+    slack = 1e-9 + 0.01 * TIP / np.maximum(np.nan_to_num(a.feed[i], nan=1.0), 1.0)
+    took = ~((np.abs(a.minutes[i] - b.minutes[j]) <= slack) | (np.isnan(a.minutes[i]) & np.isnan(b.minutes[j])))
     return [*out, ("the feed", unlike(a.feed, b.feed)), ("the time they take", took),
             ("the speed of the spindle", unlike(a.speed, b.speed)), ("the coolant", a.coolant[i] != b.coolant[j])]
 

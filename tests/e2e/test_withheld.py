@@ -53,10 +53,10 @@ def test_an_older_proved_program_is_gone_when_the_job_is_no_longer_proved(part, 
     (out / "program.linuxcnc.ngc.part").write_text(proved)  # of one that was cut off while it wrote
     (out / "program.mine.txt").write_text("kept")
     monkeypatch.syspath_prepend(str(FAKES))
-    monkeypatch.setattr(programs, "write_linuxcnc", programs.write_linuxcnc)
+    monkeypatch.setattr(programs, "write_program", programs.write_program)
     import gouging_chain
 
-    monkeypatch.setattr(programs, "write_linuxcnc", gouging_chain.gouging)
+    monkeypatch.setattr(programs, "write_program", gouging_chain.gouging)
     got = call(part, tmp_path)
     assert got.exit_code == 3
     report = json.loads(got.stdout)
