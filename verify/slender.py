@@ -105,7 +105,7 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
     row, far, beyond, points = row[one], far[one], beyond[one], points[one]
     normals = samples.normals[row]
     free, limit = _followed(tree, points, normals, far, ratio, skin)
-    free &= _high(tree, points, normals, far, ratio)
+    free &= _high(tree, points, normals, limit, 1.0)
     if not free.any():
         return _none()
     wall = _sheets(points - 0.5 * far[:, None] * normals, normals, np.maximum(2.5 * cell, far))
@@ -113,10 +113,10 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
     return out.only(np.isin(wall, np.unique(wall[free])))
 
 
-def _high(tree: TriangleTree, points: F64, normals: F64, thickness: F64, ratio: float) -> BOOL:
-    """(n,) bool: places farther above the lowest of the part than a sheet there may be free; others its foot holds."""
+def _high(tree: TriangleTree, points: F64, normals: F64, length: F64, times: float) -> BOOL:
+    """(n,) bool: places from which ``times`` a length, mm, down along the sheet ends above the lowest of the part."""
     lean = np.sqrt(1.0 - normals[:, 2] ** 2)
-    return np.asarray(thickness * ratio * lean < points[:, 2] - tree.mesh.bounds[0, 2])
+    return np.asarray(times * length * lean < points[:, 2] - tree.mesh.bounds[0, 2])
 
 
 def _none() -> ThinWalls:

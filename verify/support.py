@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64
@@ -49,6 +50,10 @@ class Times:
     done: INT
     mover: INT
 
+    def part(self, rows: slice) -> Times:
+        """Of some of the places."""
+        return Times(self.gone[rows], self.done[rows], self.mover[rows])
+
 
 def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody],
               source: Source, zone_ids: Sequence[str], threads: int = 2, report: Report = silent
@@ -69,9 +74,9 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
     walls = thin_walls(tree, scored.samples, setup.free_ratio)
     if not len(walls) or not moves.feed.any():
         return Support(0, 0, 0.0, setup.free_ratio, 0), []
-    times = [_times(p, n, walls.thickness, tree.mesh.bounds, setup, moves, tools, threads,
-                    lambda f, k=k: report(0.5 * (k + f)))  # type: ignore[misc]
-             for k, (p, n) in enumerate(((walls.points, walls.normals), (walls.across, walls.beyond)))]
+    both = _times(np.concatenate([walls.points, walls.across]), np.concatenate([walls.normals, walls.beyond]),
+                  np.tile(walls.thickness, 2), tree.mesh.bounds, setup, moves, tools, threads, report)
+    times = [both.part(slice(0, len(walls))), both.part(slice(len(walls), None))]
     free, judged = _free_ways(walls, *times)
     over = np.flatnonzero(judged & (free > walls.limit + ROOM * walls.spacing))
     ratio = np.where(judged, free / walls.limit, 0.0) * setup.free_ratio
@@ -104,7 +109,7 @@ def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofS
             cut = by >= 0
             fell = asked[(gone[asked] == NEVER) & cut & (after < holds[asked] - RAY_ERROR)]
             gone[fell] = k
-            # one that is never cut that far was done with the last cut that took more off it than is left elsewhere
+            # one that is never cut that far was done with the last cut that took more off it than is let pass elsewhere
             ends = cut & (done[asked] != -1) & (told[asked] > enough)
             ends &= (after <= enough) | (told[asked] - after > rest)
             done[asked[ends]], mover[asked[ends]], told[asked[ends]] = k, rows[by[ends]], after[ends]
@@ -151,7 +156,7 @@ def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray
         # what is held in the finished part is so within its own limit
         held = np.where(walls.free[own], np.inf, walls.limit[own])
         for rows in np.array_split(asked, -(-len(asked) // BLOCK)):
-            way = np.linalg.norm(middle[rows][:, None] - middle[own], axis=2)
+            way = cdist(middle[rows], middle[own])
             by_stock = np.where(stands[own] >= done[rows][:, None], way, np.inf).min(axis=1)
             free[rows] = np.minimum(by_stock, (way + held).min(axis=1))
     # a sheet that nothing holds anywhere, as one that hangs in the stock

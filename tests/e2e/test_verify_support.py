@@ -29,6 +29,7 @@ from verify.model import FindingKind, ScoredSamples
 from verify.prove import Proof, prove
 from verify.removal import Moves
 from verify.support import supported
+from verify.toolaxes import ToolAxes
 
 PART = wall_part()
 SCORED = scored(PART)
@@ -133,12 +134,17 @@ def moves(cuts, angle: float = 0.0, parts: int = 1) -> Moves:
     return Moves(start, end, np.ones(n, np.bool_), np.zeros(n, np.int32))
 
 
-def judged(cuts, angle: float = 0.0, parts: int = 1, density: float = 60.0):
+def judged(cuts, angle: float = 0.0, parts: int = 1, density: float = 60.0, axes=None, lean=None):
     c, s = np.cos(angle), np.sin(angle)
     m = PART.mesh
-    mesh = type(m)(m.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), m.faces, m.face_ids)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ (np.eye(3) if lean is None else lean)
+    mesh = type(m)(m.vertices @ turn, m.faces, m.face_ids)
     samples = sample_surface(mesh, density, seed=3)
     way = moves(cuts, angle, parts)
+    if lean is not None:
+        way = replace(way, start=way.start @ lean, end=way.end @ lean)
+    if axes is not None:
+        way = replace(way, axes=ToolAxes.between(axes, axes))
     none = np.zeros(len(way), np.int32)
     asked, source = ScoredSamples(samples, np.zeros(len(samples), np.int32)), Source(("p",), none, none, none)
     setup = replace(SETUP, stock_kind="part_offset", margin=3.0)
@@ -152,3 +158,20 @@ def test_it_hangs_neither_on_the_frame_nor_on_how_fine_moves_and_samples_are(cut
         assert other.walls == 1 and bool(other.over) == bool(usual.over)
         assert other.most == pytest.approx(usual.most, abs=0.8)
         assert other.over / other.places == pytest.approx(usual.over / usual.places, abs=0.03)
+
+
+def test_tools_of_which_axes_are_known_are_judged_alike():
+    """The kernels of leaning tools, with an axis that stands up."""
+    plain = judged(in_turn(7.0))
+    axes = np.tile([0.0, 0.0, 1.0], (len(in_turn(7.0)), 1))
+    assert judged(in_turn(7.0), axes=axes) == plain
+
+
+@pytest.mark.parametrize("order", [in_turn(2.0), [*whole("left"), *whole("right")]])
+def test_a_leaning_wall_is_judged_along_itself(order):
+    """Wall and tool lean by 12 degrees about Y; stock and order are the same."""
+    lean = np.radians(12.0)
+    turn = np.array([[np.cos(lean), 0.0, -np.sin(lean)], [0.0, 1.0, 0.0], [np.sin(lean), 0.0, np.cos(lean)]])
+    plain, leaning = judged(order), judged(order, axes=np.tile(turn[2], (len(order), 1)), lean=turn)
+    assert leaning.walls == 1 and leaning.most == pytest.approx(plain.most, abs=1.0)
+    assert bool(leaning.over) == bool(plain.over)
