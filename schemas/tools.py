@@ -72,8 +72,9 @@ class Tool(WireModel):
     max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: no limit of "
                                                                        "the tool's own.")] = None
     max_engagement_deg: Annotated[Number | None, Field(
-        gt=0, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
-                                  "deeper than a twentieth of its radius; 180 is a slot. null: not limited.")] = None
+        ge=30, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
+                                   "deeper than a twentieth of its radius; 180 is a slot. No less than 30: the proof "
+                                   "tells angles apart by 11. null: not limited.")] = None
     life_min: Annotated[Number | None, Field(
         gt=0, le=1e6, description="Life in cut, min: plans ask for a fresh cutter before it ends, between two passes; "
                                   "null: not counted.")] = None
@@ -84,8 +85,9 @@ class Tool(WireModel):
         ge=0.1, le=1e6, description="Feed in cut, mm/min, of all its steps; null: from material, flutes and speed. No "
                                     "more than machine.max_feed_mm_min allows.")] = None
     plunge_feed_mm_min: Annotated[Number | None, Field(
-        ge=0.1, le=1e6, description="Feed of ways down into the stock, mm/min; null: 0.3 of the feed in cut. No more "
-                                    "than machine.max_feed_mm_min allows.")] = None
+        ge=0.1, le=1e6, description="How fast it may go down into the stock, mm/min: straight down, and on ramps "
+                                    "and helices as far as these go down; null: 0.3 of the feed in cut. No more than "
+                                    "machine.max_feed_mm_min allows.")] = None
     holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
                                                                             "no holder is checked.")] = []
 

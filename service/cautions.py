@@ -140,13 +140,13 @@ def lives_ended(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
         asked = [s.id for s in mine if s.fresh]
         if asked:
             total = float(sum(minutes_in_cut(s).sum() for s in mine))
-            message = (f"tool {tool.id} is in cut for {total:.1f} min and lasts for {tool.life_min:g}: the program "
+            message = (f"tool {tool.id} is in cut for {total:.3g} min and lasts for {tool.life_min:g}: the program "
                        f"stops for a fresh cutter before {', '.join(asked)}")
             out.append(Caution("tool_life", (tool.id, *asked), message, total, tool.life_min,
                                f"have {len(asked) + 1} cutters at hand"))
         for step, minutes in [(s.id, float(minutes_in_cut(s).sum())) for s in mine]:
             if minutes > tool.life_min * (1.0 + 1e-9):
-                message = f"{step} keeps tool {tool.id} in cut for {minutes:.1f} min (limit {tool.life_min:g} min)"
+                message = f"{step} keeps tool {tool.id} in cut for {minutes:.3g} min (limit {tool.life_min:g} min)"
                 out.append(Caution("tool_life", (tool.id, step), message, minutes, tool.life_min,
                                    "the tool never goes up in it, so no cutter is changed; take one that lasts longer"))
     return out

@@ -94,8 +94,8 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     depth : mm, of layers in roughing; None: finishing, where a wall may meet all of the cutter
 
     The speed is n = 1000 vc / (pi d) at the widest place in cut, the feed n z fz with the thinning of the chip counted
-    in where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says of the tool
-    stands instead. Both are held to the tool's and the machine's limits; where a machine states none and the tool has
+    in for layers where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says of
+    the tool stands instead. Both are held to the tool's and the machine's limits; where a machine states none and the tool has
     no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
     ``LEAST_FEED``.
     """
@@ -121,7 +121,9 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     if tool.feed_mm_min is not None:
         feed = given("feed_mm_min", tool.feed_mm_min, machine.max_feed_mm_min)
     else:
-        engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
+        # a finish may have the whole front in a skin, which no limit counts: its chip is as thick as in a slot
+        limit = None if depth is None else tool.max_engagement_deg
+        engaged = math.radians(180.0 if limit is None else limit)
         per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm) * chip_thinning(
             tool.corner_radius_mm, depth, engaged)
         feed = min(max(per_tooth * tool.flutes * rpm, LEAST_FEED),

@@ -139,7 +139,6 @@ class Blank:
         ax, ay, az = (((np.array(high) - low) / bar.height).round(15) + 0.0).tolist()
         return (low[0], low[1], low[2], bar.radius, bar.height), (ax, ay, az)
 
-
     def proof_mesh(self, rotation: F64) -> TriangleMesh | None:
         """The mesh of a solid blank in a frame that rotation (3, 3) leads to; None where there is none."""
         return None if self.solid is None else turned(self.solid, rotation).mesh

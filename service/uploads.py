@@ -51,7 +51,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
         raise RequestError("the body must be multipart/form-data", code="not_multipart",
                            remedy="curl -F part=@PART.step -F 'setup=@SETUP.json;type=application/json'")
     try:
-        form = await request.form(max_files=4, max_fields=4, max_part_size=MAX_SETUP_BYTES)
+        form = await request.form(max_files=5, max_fields=4, max_part_size=MAX_SETUP_BYTES)
     except HTTPException as error:
         if error.status_code == 413:
             raise
@@ -69,10 +69,11 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                                subjects=(name,), code="repeated_part" if count else "missing_part", measured=count,
                                limit=1, remedy=f"send {' and '.join(sorted(wanted))}, each once")
     part, program, stock = form["part"], form.get("program"), form.get(STOCK)
-    if (not isinstance(part, UploadFile) or (with_program and not isinstance(program, UploadFile))
-            or (STOCK in names and not isinstance(stock, UploadFile))):
-        raise RequestError("part, program and stock must be sent as files, with a file name", code="not_a_file",
-                           subjects=("part",), remedy="curl -F part=@PART.step")
+    for name in ("part", *(["program"] if with_program else []), *([STOCK] if STOCK in names else [])):
+        if not isinstance(form[name], UploadFile):
+            raise RequestError(f"'{name}' must be sent as a file, with a file name", code="not_a_file",
+                               subjects=(name,), remedy=f"curl -F {name}=@FILE")
+    assert isinstance(part, UploadFile)
     return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
                 _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
                 stock if isinstance(stock, UploadFile) else None)

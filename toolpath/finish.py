@@ -21,6 +21,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.border import beyond
 from toolpath.deflection import left_by_layers
+from toolpath.engaged import UNBOUNDED
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
@@ -456,9 +457,13 @@ def turned(line: Line, settings: PlanSettings) -> Line:
 
 
 def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
-    """Feeds and heights of a step, as the linker wants them."""
+    """Feeds and heights of a step, as the linker wants them.
+
+    Where the engaged angle has a limit layers are fed for thin chips; a finish is not, nor what is skimmed like one.
+    """
+    skimmed = math.inf if cut.finish is None or cut.engaged >= UNBOUNDED else cut.finish.feed
     return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.rates.rapid, settings.clearance,
-                   settings.rapid_floor, settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance)
+                   settings.rapid_floor, settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance, skimmed)
 
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,

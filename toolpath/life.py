@@ -1,8 +1,8 @@
 """How long tools are in cut, and steps parted where the life of a cutter ends.
 
-A feed move is taken to be in cut unless it is as fast as moves in air are, so that what is counted is never less than
-what the proof finds in stock. Minutes are those of ``geometry.timing``, speeding up and slowing down counted. A cutter
-is changed between two passes, where the tool is up at the clearance plane along Z, or between two steps.
+A feed move is taken to be in cut unless it is a link as fast as those in air are, so that what is counted is never less
+than what the proof finds in stock. Minutes are those of ``geometry.timing``, speeding up and slowing down counted. A
+cutter is changed between two passes, where the tool is up at the clearance plane along Z, or between two steps.
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ AS_FAST = 1.0 + 1e-9
 
 def minutes_in_cut(step: Workingstep) -> NDArray[np.float64]:
     """(k,) float64, min: what each trajectory of a step keeps the tool in cut at most."""
-    cuts = np.array([t.motion is not Motion.RAPID and t.feed <= step.feed * AS_FAST for t in step.trajectories])
+    links = [t.feed for t in step.trajectories if t.motion not in (Motion.RAPID, Motion.CUT)]
+    air = max(links, default=0.0) / AS_FAST
+    told = air > step.feed  # else nothing tells a link in air from one in stock
+    cuts = np.array([t.motion is Motion.CUT or t.motion is not Motion.RAPID and not (told and t.feed >= air)
+                     for t in step.trajectories])
     return np.asarray(np.where(cuts, trajectory_seconds(step.trajectories, step.rates), 0.0) / 60.0)
 
 

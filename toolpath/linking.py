@@ -47,7 +47,11 @@ COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi /
 
 @dataclass
 class Motions:
-    """Feeds and heights of a step, mm and mm/min."""
+    """Feeds and heights of a step, mm and mm/min.
+
+    plunge_feed : straight down, and how fast a way down along a pass goes down; front_feed : in cut at most, where the
+    whole front of the cutter is in stock that no limit of the engaged angle counts
+    """
 
     feed: float
     plunge_feed: float
@@ -58,6 +62,7 @@ class Motions:
     ramp_angle: float
     step_down: float
     tolerance: float
+    front_feed: float = math.inf
 
 
 @dataclass
@@ -88,6 +93,9 @@ class Linker:
     skipped: list[Line] = fresh(default_factory=list)
     refused: int = 0
 
+    def __post_init__(self) -> None:
+        self.gone = Depths(self.stock.lattice)  # ways back in air
+
     def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
 
@@ -95,7 +103,7 @@ class Linker:
         stands in the way of shank or holder, and where the tool is barred, the line is left out; what is higher than
         rapids go, or was walked as it stands, is not walked.
 
-        eased : the line takes off what it comes to bit by bit, as a helix does, and needs no skims
+        eased : the line takes off what it comes to bit by bit on its way down, as a helix does, and needs no skims
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
@@ -103,8 +111,8 @@ class Linker:
         before = len(self.skipped)
         free = [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]
         for piece in [q for p in free for q in self._unwalked(p)]:
-            walk = self._one if eased else self._pass
-            if not (self._topped(piece) and walk(piece.points, piece.closed)):
+            if not (self._topped(piece) and (self._one(piece.points, piece.closed, eased=True) if eased
+                                             else self._pass(piece.points, piece.closed))):
                 self.skipped.append(piece)
                 self.refused += 1
         return len(self.skipped) == before
@@ -174,14 +182,19 @@ class Linker:
         for whole in (False, True) if self.engaged < UNBOUNDED else ():  # the whole, where only the way in is too much
             for skim in skims(self.stock, line, tool, self.engaged, self.found, whole=whole):
                 way = Line(thinned(skim.points, self.motions.tolerance), skim.closed)
-                if not all(self._one(rest.points, rest.closed) for rest in self._unwalked(way)):
+                if not all(self._one(rest.points, rest.closed, most=self.motions.front_feed)
+                           for rest in self._unwalked(way)):
                     return False
             if self._one(points, closed):
                 return True
         return False
 
-    def _one(self, points: F64, closed: bool, *, unless_over: bool = False) -> bool:
-        """Walk a line as it is; False where no way leads in, or where it is over the limit and not to be then."""
+    def _one(self, points: F64, closed: bool, *, unless_over: bool = False, eased: bool = False,
+             most: float = math.inf) -> bool:
+        """Walk a line as it is; False where no way leads in, or where it is over the limit and not to be then.
+
+        eased : it is a way down all along, with the whole front in stock; most : mm/min, its feed at most
+        """
         if unless_over and not within(self.stock, points, self.field.tool, self.engaged, self.found):
             return False
         way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
@@ -196,25 +209,45 @@ class Linker:
                 self._feed(Motion.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self._here() - cut[0]) > 1e-9:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
-        self._paced(Motion.CUT, cut)
+        down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
+        most = min(most, self.motions.front_feed) if eased else most
+        head = min(most, self._descent(cut[:down + 1]))
+        if head < min(most, self.motions.feed):
+            self._paced(Motion.CUT, cut[:down + 1], head)
+            self._paced(Motion.CUT, cut[down:], most)
+        else:
+            self._paced(Motion.CUT, cut, most)
         self.depths.cut(cut)
         self.passes += 1
         return True
 
-    def _paced(self, motion: Motion, points: F64) -> None:
+    def _descent(self, points: F64) -> float:
+        """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
+        way = np.diff(points, axis=0)
+        drop, length = -way[:, 2], np.linalg.norm(way, axis=1)
+        steepest = float((drop[length > 0.0] / length[length > 0.0]).max(initial=0.0))
+        return self.motions.plunge_feed / steepest if steepest > 0.0 else math.inf
+
+    def _paced(self, motion: Motion, points: F64, most: float = math.inf) -> None:
         """Go along a way (n, 3), mm, in stretches as fast as what stands there lets the tool, where a pace is given.
 
-        Only where it takes stock off: a finish is not left to what the stock's lattice shows. Nor is a way down.
+        Only where it takes stock off: a finish is not left to what the stock's lattice shows. Nor is a way down between
+        passes. In stock never faster than ``most`` mm/min.
         """
+        if len(points) < 2:
+            return
         slow = self.pace is None or motion is Motion.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
         if self.pace is None or slow:
-            self._feed(motion, points, self.motions.feed)
+            self._feed(motion, points, min(self.motions.feed, most))
             return
         for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
-            self._feed(Motion.CONNECT if air else motion, part, feed)
+            self._feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
 
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
+
+        Only where that is sooner than by the clearance plane, and a way it has not gone before: a program that runs
+        the same moves again and takes nothing off is one that somebody has pasted twice.
 
         Returns whether there was one.
         """
@@ -222,10 +255,17 @@ class Linker:
             steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
             if not len(steps):
                 return True
+            length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+            if length / self.motions.link_feed > self._by_plane(way[0], way[-1]):
+                continue
+            known = self.gone.were_cut(way) | self.depths.were_cut(way)
+            if int(known.sum()) > MOST_AGAIN:
+                continue
             points = dense(way, 0.5 * self.stock.lattice.step)
             if (float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
                     and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
                 self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+                self.gone.cut(way)
                 return True
         self._lift()
         return False
@@ -399,8 +439,7 @@ class Linker:
         here, low = self.at, start[2] + self._in_front
         run = float(np.hypot(*(start - here)[:2]))
         level = max(float(here[2]), low)
-        by_plane = ((2.0 * m.rapid_floor - here[2] - low) / m.link_feed
-                    + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
+        by_plane = self._by_plane(here, np.array([*start[:2], low]))
         if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane:
             return None
         n = max(2, int(run / (0.5 * self.stock.lattice.step)) + 1)
@@ -417,6 +456,12 @@ class Linker:
             return None
         way = np.array([here, [*here[:2], level], [*start[:2], level], [*start[:2], low]])
         return np.ascontiguousarray(way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]])
+
+    def _by_plane(self, here: F64, to: F64) -> float:
+        """Minutes from a place to another, (3,) mm, up to the clearance plane, across and down."""
+        m, run = self.motions, float(np.hypot(*(to - here)[:2]))
+        return float((2.0 * m.rapid_floor - here[2] - to[2]) / m.link_feed
+                     + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
 
     def _come_down(self, start: F64) -> None:
         x, y, z = start

@@ -46,8 +46,11 @@ class Pace:
 def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
     """A pass (n, 3), mm, in stretches: whether one is in air, its points, and its feed, mm/min.
 
-    Where the stock map shows nothing all along, it is one that takes what the map does not show.
+    Where the stock map shows nothing all along, it is one that takes what the map does not show; where moves in air are
+    no faster than those in stock, it stays whole.
     """
+    if pace.air <= pace.feed:
+        return [(False, points, pace.feed)]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     guard = max(GUARD * tool.diameter, 2.0 * stock.lattice.step)
     at = np.linspace(0.0, s[-1], max(2, math.ceil(ASKED * s[-1] / guard) + 1))
@@ -61,8 +64,10 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
     # what is faster for less than a guard's way is not worth a word
     feeds = maximum_filter1d(minimum_filter1d(feeds, ASKED + 1, mode="nearest"), ASKED + 1, mode="nearest")
     between = np.minimum(feeds[1:], feeds[:-1])
-    ends = np.concatenate([[0], np.flatnonzero(np.diff(between)) + 1, [len(between)]])
-    return [(bool(between[a] >= pace.air), stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
+    near = maximum_filter1d(busy, 2 * ASKED + 1, mode="nearest")  # stock may be cut as fast as moves in air go
+    cuts = near[1:] | near[:-1] | (between < pace.air)
+    ends = np.concatenate([[0], np.flatnonzero((np.diff(between) != 0.0) | (np.diff(cuts))) + 1, [len(between)]])
+    return [(not cuts[a], stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
             for a, b in zip(ends[:-1], ends[1:], strict=True)]
 
 

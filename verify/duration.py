@@ -55,6 +55,5 @@ def spent(read: Sequence[Program], took: F64, known: NDArray[np.bool_], cut: NDA
     inside = np.zeros(len(took), np.bool_)
     inside[known] = cut
     retracts = sum(int((~r[:-1] & r[1:]).sum()) for r in (p.kind == RAPID for p in read))
-    changes = sum(int((p.tool[1:] != p.tool[:-1]).sum()) for p in read)
     return Spent(60.0 * float(took.sum()) + sum(p.dwell for p in read), 60.0 * float(took[inside].sum()),
-                 60.0 * float(took[rapid].sum()), retracts, changes)
+                 60.0 * float(took[rapid].sum()), retracts, sum(p.changes for p in read))

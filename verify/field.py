@@ -178,7 +178,8 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
             events, taken = event_table(), spare.get()
             n = field_tile(field.values, tile, field.origin, field.step, field.band, start, end, axes.axis,
                            axes.about, axes.angle, twists, moves.feed, free, steep, moves.tool, cutters, ends,
-                           bodies.rows, bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow, taken, events)
+                           bodies.rows, bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow,
+                           taken, events)
             spare.put(taken)
             return noted(events), n
         return work

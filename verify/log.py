@@ -26,7 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based, the one being read
-    speeds, unknown, stops, blend : as in ``Program``
+    speeds, unknown, stops, blend, changes : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -47,6 +47,7 @@ class Log:
         self.unknown: list[tuple[int, int]] = []
         self.stops: list[Stop] = []
         self.blend = 0.0
+        self.changes = 0
         self.turned = TurnLog()
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]

@@ -82,6 +82,7 @@ class Modes(Rotary):
         if 6 in ms:
             self.stop("tool change")
             if s.selected != s.tool:
+                self.log.changes += s.tool > 0
                 self._leave([False, False, True])
             s.tool, s.spindle, self.loaded = s.selected, False, True
         if 3 in ms or 4 in ms:

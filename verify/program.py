@@ -74,6 +74,7 @@ class Program:
     notes   : what was done and should be known
     speed   : (m,) float64, 1/min, at which the spindle turns, 0 where it stands
     coolant : (m,) bool
+    changes : times a tool was taken out of the spindle for another, or for nothing
     """
 
     name: str
@@ -96,6 +97,7 @@ class Program:
     notes: tuple[str, ...] = ()
     speed: F64 = field(default_factory=lambda: np.zeros(0))
     coolant: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    changes: int = 0
 
     def __len__(self) -> int:
         return len(self.start)

@@ -65,7 +65,7 @@ class Reader(Motion):
                        table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
-                       log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant)
+                       log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control keeps by itself (``verify.served``)."""

@@ -63,10 +63,11 @@ def test_finishing_keeps_the_figures_of_the_table_and_layers_of_a_ball_count_the
     assert same[0] == same[1]
 
 
-def test_a_bound_on_the_engaged_angle_feeds_faster():
+def test_a_bound_on_the_engaged_angle_feeds_layers_faster_and_no_finish():
     slot, side = (setup({**FLAT, "max_engagement_deg": a}) for a in (90, 60))
-    feeds = [cutting_data(s.material, s.tools[0], s.machine).feed for s in (setup(FLAT), slot, side)]
+    feeds = [cutting_data(s.material, s.tools[0], s.machine, 2.0).feed for s in (setup(FLAT), slot, side)]
     assert feeds[0] == feeds[1] and feeds[2] == pytest.approx(feeds[0] / math.sin(math.radians(60)))
+    assert cutting_data(side.material, side.tools[0], side.machine).feed == feeds[0]
 
 
 def test_what_the_setup_says_of_a_tool_stands_and_is_held_to_the_limits():

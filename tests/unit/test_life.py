@@ -58,6 +58,15 @@ def test_minutes_are_those_of_moves_at_the_feed_and_below_it():
     s = step(1, 100.0)
     kept = [t.motion for t, m in zip(s.trajectories, minutes_in_cut(s), strict=True) if m > 0.0]
     assert kept == [Motion.APPROACH, Motion.CUT, Motion.CUT]
+
+
+def test_minutes_hold_cuts_faster_than_the_feed_of_the_step_and_all_where_air_is_no_faster():
+    s = step(1, 100.0)
+    eased = replace(s, feed=0.1 * FEED)  # as of a slender tool, whose layers go faster where less stands in front
+    assert minutes_in_cut(eased).sum() == minutes_in_cut(s).sum() > 0.2
+    same = replace(s, feed=AIR, trajectories=tuple(replace(t, feed=AIR) for t in s.trajectories))
+    kept = [t.motion for t, m in zip(same.trajectories, minutes_in_cut(same), strict=True) if m > 0.0]
+    assert kept == [m for m in (t.motion for t in s.trajectories) if m is not Motion.RAPID]
     assert minutes_in_cut(s).sum() == pytest.approx(2 * 100.0 / FEED + 3.0 / 200.0, rel=0.01)
     assert trajectory_seconds(s.trajectories, s.rates).sum() == pytest.approx(s.seconds)
     assert trajectory_seconds((), s.rates).shape == (0,)

@@ -170,7 +170,8 @@ def test_to_and_fro_along_a_leaning_line_the_way_back_takes_no_more_than_a_skin(
     x = 15.0 + 0.5 * length * np.array([-1.0, 1.0])
     line = Line(np.column_stack([x, [15.0, 15.0], [1.5, 1.5 + rise]]), False)
     assert link.add(line)
-    cut = link.trajectories[-1].points
+    cuts = [t.points for t in link.trajectories if t.motion is Motion.CUT]
+    cut = np.vstack([cuts[0], *(c[1:] for c in cuts[1:])])
     assert (cut[-2:] == line.points).all() and cut[0, 2] >= TOP
     dug, aside = digging(cut, cut[:, 0])
     assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
@@ -443,3 +444,27 @@ def test_a_way_down_begins_after_the_last_move_that_was_made_before():
     entry, ramp, _ = link._ramped(points, False)
     np.testing.assert_allclose(ramp, whole[1][last:])
     np.testing.assert_allclose(entry[-1], whole[1][last])
+
+
+def test_a_way_down_goes_down_no_faster_than_straight_down_it_may():
+    link = linker(step_down=0.5)
+    link.motions.plunge_feed = 10.0
+    assert link.add(straight(13, 17, 15, TOP - 0.5))
+    down = [t for t in link.trajectories if t.motion is Motion.CUT and np.diff(t.points[:, 2]).min() < -1e-9]
+    assert down
+    for t in down:
+        way = np.diff(t.points, axis=0)
+        assert (-way[:, 2] / np.linalg.norm(way, axis=1)).max() * t.feed == pytest.approx(10.0)
+    assert [t.feed for t in link.trajectories if t.motion is Motion.CUT][-1] == 800
+
+
+def test_back_in_air_the_tool_goes_the_same_way_but_once():
+    link = linker(top=-1.0)
+    assert link.add(straight(5, 20, 10, 1.0))
+    a = np.linspace(0.0, 2.0 * np.pi, 20)
+    way = np.vstack([[20.0, 10.0, 1.0], np.column_stack([19.5 + 0.5 * np.cos(a), 10 + 0.5 * np.sin(a), np.ones(20)])])
+    assert link.keep_down([way]) and link.trajectories[-1].motion is Motion.CONNECT
+    assert not link.keep_down([way]) and link.trajectories[-1].motion is Motion.RAPID
+    assert link.add(straight(5, 20, 12, 1.0))
+    long = np.column_stack([np.tile([20.0, 4.0], 20), np.linspace(12.0, 13.0, 40), np.ones(40)])
+    assert not link.keep_down([long])  # by the clearance plane it is sooner

@@ -100,3 +100,12 @@ def test_an_eased_feed_is_given_back_where_less_stands_and_never_more():
     assert all(cut.feed <= f <= full * (1.0 + 1e-9) for f in halves) and halves[0] > halves[-1]
     own = cut_table(parse_setup(json.dumps({"tools": [{**slim, "feed_mm_min": 300}]})))["T1"]
     assert own.feed_under(body, 0.05, 0.2) == own.feed == 300
+
+
+@pytest.mark.parametrize("air", [0.5 * SLOT, SLOT, FULL])
+def test_what_takes_stock_off_is_no_link_however_slow_links_are(air):
+    stock = low(block(), lambda x, y: x < 8.0)
+    made = paced(np.array([[2.0, 15.0, 0.0], [28.0, 15.0, 0.0]]), stock, tool(4.0, 0.0), Pace(SLOT, air, under, LAYER))
+    cut = [part for in_air, part, _ in made if not in_air]
+    assert min(p[:, 0].min() for p in cut) < 8.0 and max(p[:, 0].max() for p in cut) == 28.0
+    assert all(part[:, 0].max() < 8.0 for in_air, part, _ in made if in_air)

@@ -74,5 +74,14 @@ def test_time_is_told_apart():
     assert twice.in_cut == pytest.approx(0.5, rel=0.01) and twice.retracts == 4 and twice.tool_changes == 2
 
 
+def test_a_cutter_changed_for_a_fresh_one_is_a_tool_change():
+    text = ("%\nG21 G17 G90 G94 G40 G49 G80 G61\nG54\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z10\nM5\nT0 M6\nM0\nT1 M6\n"
+            "S1000 M3\nG43 H1\nG0 X1 Y0 Z10\nM2\n%\n")
+    program = read_program(text)
+    assert (program.tool == 1).all()
+    assert spent([program], minutes_of(program, SETUP), np.ones(len(program), np.bool_),
+                 np.zeros(len(program), np.bool_)).tool_changes == 1
+
+
 def test_no_program_takes_no_time():
     assert spent([], np.zeros(0), np.zeros(0, np.bool_), np.zeros(0, np.bool_)).seconds == 0.0
