@@ -94,9 +94,9 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     depth : mm, of layers in roughing; None: finishing, where a wall may meet all of the cutter
 
     The speed is n = 1000 vc / (pi d) at the widest place in cut, the feed n z fz with the thinning of the chip counted
-    in for layers where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says of
-    the tool stands instead. Both are held to the tool's and the machine's limits; where a machine states none and the tool has
-    no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
+    in for layers where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says
+    of the tool stands instead. Both are held to the tool's and the machine's limits; where a machine states none and
+    the tool has no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
     ``LEAST_FEED``.
     """
     deep = tool.corner_radius_mm if depth is None else depth
