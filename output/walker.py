@@ -34,6 +34,7 @@ from output.model import Clamping, Workplan
 from output.text import decimal, face_words, height_word, step_title, tool_name
 from toolpath.motion import Motion, Trajectory, Workingstep
 
+UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
 LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
 
 
@@ -120,7 +121,7 @@ class _Walk:
         """Coordinate words of points[1:], only those that differ from the point before."""
         moved = np.diff(points, axis=0) != 0
         columns, number = [], self.dialect.number
-        for axis, letter in enumerate(self.letters):
+        for axis, letter in enumerate(self.letters[:points.shape[1]]):
             words = [""] * len(moved)
             where = np.flatnonzero(moved[:, axis])
             for i, value in zip(where.tolist(), points[1:, axis][where].tolist(), strict=True):
@@ -201,6 +202,8 @@ class _Turning(_Walk):
         self.clamping, self.machine = clamping, clamping.machine
         self.letters = "XYZ" + self.machine.letters
         self.home = home_of(clamping)
+        self.plane: F64 | None = None  # columns are its axes in the setup frame
+        self.place = np.zeros(3, dtype=np.int64)  # in it
 
     def run(self, walked: list[Section]) -> None:
         """All lines after the header."""
@@ -235,11 +238,30 @@ class _Turning(_Walk):
                 self.lines += self.dialect.tcp_on(step.tool.number, self.zero)
                 self.rapid = None
             self.position = np.array([*at, 0, 0], dtype=np.int64)
-        for leg in (*section.before, *section.legs, *section.after):
+        for leg in section.before:
+            self._leg(leg)
+        self._in_plane(section.legs)
+        for leg in section.after:
             self._leg(leg)
         if section.last and self.machine.tcp:
             self.lines += self.dialect.tcp_off()
             self.rapid = None
+
+    def _in_plane(self, legs: Sequence[Leg]) -> None:
+        """A step; in a plane square to its tool axis where the axis is fixed, leans and the control wants it so."""
+        axis = legs[0].axes[0]
+        flat = not any(leg.is_turning for leg in legs) and float(np.hypot(*axis[:2])) > UPRIGHT
+        if flat and self.dialect.planes and self.machine.tcp:
+            first, second = to_grid(np.degrees([-np.arcsin(axis[1]), np.arctan2(axis[0], axis[2])])).tolist()
+            self.plane = plane_axes(np.radians(first * GRID), np.radians(second * GRID))
+            self.place = to_grid(legs[0].tips[0] @ self.plane)
+            self.lines += self.dialect.plane_on(first, second)
+            self.rapid = None
+        for leg in legs:
+            self._leg(leg)
+        if self.plane is not None:
+            self.plane, self.rapid = None, None
+            self.lines += self.dialect.plane_off()
 
     def _leg(self, leg: Leg) -> None:
         """The blocks of a leg; it begins where the tool stands."""
@@ -253,7 +275,10 @@ class _Turning(_Walk):
         in_time = not self.machine.tcp and not rapid and leg.is_turning
         self.position = points[-1]
         moved = (points[1:] != points[:-1]).any(axis=1)
-        rows = [row for row in self._rows(points) if row]
+        if self.plane is None:
+            rows = [row for row in self._rows(points) if row]
+        else:
+            rows = self._planar(to_grid(leg.tips[1:] @ self.plane)[moved], leg.tips[1:][moved] @ self.plane)
         if not rows:
             return
         if in_time:
@@ -262,6 +287,35 @@ class _Turning(_Walk):
             self.rapid, self.feed = None, ""
             return
         self._say(rows, rapid, leg.feed)
+
+
+    def _planar(self, points: I64, places: F64) -> list[str]:
+        """Rows of points (m, 3) of the plane, grid steps, and the places they stand for, mm.
+
+        A move of next to nothing may be none on this grid; it is stepped the way it goes then, so that a program has
+        the same blocks with planes and without.
+        """
+        at = self.place
+        for k in range(len(points)):
+            if (points[k] == at).all():
+                off = places[k] / GRID - at
+                axis = int(np.argmax(np.abs(off)))
+                points[k, axis] += 1 if off[axis] >= 0.0 else -1
+            at = points[k]
+        rows = self._rows(np.vstack([self.place, points]))
+        self.place = at
+        return rows
+
+
+def plane_axes(first: float, second: float) -> F64:
+    """(3, 3): columns are X, Y, Z of the setup frame turned about its X by ``first`` and then about its Y, rad.
+
+    >>> np.round(plane_axes(np.radians(90.0), 0.0) @ [0.0, 0.0, 1.0], 9) + 0.0
+    array([ 0., -1.,  0.])
+    """
+    a, b = (np.cos(first), np.sin(first)), (np.cos(second), np.sin(second))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, a[0], -a[1]], [0.0, a[1], a[0]]])
+    return np.array([[b[0], 0.0, b[1]], [0.0, 1.0, 0.0], [-b[1], 0.0, b[0]]]) @ about_x
 
 
 def label_number(plan: Workplan, step: Workingstep) -> int:
@@ -362,4 +416,4 @@ def step_words(step: Workingstep) -> str:
     return "; ".join(words)
 
 
-__all__ = ["label_number", "path_tolerance", "step_words", "write_program"]
+__all__ = ["label_number", "path_tolerance", "plane_axes", "step_words", "write_program"]

@@ -45,6 +45,9 @@ class Machine(WireModel):
                     "on siemens.")] = False
     haas_tcp: Annotated[Literal["G234", "G43.4"], Field(
         description="The word by which a Haas keeps the tool tip.")] = "G234"
+    heidenhain_plane: Annotated[bool, Field(
+        description="On heidenhain, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL, STAY) instead "
+                    "of the setup frame; M128 keeps the tip in both.")] = False
     travel_mm: Annotated[Triple | None, Field(
         description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
                     "counted; where on the machine is for the work offset. null: not limited.")] = None
@@ -86,6 +89,10 @@ class Machine(WireModel):
         description="How the control runs a rapid in several axes. linear: straight. dogleg: each axis at its own "
                     "speed, so a rapid that moves more than one axis lower than clearance_mm.rapid over the top of "
                     "part, stock and fixtures is a finding.")] = "linear"
+    ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
+        description="What job.stpnc is for. cc1: tool paths, conformance class 1. cc2: class 2, with part and blank as "
+                    "shapes, strategies and setup instructions too. integrated_cnc: as cc1, under the schema name of "
+                    "the first edition, INTEGRATED_CNC_SCHEMA, for readers that know no other.")] = "cc1"
 
     @model_validator(mode="after")
     def _check(self) -> Machine:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
+from geometry.nurbs import NurbsSurface
 from geometry.toolbody import ToolBody
 from output.clamping import SWING, home_of
 from output.dialects import DIALECTS, Switches
-from output.model import Clamping, Frame, StockBox, Workplan
+from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from output.walker import write_program
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
@@ -21,9 +22,11 @@ from service.materials import rates_of
 from service.prepare import TABLE_SPARE, Prepared, table_height
 from service.sides import Look, Program, Side
 from service.stock import turned_box
+from service.trimmed import exact_faces
 from service.version import VERSION
 from toolpath.motion import Workingstep
 from toolpath.settings import Turning
+from toolpath.strategies.isoparametric import Faces
 from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
@@ -50,17 +53,22 @@ def proof_frame(ready: Prepared) -> Look:
     return first if np.array_equal(first.rotation, turn) else Look(first.id, turn, ready.part)
 
 
-def programs_of(ready: Prepared, sides: Sequence[Side]) -> list[Program]:
-    """The programs: one of each access that has steps, on a machine with rotary axes one of them all."""
+def programs_of(ready: Prepared, sides: Sequence[Side],
+                trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[Program]:
+    """The programs: one of each access that has steps, on a machine with rotary axes one of them all.
+
+    trimmed : exact faces by zone, in the frame of its access, which the features of STEP-NC are made of
+    """
     cutting = [s for s in sides if s.made.steps]
     if not cutting:
         return []
     if ready.setup.machine.kind == "5-axis":
-        work = clamped_workplan(ready, cutting)
+        work = replace(clamped_workplan(ready, cutting), surfaces=_surfaces(ready, cutting, trimmed or {}))
         return [_written(ready, ready.views[0].id, work)]
     out = []
     for s in cutting:
-        work, view = workplan(ready, s), s.view
+        view = s.view
+        work = replace(workplan(ready, s), surfaces=_surfaces(ready, [s], trimmed or {}))
         turn = None if view.is_first else view.rotation @ view.first.T
         out.append(_written(ready, view.id, work, "" if view.is_first else f".{view.id}", turn))
     return out
@@ -69,7 +77,7 @@ def programs_of(ready: Prepared, sides: Sequence[Side]) -> list[Program]:
 def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> Program:
     """The program of a plan for every control of the machine."""
     machine = ready.setup.machine
-    switches = Switches(machine.high_speed, machine.haas_tcp)
+    switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane)
     work = replace(work, restart=machine.restart_points)
     texts = {d: write_program(work, DIALECTS[d](switches)) for d in machine.dialects}
     first = machine.dialects[0]
@@ -176,10 +184,50 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
     if ready.blank.solid is not None:
         words = (*words, f"stock sha256 {ready.blank.solid.sha256}")
     lo, hi = ready.blank.corners(look.rotation)
+    shapes = Ap238(setup.machine.ap238) is Ap238.CC2
+    gauges = gauge_lengths(setup)
     return Workplan(setup.labels.get("order", "zonemill job"), steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
                     StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
-                    dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)))
+                    dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
+                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
+                    stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,
+                    part_mesh=look.part.mesh if shapes else None, ap238=Ap238(setup.machine.ap238),
+                    assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
+                                for t, b in zip(setup.tools, tool_bodies(setup), strict=True)})
+
+
+def _stock_words(ready: Prepared) -> str:
+    """What kind of blank it is, where a box does not say it all."""
+    blank = ready.blank
+    if blank.bar is not None:
+        return f"cylinder of diameter {2.0 * blank.bar.radius:g} mm and height {blank.bar.height:g} mm"
+    if blank.solid is not None:
+        return "solid of a STEP file"
+    return "" if blank.box is not None else f"part grown by {blank.margin:g} mm"
+
+
+def _cylinder(ready: Prepared, look: Look) -> StockCylinder | None:
+    """The blank in a frame, where it is a cylinder."""
+    bar = ready.blank.bar
+    if bar is None:
+        return None
+    low, high = bar.ends(look.rotation)
+    return StockCylinder(low, (high - low) / bar.height, bar.radius, bar.height)
+
+
+def _surfaces(ready: Prepared, sides: Sequence[Side],
+              trimmed: Mapping[str, Sequence[Faces]]) -> dict[int, NurbsSurface]:
+    """Exact faces by number: of one side in its frame, on a machine that turns of all of them in the setup's."""
+    out: dict[int, NurbsSurface] = {}
+    for side in sides:
+        turn = np.eye(4)
+        if ready.setup.machine.kind == "5-axis":
+            turn[:3, :3] = side.view.rotation.T
+        for zone in ready.zones:
+            for face in trimmed.get(zone.id, ()) if zone.access == side.view.id else ():
+                out.update({one.face: one.surface.moved(turn) for one in exact_faces(face)})
+    return out
 
 
 def gauge_lengths(setup: Setup) -> dict[int, float]:

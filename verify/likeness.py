@@ -85,8 +85,8 @@ def _compared(a: Program, b: Program, i: NDArray[np.int64],
         out.append((what, far(one, other, AXIS)))
     if a.poses is not None and b.poses is not None:
         out.append(("where the rotary axes stand", far(a.poses.end_turn, b.poses.end_turn, AXIS)))
-    # what a block takes is rounded with its places: to what the tip goes in TIP / 100 at least
-    slack = 1e-9 + 0.01 * TIP / np.maximum(np.nan_to_num(a.feed[i], nan=1.0), 1.0)
+    # what a block takes is rounded with its places
+    slack = 1e-9 + TIP / np.maximum(np.nan_to_num(a.feed[i], nan=1.0), 1.0)
     took = ~((np.abs(a.minutes[i] - b.minutes[j]) <= slack) | (np.isnan(a.minutes[i]) & np.isnan(b.minutes[j])))
     return [*out, ("the feed", unlike(a.feed, b.feed)), ("the time they take", took),
             ("the speed of the spindle", unlike(a.speed, b.speed)), ("the coolant", a.coolant[i] != b.coolant[j])]

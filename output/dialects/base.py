@@ -24,10 +24,12 @@ class Switches:
 
     high_speed : say the word for fast contouring (G05.1 Q1, CYCLE832) where the control has it as an option
     haas_tcp   : the word by which a Haas keeps the tip: 'G234' or 'G43.4'
+    planes     : a Heidenhain cuts with a fixed tool axis in a plane tilted to it (PLANE SPATIAL)
     """
 
     high_speed: bool = False
     haas_tcp: str = "G234"
+    planes: bool = False
 
 
 class Dialect:
@@ -141,6 +143,20 @@ class Dialect:
 
     def tcp_off(self) -> list[str]:
         """It does not any more; rotary axes stand at 0, the tip over the part."""
+        return []
+
+    @property
+    def planes(self) -> bool:
+        """Whether steps of a fixed tool axis are written in a plane square to it; the tip is kept all along."""
+        return False
+
+    def plane_on(self, first: int, second: int) -> list[str]:
+        """From here on X, Y, Z count in the setup frame turned about its X by ``first`` and then about its Y by
+        ``second``, grid steps of 0.0001 deg; no axis moves."""
+        return []
+
+    def plane_off(self) -> list[str]:
+        """They count in the setup frame again; no axis moves."""
         return []
 
     # moves

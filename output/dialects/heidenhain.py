@@ -2,7 +2,8 @@
 
 Every block has its number, from 0 on. A rapid says FMAX in every block, for FMAX holds for one block alone. Zeros are
 rows of the preset table (cycle 247), corners are rounded by no more than the tolerance of cycle 32. The tip is kept
-by M128, which is off (M129) before the spindle goes to machine zero (M91) and before a tool is called.
+by M128, which is off (M129) before the spindle goes to machine zero (M91) and before a tool is called. Where the shop
+wants it, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL), M128 on and the axes already there (STAY).
 """
 
 from __future__ import annotations
@@ -95,6 +96,19 @@ class Heidenhain(Dialect):
     def tcp_off(self) -> list[str]:
         """Before M91 and TOOL CALL."""
         return ["M129"]
+
+    @property
+    def planes(self) -> bool:
+        """As the shop says."""
+        return self.switches.planes
+
+    def plane_on(self, first: int, second: int) -> list[str]:
+        """Without a preferred side the control takes the place of the axes that is nearest: where they stand."""
+        return [f"PLANE SPATIAL SPA{self.number(first)} SPB{self.number(second)} SPC+0 STAY"]
+
+    def plane_off(self) -> list[str]:
+        """The plane alone; M128 stays."""
+        return ["PLANE RESET STAY"]
 
     def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
         """A rapid like any other."""

@@ -22,7 +22,7 @@ from verify.likeness import difference
 from verify.reader import read_program
 
 OTHERS = ("fanuc", "haas", "siemens", "heidenhain")
-SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4")}
+SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4"), "planes": Switches(planes=True)}
 TURNED = clamped("table-table-BC", swings=False)
 JOBS = {
     "five steps": plan(), "tiny": tiny(), "further zero": replace(tiny(), work_offset="G59.2"),
@@ -163,7 +163,8 @@ def test_a_move_left_out_or_put_in_is_found():
     ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
     ("heidenhain", "L IX+5", "cannot read"), ("heidenhain", "L X+5 RL F100", "cannot read"),
     ("heidenhain", "CALL LBL 1", "cannot read"), ("heidenhain", "FN 0: Q1 = 5", "cannot read"),
-    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "cannot read"),
+    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "only while M128"),
+    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 TURN F999", "cannot read"),
     ("heidenhain", "L X+5 M140", "unknown word"),
     ("heidenhain", "CYCL DEF 7.0 DATUM SHIFT", "cannot read"), ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
 ])
@@ -204,6 +205,34 @@ def test_whose_program_a_text_is():
     with pytest.raises(VerificationError) as unknown:
         read_program("M30\n", dialect="fagor")
     assert unknown.value.code == "unknown_dialect"
+
+
+@pytest.mark.parametrize("kind", ["table-table-AC", "head-head-BC"])
+def test_planes_hold_the_steps_of_a_fixed_axis(kind):
+    work = clamped(kind)
+    text = write(work, "heidenhain", SHOPS["planes"])
+    assert text.count("PLANE SPATIAL") == text.count("PLANE RESET STAY") == 3  # S02 to S04; S05 turns, S01 is upright
+    inside = text.split("PLANE SPATIAL")[1].split("PLANE RESET")[0]
+    assert not re.search(r" [AC][+-]", inside) and len(inside.splitlines()) > 10
+    planar, same = read(work, text, "heidenhain"), read(work, write(work, "heidenhain"), "heidenhain")
+    assert difference(same, planar) == "" and difference(read(work, write_linuxcnc(work), "linuxcnc"), planar) == ""
+    far = np.linalg.norm(planar.end - same.end, axis=1)
+    assert 0.0 < far.max() < 2.5e-4
+    for wrong in (("SPA+", "SPA-"), ("SPB+", "SPB-"), ("SPA-", "SPA+"), ("SPC+0", "SPC+0.01")):
+        if wrong[0] in text:
+            assert difference(same, read(work, text.replace(*wrong, 1), "heidenhain")) != ""
+    with pytest.raises(ProgramError, match="M91 in a tilted plane"):
+        read(work, text.replace("PLANE RESET STAY", "M8"), "heidenhain")
+
+
+def test_a_move_of_next_to_nothing_stays_a_move_in_a_plane():
+    work = clamped(swings=False)
+    tips = np.array([5.0, 3.0, 4.0]) + 1.1e-4 * np.arange(40)[:, None] * [0.6, 0.7, -0.4]
+    cut = replace(work.steps[1].trajectories[2], points=tips)
+    step = replace(work.steps[1], trajectories=(cut,))
+    work = replace(work, steps=(step,))
+    planar = read(work, write(work, "heidenhain", SHOPS["planes"]), "heidenhain")
+    assert difference(read(work, write_linuxcnc(work), "linuxcnc"), planar) == ""
 
 
 def test_programs_of_joints():

@@ -1,14 +1,19 @@
 """Heidenhain, conversational: a keyword opens each block, FMAX makes a rapid for one block, F stays.
 
 Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, M words, LBL, STOP, and of the cycles 247 (preset) and
-32 (tolerance). Radius compensation, incremental words (IX), arcs, Q parameters, calls, shifts and tilted planes are
-refused by name.
+32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup frame turned about its X, then
+Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius compensation, incremental words (IX),
+arcs, Q parameters, calls and shifts are refused by name.
 """
 
 from __future__ import annotations
 
+import math
 import re
 
+import numpy as np
+
+from geometry.mesh import F64
 from verify.dialects.base import NUMBER, BlockError, Control, zero_word
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
@@ -16,6 +21,7 @@ _LINE = re.compile(rf"L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?:
 _TOOL = re.compile(rf'TOOL CALL(?: +"?([0-9]+)"?)?(?: +([XYZ]))?(?: +S({NUMBER}))?(?: +F({NUMBER}))?'
                    r"(?: +D[LR][+-]?0*\.?0*)*")
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
+_PLANE = re.compile(rf"PLANE SPATIAL SPA({_NUM}) SPB({_NUM}) SPC({_NUM}) STAY")
 _START, _END = (3, 4, 8, 13, 14, 128), (0, 1, 2, 5, 9, 30, 129)  # when in the block an M word takes effect
 _WORDS = {13: "M3 M8", 14: "M4 M8", 128: "M428", 129: "M429"}
 _IDLE = ("BLK FORM", "TOOL DEF", "CYCL DEF 32.0", "* -")
@@ -26,12 +32,24 @@ def is_conversational(text: str) -> bool:
     return re.match(r"\s*(?:[0-9]+\s+)?BEGIN PGM\b", text.upper()) is not None
 
 
+def _turn(axis: int, angle: float) -> F64:
+    """(3, 3): right-handed about X, Y or Z (0, 1, 2) by rad."""
+    out = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out[i, i] = out[j, j] = math.cos(angle)
+    out[j, i] = math.sin(angle)
+    out[i, j] = -out[j, i]
+    return out
+
+
 class Heidenhain(Control):
     """TNC 320 to 640, iTNC 530, TNC7."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.preset = False
+        self.preset = self.tcp = False
+        self.plane: F64 | None = None  # columns are its axes in the setup frame
+        self.at = [math.nan] * 3  # mm, setup frame
 
     def blocks(self, raw: str) -> list[str]:
         """By the keyword the block opens with."""
@@ -48,6 +66,8 @@ class Heidenhain(Control):
             return self._tool(m)
         if re.fullmatch(r"(?:STOP)?(?: *M[0-9]+)*", text):
             return self._machine([int(w) for w in re.findall(r"M([0-9]+)", text)], "M0" if "STOP" in text else "")
+        if text.startswith("PLANE"):
+            return self._tilt(text)
         if m := re.fullmatch(rf"CYCL DEF 32\.1 T({NUMBER})", text):
             return [f"G64 P{float(m[1]):.6f}"]
         if re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA{NUMBER})?", text):
@@ -59,6 +79,38 @@ class Heidenhain(Control):
 
     def _no(self, text: str) -> list[str]:
         raise BlockError(f"cannot read '{text[:60]}'")
+
+    def _tilt(self, text: str) -> list[str]:
+        if re.fullmatch(r"PLANE RESET STAY", text):
+            self.plane = None
+            return []
+        m = _PLANE.fullmatch(text)
+        if m is None or not self.tcp:
+            raise BlockError(f"cannot read '{text[:60]}': of tilted planes only PLANE SPATIAL and PLANE RESET with "
+                             "STAY are read, and only while M128 keeps the tip")
+        a, b, c = (math.radians(float(v)) for v in m.groups())
+        self.plane = _turn(2, c) @ _turn(1, b) @ _turn(0, a)
+        return []
+
+    def _setup(self, words: str, machine: bool) -> str:
+        """The same words with X, Y, Z in the setup frame."""
+        named = {w[0]: w[1:] for w in words.split()}
+        linear = [float(named[k]) if k in named else math.nan for k in "XYZ"]
+        if machine:
+            self.at = [math.nan if k in named else v for k, v in zip("XYZ", self.at, strict=True)]
+            return words
+        if self.plane is None:
+            self.at = [v if math.isnan(w) else w for v, w in zip(self.at, linear, strict=True)]
+            return words
+        if len(named) == 0 or not named.keys() & set("XYZ"):
+            return words
+        here = np.array(self.at) @ self.plane
+        there = self.plane @ np.where(np.isnan(linear), here, linear)
+        if np.isnan(there).any():
+            raise BlockError("a move in a tilted plane from a place the program has not stated")
+        self.at = there.tolist()
+        turns = [k + v for k, v in named.items() if k not in "XYZ"]
+        return " ".join([*(f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)), *turns])
 
     def _preset(self, text: str) -> list[str]:
         self.preset = False
@@ -73,11 +125,15 @@ class Heidenhain(Control):
         out = [f"S{m[3]}"] if m[3] else []
         out += [f"F{m[4]}"] if m[4] else []
         if m[1]:
+            self.at[2] = math.nan
             out = [f"T{m[1]} M6", *out, *([f"G43 H{m[1]}"] if int(m[1]) else [])]
         return out
 
     def _straight(self, places: str, feed: str | None, ms: list[int]) -> list[str]:
-        words = " ".join(places.split())
+        if self.plane is not None and 91 in ms:
+            raise BlockError("M91 in a tilted plane")
+        words = self._setup(" ".join(places.split()), 91 in ms)
+        self._switch(ms)
         if not ms:
             return [f"G0 {words}" if feed == "FMAX" else f"G1 {words} {feed}" if feed else f"G1 {words}"]
         if unknown := [m for m in ms if m not in (*_START, *_END, 91)]:
@@ -90,7 +146,11 @@ class Heidenhain(Control):
         after = [_WORDS.get(m, f"M{m}") for m in ms if m in _END]
         return [*before, *([block] if block else []), *after]
 
+    def _switch(self, ms: list[int]) -> None:
+        self.tcp = 129 not in ms and (self.tcp or 128 in ms)
+
     def _machine(self, ms: list[int], stop: str) -> list[str]:
+        self._switch(ms)
         if unknown := [m for m in ms if m not in (*_START, *_END)]:
             raise BlockError(f"unknown word M{unknown[0]}")
         return [*(_WORDS.get(m, f"M{m}") for m in ms), *([stop] if stop else [])]
