@@ -144,7 +144,7 @@ class _Upright(_Walk):
             self.lines += self._modes()
 
     def _modes(self) -> list[str]:
-        return [*self.dialect.modes(self.tolerance), *self.dialect.state_zero(self.zero)]
+        return [*self.dialect.modes(self.tolerance, False), *self.dialect.state_zero(self.zero)]
 
     def add_step(self, step: Workingstep) -> None:
         """A step with the way to it."""
@@ -216,7 +216,7 @@ class _Turning(_Walk):
 
     def _modes(self) -> list[str]:
         d = self.dialect
-        return [*d.modes(self.tolerance), *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero),
+        return [*d.modes(self.tolerance, True), *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero),
                 *d.aloft(self.machine.letters)]
 
     def _add(self, section: Section) -> None:

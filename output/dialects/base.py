@@ -6,6 +6,7 @@ program; lengths come as whole steps of the grid or as text, speeds and feeds as
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +15,20 @@ from geometry.errors import OutputError
 from output.grid import PER_MM
 from output.text import ascii_text, decimal
 
+UP_THE_TOOL = 50.0
+"""mm above the tip at which a tool may leave its place by the path tolerance where its axis is smoothed too."""
+
 ZEROS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """How a setup names the zeros of a control, from the first on."""
+
+
+def axis_tolerance(tolerance: str) -> str:
+    """Degrees the tool axis may leave its way by, for a path tolerance in mm.
+
+    >>> axis_tolerance("0.001")
+    '0.0011'
+    """
+    return decimal(max(math.degrees(float(tolerance) / UP_THE_TOOL), 1.0 / PER_MM))
 
 
 @dataclass(frozen=True)
@@ -105,8 +118,11 @@ class Dialect:
         """Where a step can be started: lines before it."""
         return [f"N{number}"]
 
-    def modes(self, tolerance: str) -> list[str]:
-        """Units, plane, absolute coordinates, feed by the minute, everything else off; mm of path tolerance."""
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
+        """Units, plane, absolute coordinates, feed by the minute, everything else off.
+
+        tolerance : mm the control may leave the path by;  turns : the program has rotary words
+        """
         return [f"G21 G17 G90 G94 G40 G49 G80 G64 P{tolerance}"]
 
     def state_zero(self, zero: str) -> list[str]:

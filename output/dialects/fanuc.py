@@ -39,7 +39,7 @@ class Fanuc(Dialect):
         """A program number of its own folder; % before it."""
         return ["%", "O1000"]
 
-    def modes(self, tolerance: str) -> list[str]:
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
         """The unit has a block of its own, and the length is given up at home."""
         return ["G21", "G17 G90 G94 G40 G80 G64", *self.home(), "G49"]
 

@@ -26,6 +26,6 @@ class Haas(Fanuc):
         """Bounded by E."""
         return f"Path mode G187 E{tolerance}: the control may leave the written path by that much, in mm"
 
-    def modes(self, tolerance: str) -> list[str]:
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
         """P3 is the smoothness for finishing."""
         return ["G21", "G17 G90 G94 G40 G80", *self.home(), "G49", f"G187 P3 E{tolerance}"]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from geometry.errors import OutputError
-from output.dialects.base import Dialect
+from output.dialects.base import Dialect, axis_tolerance
 from output.text import decimal
 
 
@@ -65,9 +65,10 @@ class Heidenhain(Dialect):
         """A label by name."""
         return [f'LBL "{step}"']
 
-    def modes(self, tolerance: str) -> list[str]:
-        """Units, plane and absolute coordinates are what they are; cycle 32 for the path."""
-        return ["CYCL DEF 32.0 TOLERANCE", f"CYCL DEF 32.1 T{tolerance}"]
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
+        """Units, plane and absolute coordinates are what they are; cycle 32 for the path, in its finishing mode."""
+        way = ["CYCL DEF 32.0 TOLERANCE", f"CYCL DEF 32.1 T{tolerance}"]
+        return [*way, f"CYCL DEF 32.2 HSC-MODE:0 TA{axis_tolerance(tolerance)}", "PLANE RESET STAY"] if turns else way
 
     def state_zero(self, zero: str) -> list[str]:
         """The row of the preset table."""

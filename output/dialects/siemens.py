@@ -8,7 +8,7 @@ after every change of the transformation.
 
 from __future__ import annotations
 
-from output.dialects.base import Dialect
+from output.dialects.base import Dialect, axis_tolerance
 
 
 class Siemens(Dialect):
@@ -48,9 +48,11 @@ class Siemens(Dialect):
         """A label begins with two letters; the search for a block finds it by its name."""
         return [f"STEP_{step}:"]
 
-    def modes(self, tolerance: str) -> list[str]:
-        """1 is finishing, 1 the tolerance of the orientation in degrees, which has to be there."""
-        way = f"CYCLE832({tolerance},1,1)" if self.switches.high_speed else f"G641 ADIS={tolerance} ADISPOS={tolerance}"
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
+        """1 is finishing, 11 that with a tolerance of the orientation in degrees behind it; 1 there is no tolerance."""
+        way = f"G641 ADIS={tolerance} ADISPOS={tolerance}"
+        if self.switches.high_speed:
+            way = f"CYCLE832({tolerance},{f'11,{axis_tolerance(tolerance)}' if turns else '1,1'})"
         return ["G710 G17 G90 G94 G40", way]
 
     def aloft(self, letters: str) -> list[str]:

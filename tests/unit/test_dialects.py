@@ -211,7 +211,7 @@ def test_whose_program_a_text_is():
 def test_planes_hold_the_steps_of_a_fixed_axis(kind):
     work = clamped(kind)
     text = write(work, "heidenhain", SHOPS["planes"])
-    assert text.count("PLANE SPATIAL") == text.count("PLANE RESET STAY") == 3  # S02 to S04; S05 turns, S01 is upright
+    assert text.count("PLANE SPATIAL") == text.count("PLANE RESET STAY") - 1 == 3  # S05 turns, S01 is upright
     inside = text.split("PLANE SPATIAL")[1].split("PLANE RESET")[0]
     assert not re.search(r" [AC][+-]", inside) and len(inside.splitlines()) > 10
     planar, same = read(work, text, "heidenhain"), read(work, write(work, "heidenhain"), "heidenhain")
@@ -223,6 +223,21 @@ def test_planes_hold_the_steps_of_a_fixed_axis(kind):
             assert difference(same, read(work, text.replace(*wrong, 1), "heidenhain")) != ""
     with pytest.raises(ProgramError, match="M91 in a tilted plane"):
         read(work, text.replace("PLANE RESET STAY", "M8"), "heidenhain")
+    with pytest.raises(ProgramError, match="place the program has not stated"):
+        read_program("BEGIN PGM A MM\nM128\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nL X+1 FMAX\nM30\n",
+                     dialect="heidenhain", kinematics=Kinematics("table-table-AC"))
+
+
+@pytest.mark.parametrize("shop", SHOPS)
+def test_how_far_an_axis_may_leave_its_way_is_small_or_told(shop):
+    """0.0011 deg: 0.001 mm at 50 mm above the tip."""
+    work = clamped()
+    for dialect, told in (("siemens", "CYCLE832(0.001,11,0.0011)"), ("heidenhain", "HSC-MODE:0 TA0.0011")):
+        text = write(work, dialect, SHOPS[shop])
+        assert (told in text) == (dialect == "heidenhain" or shop == "fast")
+        assert read(work, text, dialect).notes == ()
+        for loose in (text.replace("11,0.0011", "1,1"), text.replace("0.0011", "0.5")):
+            assert loose == text or "not in the error bound" in read(work, loose, dialect).notes[0]
 
 
 def test_a_move_of_next_to_nothing_stays_a_move_in_a_plane():

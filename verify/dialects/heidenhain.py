@@ -23,6 +23,8 @@ _TOOL = re.compile(rf'TOOL CALL(?: +"?([0-9]+)"?)?(?: +([XYZ]))?(?: +S({NUMBER})
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
 _PLANE = re.compile(rf"PLANE SPATIAL SPA({_NUM}) SPB({_NUM}) SPC({_NUM}) STAY")
 _START, _END = (3, 4, 8, 13, 14, 128), (0, 1, 2, 5, 9, 30, 129)  # when in the block an M word takes effect
+SMALL = 0.01
+"""deg a rotary axis may leave its way by without a word about it."""
 _WORDS = {13: "M3 M8", 14: "M4 M8", 128: "M428", 129: "M429"}
 _IDLE = ("BLK FORM", "TOOL DEF", "CYCL DEF 32.0", "* -")
 
@@ -70,7 +72,10 @@ class Heidenhain(Control):
             return self._tilt(text)
         if m := re.fullmatch(rf"CYCL DEF 32\.1 T({NUMBER})", text):
             return [f"G64 P{float(m[1]):.6f}"]
-        if re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA{NUMBER})?", text):
+        if m := re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA({NUMBER}))?", text):
+            if m[1] and float(m[1]) > SMALL:
+                self.notes.append(f"cycle 32 lets rotary axes leave their way by {m[1]} deg: it is not in the error "
+                                  "bound")
             return []
         if re.fullmatch(r"CYCL DEF 247( [A-Z -]*)? ?~", text):
             self.preset = True

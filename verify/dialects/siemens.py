@@ -17,6 +17,8 @@ _TOKEN = re.compile(rf"""\s*(?:(?P<call>[A-Z_][A-Z_0-9]*)\s*\((?P<args>[^()]*)\)
     |(?P<letter>[A-Z])(?P<digits>{NUMBER})(?![A-Z_0-9.])
     |(?P<word>[A-Z_][A-Z_0-9]*))""", re.VERBOSE)
 _LABEL = re.compile(r"(?:N[0-9]+\s+)?[A-Z_]{2}[A-Z_0-9]*:")
+SMALL = 0.01
+"""deg a tool axis may leave its way by without a word about it: 0.01 mm at 57 mm above the tip."""
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{2}\s*\(|SUPA|G710|G700|G641|G642|G645"
                     r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
 _SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
@@ -37,6 +39,7 @@ class Siemens(Control):
     def __init__(self) -> None:
         super().__init__()
         self.tool = self.selected = 0
+        self.loose = ""
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move as it is; everything else word by word."""
@@ -160,12 +163,23 @@ class Siemens(Control):
         known = {"SUPA": "G53", "TRAORI": "M428", "TRAFOOF": "M429"}.get(word)
         if known is None:
             raise BlockError(f"unknown word {word[:40]}")
+        if word == "TRAORI" and self.loose:
+            self.notes.append(self.loose)
         return [known]
+
+    def _oriented(self, parts: list[str]) -> None:
+        """What to note, once a tool axis moves, where CYCLE832 lets it leave its way by no small angle, or unsaid."""
+        said = len(parts) > 2 and re.fullmatch("1[0-9]", parts[1]) and re.fullmatch(NUMBER, parts[2])
+        self.loose = ""
+        if said and float(parts[2]) <= SMALL:
+            return
+        how = f"by {parts[2]} deg" if said else "by what setting data say"
+        self.loose = f"CYCLE832 lets the tool axis leave its way {how} where it moves: it is not in the error bound"
 
     def _call(self, name: str, arguments: str) -> list[str]:
         parts = [p.strip() for p in arguments.split(",")]
         if name == "TRAORI" and parts in ([""], ["1"]):
-            return ["M428"]
+            return self._name("TRAORI")
         if name == "CYCLE832":
             if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
                 self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
@@ -173,5 +187,6 @@ class Siemens(Control):
                 return []
             if not re.fullmatch(NUMBER, parts[0]):
                 raise BlockError(f"CYCLE832({arguments}): its tolerance is no plain number")
+            self._oriented(parts)
             return [f"G64 P{float(parts[0]):.6f}"]
         raise BlockError(f"{name[:40]}( ): a cycle or function the reader does not know")
