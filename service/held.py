@@ -15,8 +15,6 @@ FREE_RATIO = MOST_RATIO
 """Times its thickness that a wall may be free for where it is finished: what is not told of when it stands alone."""
 PLANNED_RATIO = 8.0
 """The same in a plan: the layer under a band and how well a wall is measured take the rest."""
-NEAR_RATIO = 9.0
-"""Height over thickness by its profile, from which on a wall may have places over ``FREE_RATIO``."""
 
 
 def in_turn(ready: Prepared) -> bool:
@@ -31,13 +29,15 @@ def in_turn(ready: Prepared) -> bool:
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:
     """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.bands``).
 
+    They are for walls over ``FREE_RATIO`` by their profile; what has single places over it the proof finds.
+
     unheld : walls that a proof found without support, known as walls or not
     """
     if not in_turn(ready):
         return ()
     span = {w.id: (w.z_top, w.z_bottom) for w in ready.decomposition.walls}
     high = [HighWall(*span[s.wall], s.thickness)
-            for s in slender_walls(view.part, view.tree, walls_to_cut(ready), NEAR_RATIO)]
+            for s in slender_walls(view.part, view.tree, walls_to_cut(ready), FREE_RATIO)]
     return planes([*high, *unheld], largest_corner(ready.zones), PLANNED_RATIO)
 
 
