@@ -19,8 +19,6 @@ import numpy as np
 
 from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
 from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned
@@ -49,6 +47,7 @@ from service.programs import (
 from service.scoring import score
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
+from service.stepnc import stepnc_files
 from service.trimmed import trimmed_faces
 from toolpath.deflection import effective_diameter
 from toolpath.family import Target
@@ -122,7 +121,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner))
         made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
         zone, given_up = scored.without(made, ready.zones)
-        written = programs_of(ready, sides)
+        written = programs_of(ready, sides, trimmed)
         programs = [p.given() for p in written]
         proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
                       ScoredSamples(dense, zone), [z.id for z in ready.zones], span.proving)
@@ -144,8 +143,6 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     if report["state"] == "proved":
         for p in written:
             files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
-            files[p.file_name("job", "stpnc")] = ("stepnc", "", None, write_stepnc_aim(p.work).encode())
-            files[p.file_name("job", "arm.stpnc")] = ("stepnc-arm", "", None, write_stepnc_arm(p.work).encode())
     files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
     _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
     files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
@@ -156,6 +153,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
                                       lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
         report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
         files[MESH_NAME] = ("machined", "", None, data)
+    if report["state"] == "proved":
+        files.update(stepnc_files(written, look.part, tool_bodies(setup), proof_setup(ready, look), out))
     deliver(out, report, files)
     progress("done", 1.0)
     return report

@@ -8,17 +8,20 @@ import os
 from pathlib import Path
 from typing import Any
 
-Files = dict[str, tuple[str, str, str | None, bytes]]
-"""By name: kind, dialect, access, content."""
+Files = dict[str, tuple[str, str, str | None, bytes | Path]]
+"""By name: kind, dialect, access, content; a large one as a file beside its place, which is moved there."""
 
 
 def deliver(out: Path, report: dict[str, Any], files: Files) -> None:
     """List the files in the report, under ``files``, and write them into a folder, the report last."""
     report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
-                        "sha256": hashlib.sha256(data).hexdigest()}
+                        "sha256": _digest(data)}
                        for name, (kind, dialect, access, data) in sorted(files.items())]
     for name, (*_, data) in files.items():
-        write_whole(out / name, data)
+        if isinstance(data, Path):
+            _move_whole(data, out / name)
+        else:
+            write_whole(out / name, data)
     write_whole(out / "report.json", json_bytes(report))
 
 
@@ -35,3 +38,16 @@ def write_whole(path: Path, data: bytes) -> None:
         f.flush()
         os.fsync(f.fileno())
     os.replace(partial, path)
+
+
+def _move_whole(there: Path, path: Path) -> None:
+    with open(there, "rb") as f:
+        os.fsync(f.fileno())
+    os.replace(there, path)
+
+
+def _digest(data: bytes | Path) -> str:
+    if isinstance(data, bytes):
+        return hashlib.sha256(data).hexdigest()
+    with open(data, "rb") as f:
+        return hashlib.file_digest(f, "sha256").hexdigest()

@@ -72,6 +72,11 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     return out
 
 
+def exact_faces(faces: Faces) -> tuple[TrimmedFace, ...]:
+    """The faces that are gone over as one, each by itself."""
+    return faces.alone if isinstance(faces, SmoothFaces) else (faces,) if isinstance(faces, TrimmedFace) else ()
+
+
 def _together(faces: list[int], smooth: list[tuple[int, int]]) -> list[tuple[int, ...]]:
     """Faces in groups that smooth edges join, in order."""
     place = {f: k for k, f in enumerate(faces)}

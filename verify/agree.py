@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.errors import VerificationError
+from geometry.errors import InternalError
 from geometry.mesh import F64
 from verify.program import Program
 
@@ -60,6 +60,7 @@ class _Rows:
         self.at, self.name = at[keep.astype(np.bool_)], p.name
         self.rapid, self.feed, self.tool, self.line = rapid[rows], p.feed[rows].copy(), p.tool[rows], p.line[rows]
         self.arrival, self.turning = unknown[rows], turning[rows]
+        self.speed, self.coolant = p.speed[rows], p.coolant[rows]
         took = np.add.reduceat(p.minutes, begins)[keep.astype(np.bool_)] if len(begins) else p.minutes
         tip = np.linalg.norm(self.at[:, 3:6] - self.at[:, :3], axis=1) / np.where(took > 0.0, took, np.inf)
         # turning joints are fed by time: what the tip does follows from that, as rounded as both are
@@ -83,9 +84,10 @@ def check_agreement(nc: Program, stepnc: Program) -> Agreement:
 
     Raises
     ------
-    VerificationError
+    InternalError
         Code stepnc_differs: the tip is more than 0.001 mm apart, the axis more than 1e-6, feed, tool or kind of a move
-        is another, or one of them has moves that the other has not. The message names the lines of both.
+        is another, speed or coolant of a feed move, or one of them has moves that the other has not. The message names
+        the lines of both.
     """
     a, b = _Rows(nc, arrivals=False), _Rows(stepnc, arrivals=True)
     i, moves, tip, axis = 0, 0, 0.0, 0.0
@@ -123,8 +125,10 @@ def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
     way = np.linalg.norm(a.at[mine, 3:6] - a.at[mine, :3], axis=1)
     feed, other = (np.where(rapid, 0.0, np.nan_to_num(f)) for f in (a.feed[mine], b.feed[theirs]))
     slack = FEED * other + np.where(a.timed[mine], INVERSE * way + other * TIP / np.maximum(way, TIP), 0.0)
+    turned = np.abs(a.speed[mine] - b.speed[theirs]) > FEED * b.speed[theirs]
+    wet = a.coolant[mine] != b.coolant[theirs]
     bad = np.flatnonzero((rapid != b.rapid[theirs]) | (a.tool[mine] != b.tool[theirs])
-                         | (np.abs(feed - other) > slack))
+                         | (np.abs(feed - other) > slack) | (~rapid & (turned | wet)))
     return int(bad[0]) if len(bad) else None
 
 
@@ -137,7 +141,7 @@ def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int
             _differ(a, len(a) - 1, b, begin, "do not end together")
         last_a = _stretch(a, i, len(a))
         if _same_words(a, i, b, begin, 1) is not None:
-            _differ(a, i, b, begin, "have different feeds, tools or kinds of move")
+            _differ(a, i, b, begin, "have different feeds, speeds, coolant, tools or kinds of move")
         if last_a - i == last_b - begin:
             apart = float(np.abs(a.at[i:last_a, :6] - b.at[begin:last_b, :6]).max(initial=0.0))
             leaning = float(np.abs(a.at[i:last_a, 6:] - b.at[begin:last_b, 6:]).max(initial=0.0))
@@ -156,7 +160,7 @@ def _stretch(r: _Rows, begin: int, end: int) -> int:
     """Where the moves from ``begin`` on that have its tool, kind and feed end."""
     feed = np.nan_to_num(r.feed[begin:end])
     other = np.flatnonzero((r.rapid[begin:end] != r.rapid[begin]) | (r.tool[begin:end] != r.tool[begin])
-                           | (np.abs(feed - feed[0]) > FEED * feed[0]))
+                           | (np.abs(feed - feed[0]) > FEED * feed[0]) | (r.speed[begin:end] != r.speed[begin]))
     return begin + (int(other[0]) if len(other) else end - begin)
 
 
@@ -189,9 +193,9 @@ def _differ(a: _Rows, i: int, b: _Rows, j: int, how: str) -> None:
             words.append(f"{r.name} line {r.line[k]}: T{r.tool[k]} {kind} to {place}")
         else:
             words.append(f"{r.name}: no move")
-    raise VerificationError(f"the STEP-NC file and the program of the job {how}: {'; '.join(words)}",
+    raise InternalError(f"the STEP-NC file and the program of the job {how}: {'; '.join(words)}",
                             code="stepnc_differs", subjects=(a.name, b.name), measured=words,
-                            remedy="please report it with part and setup")
+                            remedy="please report it with part and setup; nothing is delivered")
 
 
 __all__ = ["Agreement", "check_agreement"]

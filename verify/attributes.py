@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from verify.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
@@ -176,7 +177,9 @@ class Checked:
         for entity, numbers in sorted(file.entities().items()):
             if entity in self._table or entity in self._records:
                 for number in numbers:
-                    if entity != "POLYLINE" or file.plain_polyline(number) is None:
+                    if entity == "POLYLINE" and (plain := file.plain_polyline(number)) is not None:
+                        self._check_points(number, plain)
+                    else:
                         self._check(number, entity)
 
     def of(self, entity: str) -> list[int]:
@@ -259,15 +262,18 @@ class Checked:
         if numbers is None:
             self._check(number, "POLYLINE")
             numbers = np.array(self.one(number, "POLYLINE", "points"), np.int64)
+        self._check_points(number, numbers)
         points = self.file.points(numbers)
-        bad = np.flatnonzero(np.isnan(points).any(axis=1))
-        if len(bad):
-            target = int(numbers[bad[0]])
-            if not self.file.has(target):
-                raise self.file.error(number, f", points: #{target}, to be CARTESIAN_POINT, is not in the file")
-            self.get(target, "CARTESIAN_POINT")
-            self._check(target, "CARTESIAN_POINT")
+        for k in np.flatnonzero(np.isnan(points).any(axis=1)).tolist():  # those not written plainly
+            points[k] = np.array(self.one(int(numbers[k]), "CARTESIAN_POINT", "coordinates"), np.float64)
         return points, self.file.lines_of(numbers).astype(np.float64)
+
+    def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:
+        """Refuse a polyline that refers to what is no point."""
+        for target in numbers[self.file.rows(numbers) < 0].tolist():
+            problem = To(("CARTESIAN_POINT",)).problem(Ref(target), self.file)
+            if problem is not None:
+                raise self.file.error(number, f", points: {problem}")
 
     def _check(self, number: int, entity: str) -> None:
         records = self.file.records(number)

@@ -55,6 +55,7 @@ class CutterMoves:
 
     start, end : (m, 3) float64, mm; start_axis, end_axis : (m, 3) float64, unit, tip to spindle
     rapid      : (m,) bool; feed : (m,) float64, mm/min, nan for rapids; speed : (m,) float64, 1/min, clockwise positive
+    coolant    : (m,) bool
     cutter     : (m,) int32, place in ``cutters``
     line       : (m,) int32, 1-based line of the file the end stands in
     arrival    : (m,) bool, the way there is left to the control: start is end
@@ -68,6 +69,7 @@ class CutterMoves:
     rapid: NDArray[np.bool_]
     feed: F64
     speed: F64
+    coolant: NDArray[np.bool_]
     cutter: I32
     line: I32
     arrival: NDArray[np.bool_]
@@ -78,6 +80,7 @@ class Course:
     """What was come upon so far.
 
     name : of the file; lines : how many it has
+    coolant : whether it is on from here on
     """
 
     def __init__(self, name: str, lines: int) -> None:
@@ -91,6 +94,7 @@ class Course:
         self._stops: list[tuple[int, str, int, F64]] = []
         self._over: tuple[F64, F64, int] | None = None
         self.dwell = 0.0
+        self.coolant = False
         self.notes: list[str] = []
         self.remarks: list[Remark] = []
 
@@ -129,12 +133,12 @@ class Course:
 
     def moves(self) -> CutterMoves:
         """All moves so far."""
-        rows = np.concatenate(self._chunks) if self._chunks else np.zeros((0, 18))
+        rows = np.concatenate(self._chunks) if self._chunks else np.zeros((0, 19))
         a, b = rows[:, :6], rows[:, 6:12]
         start, end, first, last = (np.ascontiguousarray(v) for v in (a[:, :3], b[:, :3], a[:, 3:], b[:, 3:]))
         return CutterMoves(start, end, first, last, rows[:, 12] > 0, rows[:, 13].copy(), rows[:, 14].copy(),
-                           rows[:, 15].astype(np.int32), rows[:, 16].astype(np.int32), rows[:, 17] > 0,
-                           tuple(self.cutters))
+                           rows[:, 18] > 0, rows[:, 15].astype(np.int32), rows[:, 16].astype(np.int32),
+                           rows[:, 17] > 0, tuple(self.cutters))
 
     def program(self, numbers: Sequence[int], machine: Kinematics | None) -> Program:
         """The moves as a program.
@@ -177,7 +181,8 @@ class Course:
             name=self.name, start=m.start, end=m.end, kind=np.where(m.rapid, RAPID, FEED).astype(np.int8), feed=m.feed,
             tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
             unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
-            poses=poses, notes=tuple(notes))
+            poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
+            changes=sum(what == "tool change" for _, what, _, _ in self._stops))
 
     def _last(self) -> list[tuple[int, str, int, F64]]:
         if self._here is None or self._tool is None:
@@ -242,7 +247,8 @@ class Course:
                                     code="program_too_long", measured=self._count, limit=MOST_MOVES,
                                     remedy="split the job")
         tail = np.tile([float(v) for v in row], (len(start), 1))
-        self._chunks.append(np.hstack([start, end, tail, lines[:, None], np.full((len(start), 1), float(arrival))]))
+        self._chunks.append(np.hstack([start, end, tail, lines[:, None],
+                                       np.tile([float(arrival), float(self.coolant)], (len(start), 1))]))
 
 
 def _between(start: F64, end: F64, share: F64) -> F64:

@@ -130,7 +130,7 @@ class Part21:
 
     def lines_of(self, numbers: NDArray[np.int64]) -> I32:
         """(n,) int32: 1-based lines that instances (n,), by their numbers, begin in; 0 where there is none."""
-        row = self._rows(numbers)
+        row = self.rows(numbers)
         at = np.where(row >= 0, self._point_at[row], -1) if len(self._point_at) else np.full(len(numbers), -1)
         for k in np.flatnonzero(row < 0).tolist():
             span = self._spans.get(int(numbers[k]))
@@ -139,7 +139,7 @@ class Part21:
 
     def points(self, numbers: NDArray[np.int64]) -> F64:
         """(n, 3) float64: coordinates of points (n,) by their numbers, nan where one is no point of three."""
-        row = self._rows(numbers)
+        row = self.rows(numbers)
         out = np.full((len(numbers), 3), np.nan)
         out[row >= 0] = self._points[row[row >= 0]]
         return out
@@ -150,8 +150,8 @@ class Part21:
         found = None if span is None else _POLYLINE.match(self._text, span[1])
         return None if found is None else np.fromstring(found.group(1).replace("#", ""), np.int64, sep=",")
 
-    def error(self, number: int, problem: str) -> ProgramError:
-        """The error that names an instance."""
+    def error(self, number: int, problem: str, also: int | None = None) -> ProgramError:
+        """The error that names an instance, and another one that has to do with it."""
         span = self._spans.get(number)
         entity = ""
         if self._point(number) >= 0:
@@ -159,7 +159,8 @@ class Part21:
         elif span is not None:
             words = re.match(r"\s*\(?\s*([A-Z][A-Z0-9_]*)", self._text[span[1]:span[1] + 200])
             entity = f" {words.group(1)}" if words else ""
-        subjects = (f"#{number}", *((f"line {self.line(number)}",) if self.has(number) and self._breaks.size else ()))
+        line = (f"line {self.line(number)}",) if self.has(number) and self._breaks.size else ()
+        subjects = (f"#{number}", *((f"#{also}",) if also is not None else ()), *line)
         return ProgramError(f"{self.name}, #{number}{entity}{'' if problem.startswith(',') else ' '}{problem}",
                             subjects=subjects, remedy="correct the instance named")
 
@@ -172,7 +173,8 @@ class Part21:
         k = int(np.searchsorted(self._point_ids, number))
         return k if k < len(self._point_ids) and self._point_ids[k] == number else -1
 
-    def _rows(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    def rows(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n,) int64: which of the points written plainly, with three numbers, they are; -1 where one is none."""
         if not len(self._point_ids):
             return np.full(len(numbers), -1, np.int64)
         k = np.minimum(np.searchsorted(self._point_ids, numbers), len(self._point_ids) - 1)
@@ -264,9 +266,8 @@ class Part21:
 
     def _values(self, text: str, at: int, number: int | None = None) -> list[Record]:
         """The records of a statement."""
-        tokens = _Tokens(text)
         try:
-            return tokens.records()
+            return _Tokens(text).records()
         except _Grammar as problem:
             if number is not None:
                 raise self.error(number, str(problem)) from None

@@ -246,7 +246,8 @@ class _Aim:
         self.below = {entity: self._ordered(entity) for entity in (
             "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP", "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP")}
         self.beside = {entity: self._related(entity) for entity in (
-            "MACHINING_OPERATION_RELATIONSHIP", "MACHINING_TECHNOLOGY_RELATIONSHIP", "MACHINING_FEATURE_RELATIONSHIP")}
+            "MACHINING_OPERATION_RELATIONSHIP", "MACHINING_TECHNOLOGY_RELATIONSHIP", "MACHINING_FUNCTIONS_RELATIONSHIP",
+            "MACHINING_FEATURE_RELATIONSHIP")}
         self.placements = self._placements()
         self.seen: set[int] = set()
 
@@ -365,6 +366,11 @@ class _Aim:
             raise self.file.error(operation, "has no tool: a MACHINING_TOOL whose usage holds it is due")
         self.course.take(self._cutter(tool), line)
         technology = self._one_beside("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
+        functions = self._one_beside("MACHINING_FUNCTIONS_RELATIONSHIP", operation)
+        coolant = self._told(functions, "coolant")
+        if coolant is None:
+            raise self.file.error(functions, "has no 'coolant': an ACTION_PROPERTY of that name is due")
+        self.course.coolant = coolant == "coolant on"
         paths = self.below["MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP"].get(operation)
         if paths is None:
             raise self.file.error(operation, "has no tool path: strategies without one are not read")
@@ -542,6 +548,13 @@ class _Aim:
     def _security_plane(self) -> tuple[F64, F64] | None:
         """Point, mm, and unit normal of the plane of the setup; None where there is no setup."""
         planes = []
+        for n in self.data.of("PROPERTY_DEFINITION"):
+            owner = self.data.ref(n, "PROPERTY_DEFINITION", "definition")
+            if "PRODUCT_DEFINITION" in self.file.names(owner):
+                formation = self.data.ref(owner, "PRODUCT_DEFINITION", "formation")
+                product = self.data.ref(formation, "PRODUCT_DEFINITION_FORMATION", "of_product")
+                if "MACHINING_SETUP" in self.file.names(product):
+                    self._word(n, "PROPERTY_DEFINITION", "name", ("security plane",))
         for n in self.data.of("PROPERTY_DEFINITION_REPRESENTATION"):
             prop = self.data.ref(n, "PROPERTY_DEFINITION_REPRESENTATION", "definition")
             if self.data.one(prop, "PROPERTY_DEFINITION", "name") == "security plane":

@@ -66,7 +66,7 @@ _KNOTS = {"u_multiplicities": Many(Whole(), 2), "v_multiplicities": Many(Whole()
 TABLE: Table = {
     "PROJECT": attributes(its_id=Text(), main_workplan=To(("WORKPLAN",)), its_workpieces=Many(To(("WORKPIECE",))),
                           its_owner=Maybe(To()), its_release=Maybe(To()), its_status=Maybe(To())),
-    "WORKPLAN": attributes(its_id=Text(), its_elements=Many(To(_EXECUTABLES)), its_channel=Maybe(To(("CHANNEL",))),
+    "WORKPLAN": attributes(its_id=Text(), its_elements=Many(To(_EXECUTABLES), 1), its_channel=Maybe(To(("CHANNEL",))),
                            its_setup=Maybe(To(("SETUP",))), its_effect=Maybe(To())),
     "CHANNEL": attributes(its_id=Text()),
     "MACHINING_WORKINGSTEP": attributes(its_id=Text(), its_secplane=To(("PLANE",)), its_feature=To(),
@@ -222,15 +222,15 @@ class _Arm:
         elif entity == "RAPID_MOVEMENT":
             self._rapid(place, number, line)
         elif entity == "MACHINING_WORKINGSTEP":
-            feature = self._feature(self.data.ref(number, entity, "its_feature"))
-            self._operation(self.data.ref(number, entity, "its_operation"), feature)
+            feature, operation = (self.data.ref(number, entity, a) for a in ("its_feature", "its_operation"))
+            self._operation(operation, self._feature(feature, operation))
 
     def _rapid(self, place: int, number: int, line: int) -> None:
         """One without a path brings the tool of the next workingstep over the security plane to where that begins."""
         entity = "RAPID_MOVEMENT"
         paths = self.data.maybe(number, entity, "its_toolpath")
         if paths is not None:
-            self._paths(paths, np.eye(4), self._direction(number, entity), None, rapid=True)
+            self._paths(paths, np.eye(4), self._direction(number, entity), number, None, rapid=True)
             return
         point, normal = self._plane(self.data.ref(number, entity, "its_secplane"))
         self.course.over(point, normal, line)
@@ -243,9 +243,12 @@ class _Arm:
     def _take(self, tool: int, line: int) -> None:
         self.course.take(self._cutter(tool), line)
 
-    def _feature(self, number: int) -> F64:
-        """(4, 4): from the feature to the workpiece."""
+    def _feature(self, number: int, operation: int) -> F64:
+        """(4, 4): from the feature, which has to list the operation on it, to the workpiece."""
         for _, values in self.file.records(number)[:1]:
+            listed = values[2] if len(values) > 2 else None
+            if not isinstance(listed, list) or Ref(operation) not in listed:
+                raise self.file.error(number, f", its_operations: a list with #{operation} expected")
             placement: Value = values[3] if len(values) > 3 else None
             if isinstance(placement, Ref):
                 return self.data.placement(int(placement))
@@ -263,7 +266,10 @@ class _Arm:
                 raise self.file.error(number, f", {attribute}: $ expected, as the tool path holds it")
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
-        self._paths(paths, place, self._direction(number, entity), technology, rapid=False)
+        functions = self.data.ref(number, entity, "its_machine_functions")
+        self.course.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
+        self._paths(paths, place, self._direction(number, entity), number, technology,
+                    rapid=False)
 
     def _direction(self, number: int, entity: str) -> F64 | None:
         """(3,): the tool axis where paths have none; None where they must."""
@@ -277,14 +283,17 @@ class _Arm:
             return self.data.vector(self.data.ref(target, kind, "its_tool_direction"))
         return None
 
-    def _paths(self, number: int, place: F64, direction: F64 | None, technology: int | None, *, rapid: bool) -> None:
+    def _paths(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None, *,
+               rapid: bool) -> None:
+        """Follow a list of paths; direction is the tool axis where they have none, as their owner says it."""
         for path in self.data.refs(number, "TOOLPATH_LIST", "its_list"):
             if self.data.get(path, "CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")[0] == "FEEDSTOP":
                 self.course.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
             else:
-                self._trajectory(path, place, direction, technology, rapid)
+                self._trajectory(path, place, direction, owner, technology, rapid)
 
-    def _trajectory(self, number: int, place: F64, direction: F64 | None, technology: int | None, rapid: bool) -> None:
+    def _trajectory(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None,
+                    rapid: bool) -> None:
         entity = "CUTTER_LOCATION_TRAJECTORY"
         tips, lines = self.data.curve(self.data.ref(number, entity, "basiccurve"))
         leaning = self.data.maybe(number, entity, "its_toolaxis")
@@ -292,7 +301,8 @@ class _Arm:
             axes, _ = self.data.curve(leaning)
             axes = self.data.unit_axes(number, "its_toolaxis", axes, len(tips))
         elif direction is None:
-            raise self.file.error(number, ", its_toolaxis: POLYLINE expected, as nothing else says how the tool stands")
+            raise self.file.error(number, f", its_toolaxis: POLYLINE expected, or THREE_AXES as its_tool_direction of "
+                                          f"#{owner}: nothing says how the tool stands", owner)
         else:
             axes = np.tile(direction, (len(tips), 1))
         if self.data.one(number, entity, "its_direction") == "F":

@@ -1,0 +1,271 @@
+"""STEP-NC read by the proof's own readers: plans come back, odd texts are understood, two readings that differ are told
+apart, and a file is simulated like the program of the same job."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import InternalError, ProgramError
+from output.linuxcnc import write_linuxcnc
+from output.model import Ap238, StockBox
+from output.part21 import quoted
+from output.stepnc_aim import stream_stepnc_aim, write_stepnc_aim
+from output.stepnc_arm import stream_stepnc_arm, write_stepnc_arm
+from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
+from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
+from toolpath.motion import Motion, Trajectory
+from verify.agree import check_agreement
+from verify.kinematics import KINDS, Kinematics
+from verify.model import NcProgram
+from verify.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
+from verify.prove import prove
+from verify.reader import read_program
+from verify.stepnc import is_stepnc, read_moves, read_stepnc
+
+FORMS = {"aim": write_stepnc_aim, "arm": write_stepnc_arm}
+both = pytest.mark.parametrize("write", FORMS.values(), ids=FORMS)
+JOBS = {"tiny": tiny, "three axes": plan, "all there is": full, "long": lambda: long_plan(20_000, 40),
+        "with shapes": shaped, "restart points": lambda: plan(restart=True),
+        "turning, all": lambda: shaped(job=clamped()), "turning, restart": lambda: replace(
+            clamped(), restart=True)}
+TURNING = {f"{kind} {'tip' if tcp else 'joints'}": (kind, tcp) for kind in KINDS for tcp in (True, False)}
+
+
+def machine_of(job):
+    return None if job.clamping is None else Kinematics(job.clamping.machine.kind, job.clamping.machine.pivots)
+
+
+def nc_of(job):
+    gauges = {} if job.clamping is None else job.clamping.gauges
+    return read_program(write_linuxcnc(job), name="ngc", kinematics=machine_of(job), gauge_length=gauges)
+
+
+@both
+@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
+def test_both_forms_do_what_the_program_does(write, job):
+    wanted = job()
+    read = read_stepnc(write(wanted), tools=wanted.tools, kinematics=machine_of(wanted))
+    assert not read.remarks
+    agreement = check_agreement(nc_of(wanted), read)
+    assert agreement.moves > 5 and agreement.tip < 1e-6 and agreement.axis < 1e-8
+
+
+@both
+@pytest.mark.parametrize("machine", TURNING.values(), ids=TURNING)
+def test_both_forms_do_what_the_program_of_every_machine_does(write, machine):
+    wanted = clamped(*machine)
+    agreement = check_agreement(nc_of(wanted), read_stepnc(write(wanted), tools=wanted.tools,
+                                                           kinematics=machine_of(wanted)))
+    assert agreement.tip < 3e-4 and agreement.axis < 1e-8  # joints are rounded, and with them the tips
+
+
+@both
+def test_planned_points_feeds_and_tools_come_back(write):
+    wanted = plan()
+    m = read_moves(write(wanted))
+    for s in wanted.steps:
+        mine = np.array([c.number for c in m.cutters])[m.cutter] == s.tool.number
+        ends = m.end[mine]
+        for t in s.trajectories:
+            far = np.abs(ends[:, None] - t.points[None]).max(axis=2).min(axis=0)
+            assert far[1:].max() < 0.51e-4
+            if t.motion is not Motion.RAPID:
+                assert np.isclose(m.feed[mine], t.feed, rtol=1e-9).any()
+    assert [c.kind for c in m.cutters] == ["bull", "flat", "ball"] and set(m.speed[~m.rapid].tolist()) == {12000.0}
+    assert [c.assembly_length for c in m.cutters] == [80.0, 70.0, 75.0] and m.coolant[~m.rapid].all()
+    assert (m.end_axis == [0.0, 0.0, 1.0]).all() and m.arrival.sum() == 4
+
+
+@both
+def test_a_fresh_cutter_stops_the_program_at_the_clearance_plane(write):
+    job = full()
+    read = read_stepnc(write(job), tools=job.tools)
+    stop = next(s for s in read.stops if s.what == "program stop")
+    assert stop.tip[2] == job.clearance_plane and stop.tool == 1
+    assert "Fresh cutter in T1" in write(job)
+
+
+@pytest.mark.parametrize("stream", [stream_stepnc_aim, stream_stepnc_arm])
+def test_pieces_are_small_and_make_the_file(stream):
+    pieces: list[str] = []
+    stream(long_plan(60_000), pieces.append)
+    whole = "".join(pieces)
+    assert whole.startswith("ISO-10303-21;") and whole.endswith("END-ISO-10303-21;\n")
+    assert max(map(len, pieces)) < 0.2 * len(whole)
+
+
+@both
+def test_what_differs_is_found(write):
+    """Each plan is the first but for one thing; its STEP-NC must not pass for that of the first program."""
+    good = plan(step(1, BALL, "zlevel"))
+    cut = good.steps[0].trajectories[2]
+    moved = cut.points.copy()
+    moved[3, 2] += 0.0012
+    thinner = Trajectory(cut.motion, np.delete(cut.points, 3, axis=0), cut.feed)
+
+    def with_cut(t):
+        ways = [*good.steps[0].trajectories]
+        ways[2] = t
+        return plan(replace(good.steps[0], trajectories=tuple(ways)))
+
+    others = {
+        "place": with_cut(Trajectory(cut.motion, moved, cut.feed)),
+        "feed": with_cut(replace(cut, feed=cut.feed + 0.1)),
+        "point": with_cut(thinner),
+        "speed": plan(replace(good.steps[0], spindle_rpm=11999.0)),
+        "tool": plan(replace(good.steps[0], tool=replace(BALL, number=2))),
+        "end": plan(replace(good.steps[0], trajectories=good.steps[0].trajectories[:3])),
+        "more": plan(good.steps[0], replace(step(2, BALL, "floor"), trajectories=(
+            line(Motion.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))),
+        "plane": replace(good, clearance_plane=26.0),
+    }
+    proved = nc_of(good)
+    check_agreement(proved, read_stepnc(write(good)))
+    for what, job in others.items():
+        with pytest.raises(InternalError) as found:
+            check_agreement(proved, read_stepnc(write(job)))
+        assert found.value.code == "stepnc_differs", what
+
+
+def test_a_line_with_other_points_is_the_same_line():
+    """Points left out of a straight pass are no difference; out of a bent one they are."""
+    ways = [line(Motion.CUT, (0, 0, 5), (4, 0, 5), (10, 0, 5), feed=600.0)]
+    bent = [line(Motion.CUT, (0, 0, 5), (4, 0.002, 5), (10, 0, 5), feed=600.0)]
+    short = [line(Motion.CUT, (0, 0, 5), (10, 0, 5), feed=600.0)]
+    jobs = [plan(step(1, BALL, "floor", trajectories=tuple(w))) for w in (ways, bent, short)]
+    read = [read_stepnc(write_stepnc_aim(j)) for j in jobs]
+    check_agreement(nc_of(jobs[2]), read[0])
+    check_agreement(nc_of(jobs[0]), read[2])
+    with pytest.raises(InternalError):
+        check_agreement(nc_of(jobs[2]), read[1])
+
+
+def test_values_of_all_kinds_and_complex_instances():
+    head = ("ISO-10303-21;\nHEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');"
+            "FILE_SCHEMA(('X'));ENDSEC;\nDATA;\n")
+    body = ("/* comment; with 'quotes' and #7=A(); */ #1 = A ( 1.5 , -2.E-3,\n +3 , 'it''s; /* no comment */' , "
+            ".T. , $ , * ,\n"
+            "#12,(#1,()),LENGTH_MEASURE(4.),\"0AF\") /* ; */ ;#2=(B(1.)\nC('x') /* y */ D());\n"
+            "#3=CARTESIAN_POINT('',(1.,2.,3.)); #4=CARTESIAN_POINT('\\X2\\00E9\\X0\\',(1.,2.,3.));\n"
+            "#5=CARTESIAN_POINT('',(1.,\n2.,/* two */3.));\n")
+    file = Part21(head + body + "ENDSEC;\nEND-ISO-10303-21;\n", "odd")
+    ((name, values),) = file.records(1)
+    assert name == "A" and values[:6] == [1.5, -0.002, 3, "it's; /* no comment */", Word("T"), None]
+    assert repr(values[6]) == "*" and values[7:] == [Ref(12), [Ref(1), []], Typed("LENGTH_MEASURE", 4.0),
+                                                     Typed("BINARY", "0AF")]
+    assert file.records(2) == [("B", [1.0]), ("C", ["x"]), ("D", [])] and file.names(2) == ("B", "C", "D")
+    assert file.of("C") == [2] and file.line(2) == 6 and file.has(4) and not file.has(9)
+    assert file.points(np.array([3]))[0].tolist() == [1.0, 2.0, 3.0]
+    assert file.records(5)[0][1] == ["", [1.0, 2.0, 3.0]] and file.records(4)[0][1][0] == "é"
+
+
+@pytest.mark.parametrize("text", ["it's \\ ok", "é漢x", "😀 100 %", "a\tb", "''", "\\X2\\"])
+def test_strings_come_back(text):
+    assert decoded(quoted(text)[1:-1]) == text
+
+
+@pytest.mark.parametrize(("given", "meant"), [("\\X\\E9", "é"), ("\\S\\i", "é"), ("\\PA\\a", "a"), ("a\nb", "ab")])
+def test_other_directives_of_strings(given, meant):
+    assert decoded(given) == meant
+
+
+@both
+def test_a_text_set_otherwise_is_the_same_job(write):
+    """Comments, blanks, statements over lines or all in one, instances in another order: nothing of it counts."""
+    wanted = plan(step(1, BALL, "zlevel"), step(2, BALL, "zigzag", x=11.0))
+    plain = write(wanted)
+    head, data = plain.split("DATA;\n")
+    rows = data.removesuffix("ENDSEC;\nEND-ISO-10303-21;\n").replace(",\n", ",").splitlines()
+    end = "ENDSEC;\nEND-ISO-10303-21;\n"
+    texts = [
+        "\ufeff/* made elsewhere */\n" + head + "DATA;\n" + "\n".join(reversed(rows)) + "\n" + end,
+        head + "DATA;\n" + "\n/* ' ; */\n".join(r.replace(",", ",\r\n  ").replace("=", " =\n ", 1) for r in rows) + end,
+        head.replace("\n", "") + "DATA;" + "".join(rows) + end.replace("\n", ""),
+    ]
+    good = read_moves(plain)
+    for other in texts:
+        got = read_moves(other)
+        for what in ("start", "end", "end_axis", "rapid", "feed", "speed", "cutter"):
+            assert np.array_equal(getattr(got, what), getattr(good, what), equal_nan=True)
+
+
+def test_what_is_step_nc_is_known_by_its_header():
+    assert is_stepnc(write_stepnc_aim(tiny())) and is_exchange_file("  /* x */\nISO-10303-21;\nHEADER;")
+    assert not is_stepnc("%\nG21 (ISO-10303-21;)\nM30\n%\n") and not is_stepnc("")
+
+
+def test_units_of_the_file_are_heeded():
+    """The same job in metres and seconds: mm and minutes come out."""
+    wanted = plan(step(1, BALL, "zlevel"))
+    text_ = write_stepnc_aim(wanted)
+    seconds = text_.replace("TIME_MEASURE(60.)", "TIME_MEASURE(1.)")
+    assert np.nanmax(read_moves(seconds).feed) == pytest.approx(60.0 * np.nanmax(read_moves(text_).feed))
+    micro = text_.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.MICRO.,.METRE.)")
+    assert np.allclose(1000.0 * read_moves(micro).end, read_moves(text_).end)
+
+
+def test_where_workpiece_and_feature_stand_is_heeded():
+    """Paths are in the system of their feature, in the workpiece, as the setup places it."""
+    text_ = write_stepnc_arm(tiny())
+    there = "AXIS2_PLACEMENT_3D('setup origin',#3,#4,#5)"
+    turned = text_.replace(there, "AXIS2_PLACEMENT_3D('setup origin',#9001,#9002,#9003)").replace(
+        "ENDSEC;\nEND-", "#9001=CARTESIAN_POINT('',(1.,2.,3.));\n#9002=DIRECTION('',(0.,0.,1.));\n"
+                         "#9003=DIRECTION('',(0.,1.,0.));\nENDSEC;\nEND-")
+    a, b = read_moves(text_), read_moves(turned)
+    keep = ~(a.arrival | np.roll(a.arrival, -1))
+    assert np.allclose(b.end[keep], np.column_stack([-a.end[keep, 1], a.end[keep, 0], a.end[keep, 2]]) + [1, 2, 3])
+
+
+def test_a_tool_is_known_by_its_number_or_its_size():
+    text_ = write_stepnc_arm(tiny())
+    nameless = text_.replace("MILLING_CUTTING_TOOL('T1: ball", "MILLING_CUTTING_TOOL('BALL_3MM: ball")
+    read = read_stepnc(nameless, tools=[BALL, OTHER])
+    assert set(read.tool.tolist()) == {1} and any("by its size" in n for n in read.notes)
+    with pytest.raises(ProgramError, match="none of the setup's"):
+        read_stepnc(nameless, tools=[OTHER])
+    other = read_stepnc(text_, tools=[replace(BALL, diameter=4.0, corner_radius=2.0)])
+    assert any("diameter 3 mm in the file and 4 mm" in r.message for r in other.remarks)
+
+
+def test_a_tool_that_leans_on_a_machine_that_cannot_is_remarked():
+    job = clamped()
+    assert any("no rotary axes" in r.message for r in read_stepnc(write_stepnc_arm(job), tools=job.tools).remarks)
+
+
+def pocket(lines):
+    """The pocket's program as a workplan of one step."""
+    p = read_program(text(lines), tools={1})
+    begin = int(np.flatnonzero(~np.isnan(p.feed))[0]) - 1
+    ways: list[Trajectory] = []
+    for k in range(begin, len(p)):
+        rapid = bool(np.isnan(p.feed[k]))
+        if np.abs(p.end[k] - p.start[k]).max() > 0.0:
+            ways.append(Trajectory(Motion.RAPID if rapid else Motion.CUT, np.array([p.start[k], p.end[k]]),
+                                   0.0 if rapid else float(p.feed[k])))
+    made = replace(step(1, TOOL, "layers", trajectories=tuple(ways)), spindle_rpm=8000.0, feed=400.0)
+    return plan(made, tools=(TOOL,), clearance_plane=20.0,
+                stock=StockBox(np.array([-20.5, -15.5, -10.0]), np.array([20.5, 15.5, 0.5])))
+
+
+@both
+def test_a_file_is_proved_like_the_program(write):
+    part, lines = block(), program()
+    own = scored(part)
+    plain = prove([("p", text(lines))], part, [TOOL], SETUP, own, ZONES)
+    job = pocket(lines)
+    proof = prove([NcProgram("job.stpnc", write(job))], part, [TOOL], SETUP, own, ZONES)
+    assert proof.counts == plain.counts and np.abs(proof.residual - plain.residual).max() < 1e-4
+    deep = replace(job, steps=(replace(job.steps[0], trajectories=tuple(
+        replace(t, points=t.points - [0.0, 0.0, 0.1]) for t in job.steps[0].trajectories)),))
+    found = prove([NcProgram("job.stpnc", write(deep))], part, [TOOL], SETUP, own, ZONES)
+    gouge = next(f for f in found.findings if f.kind == "gouge")
+    assert gouge.depth == pytest.approx(0.1, abs=0.01)
+    assert write(deep).split("\n")[gouge.line - 1].lstrip("#0123456789").startswith("=CARTESIAN_POINT")
+
+
+def test_the_first_edition_is_read_too():
+    job = replace(plan(), ap238=Ap238.INTEGRATED_CNC)
+    check_agreement(nc_of(job), read_stepnc(write_stepnc_aim(job), tools=job.tools))
