@@ -52,8 +52,9 @@ class RotaryMachine:
     kind   : 'table-table-AC', 'table-table-BC', 'head-table-BC', 'head-head-BC' or 'head-head-AC'
     pivots : mm, setup frame at zero, or None: table-table a point on the tilting and one on the turning axis,
              head-table (0, 0, spindle face up to the swivel) and a point on the turning axis, head-head the first alone
-    limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, or None
+    limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis as said above, or None
     tcp    : the control keeps the tip; else programs are of joints, and pivots are needed
+    sense  : 1, or -1 for an axis whose words count the other way; angles here are right-handed in either case
 
     Raises
     ------
@@ -65,6 +66,7 @@ class RotaryMachine:
     pivots: tuple[tuple[float, float, float], ...] | None = None
     limits: F64 | None = None
     tcp: bool = True
+    sense: tuple[int, int] = (1, 1)
 
     def __post_init__(self) -> None:
         if self.kind not in _AZIMUTH:
@@ -79,6 +81,10 @@ class RotaryMachine:
     def letters(self) -> str:
         """The two rotary words, the tilting axis first."""
         return self.kind[-2:]
+
+    def words(self, turns: F64) -> F64:
+        """Angles as programs say them, of or for right-handed ones, (..., 2), rad or deg; its own inverse."""
+        return turns if self.sense == (1, 1) else np.asarray(turns * np.array(self.sense))
 
     @property
     def tilts_head(self) -> bool:
@@ -305,7 +311,8 @@ class RotaryMachine:
             self._refuse(np.array([turns[k], turns[k]]), k)
 
     def _refuse(self, both: F64, place: int) -> None:
-        limits = [[-math.inf, math.inf]] * 2 if self.limits is None else self.limits
+        both = self.words(both)
+        limits = [[-math.inf, math.inf]] * 2 if self.limits is None else said_limits(self.limits, self.sense)
         asked = " or ".join(" ".join(f"{letter}{math.degrees(v):.3f}" for letter, v in zip(self.letters, row.tolist(),
                                                                                            strict=True))
                             for row in both)
@@ -343,6 +350,15 @@ class RotaryMachine:
         pivots = self._points()
         out = pivots[1] + _applied(_turn_matrix(2, turns[:, 1]), tips - pivots[1])
         return out if self.tilts_head else pivots[0] + _applied(self._tilt(turns), out - pivots[0])
+
+
+def said_limits(limits: F64, sense: tuple[int, int]) -> F64:
+    """(2, 2): least and greatest angles (2, 2), rad or deg, for words that count by ``sense``; its own inverse."""
+    out = np.array(limits, dtype=np.float64)
+    for row, way in enumerate(sense):
+        if way < 0:
+            out[row] = -out[row, ::-1]
+    return out
 
 
 def _through_pole(axes: F64, known: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -388,4 +404,4 @@ def _place(point: F64) -> str:
     return "(" + ", ".join(f"{v:.3f}" for v in point) + ")"
 
 
-__all__ = ["RotaryMachine"]
+__all__ = ["RotaryMachine", "said_limits"]

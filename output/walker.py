@@ -265,9 +265,10 @@ class _Turning(_Walk):
 
     def _leg(self, leg: Leg) -> None:
         """The blocks of a leg; it begins where the tool stands."""
-        turns = to_grid(np.degrees(leg.turns))
+        turns = to_grid(self.machine.words(np.degrees(leg.turns)))
         gauge = 0.0 if self.tool is None else self.clamping.gauges[self.tool.number]
-        linear = leg.tips if self.machine.tcp else self.machine.joints(leg.tips, np.radians(turns * GRID), gauge)
+        linear = leg.tips if self.machine.tcp else self.machine.joints(
+            leg.tips, np.radians(self.machine.words(np.asarray(turns * GRID, dtype=np.float64))), gauge)
         points = np.column_stack([to_grid(linear), turns])
         if self.position is not None:
             points[0] = self.position
@@ -373,7 +374,8 @@ def _heights(plan: Workplan, d: Dialect) -> list[str]:
     out = [f"Part, stock and fixtures lie in the ball round {ball}: the tool turns outside it", _lowest(plan),
            *(f"Access {name}, tool axis " + " ".join(decimal(v, 6) for v in f.rotation[2].tolist()) + ": "
              + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
-                        zip(c.machine.letters, c.machine.follow(f.rotation[2:], np.zeros(2))[0], strict=True))
+                        zip(c.machine.letters, c.machine.words(c.machine.follow(f.rotation[2:], np.zeros(2))[0]),
+                            strict=True))
              + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items())]
     if c.machine.tcp:
         return [*out, d.tcp_words]
@@ -384,10 +386,14 @@ def _heights(plan: Workplan, d: Dialect) -> list[str]:
             f"Made only for pivots {pivots} mm{head}"]
 
 
+def lowest_tip(plan: Workplan) -> float:
+    """mm: the lowest Z of the tip in the frame of the program, rotary axes at 0."""
+    return min(float((t.points @ _into_setup(plan, s.access))[:, 2].min()) for s in plan.steps for t in s.trajectories)
+
+
 def _lowest(plan: Workplan) -> str:
     """How deep the tip goes, for whoever sets the part on a table."""
-    lowest = min(float((t.points @ _into_setup(plan, s.access))[:, 2].min()) for s in plan.steps
-                 for t in s.trajectories)
+    lowest = lowest_tip(plan)
     below = float(plan.stock.lower[2]) - lowest
     more = f", {decimal(below, 3)} below the stock box: nothing may stand there" if below > LEAST_BELOW else ""
     return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
@@ -416,4 +422,4 @@ def step_words(step: Workingstep) -> str:
     return "; ".join(words)
 
 
-__all__ = ["label_number", "path_tolerance", "plane_axes", "step_words", "write_program"]
+__all__ = ["label_number", "lowest_tip", "path_tolerance", "plane_axes", "step_words", "write_program"]

@@ -29,6 +29,11 @@ class Machine(WireModel):
         description="Rotary axes of a 5-axis machine, the tilting one first, by what carries them; needed there, null "
                     "on a 3-axis one. A table turns the part by Rz(C) and then Rx(A) or Ry(B), as LinuxCNC's "
                     "xyzac-trt does; a head turns the tool by Rx(A) or Ry(B) and then Rz(C).")] = None
+    iso_axes: Annotated[list[Literal["A", "B", "C"]], Field(
+        max_length=2,
+        description="Axes of a table whose positive angle turns the tool right-handed as seen from the table (ISO "
+                    "841), and so the table the other way; all others turn the table right-handed, as LinuxCNC's do. "
+                    "Counts for programs that are planned and that are verified, and for rotary_deg.")] = []
     tcp: Annotated[bool, Field(description="The control keeps the tool tip in rotary moves; false: programs are of "
                                            "the linear joints, and pivots_mm is needed. No effect on a 3-axis machine, "
                                            "nor on a program that is verified: that says so by G43.4 or M428.")] = True
@@ -109,12 +114,17 @@ class Machine(WireModel):
     def _check_rotary(self) -> None:
         """What belongs to rotary axes stands on a 5-axis machine only, and fits them."""
         if self.kind == "3-axis":
+            if self.iso_axes:
+                raise ValueError("machine.iso_axes belongs to a 5-axis machine; leave it empty, or say kind '5-axis'")
             for name in ("kinematics", "table_z_mm", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"machine.{name} belongs to a 5-axis machine; leave it null, or say kind '5-axis'")
             return
         if self.kinematics is None:
             raise ValueError("machine.kinematics is needed where machine.kind is '5-axis', such as 'table-table-AC'")
+        tables = {"table-table": self.kinematics[-2:], "head-table": "C"}.get(self.kinematics[:-3], "")
+        if wrong := [letter for letter in self.iso_axes if letter not in tables]:
+            raise ValueError(f"machine.iso_axes: {', '.join(wrong)} is no axis of a table of {self.kinematics}")
         for letter, limits in zip(self.kinematics[-2:], self.rotary_deg or (), strict=False):
             if limits[0] >= limits[1]:
                 raise ValueError(f"machine.rotary_deg of {letter}: {limits[0]:g} is not below {limits[1]:g}")

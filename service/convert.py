@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
 from geometry.toolbody import HolderSegment, ToolBody
-from output.kinematics import RotaryMachine
+from output.kinematics import RotaryMachine, said_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
@@ -149,7 +149,7 @@ def _check_turning(setup: Setup, machine: RotaryMachine) -> None:
         axis = np.array([access.direction], dtype=np.float64)
         axis /= np.linalg.norm(axis)
         if not machine.stands(axis)[0]:
-            both = np.degrees(machine.turns(axis)[0]).round(3).tolist()
+            both = np.degrees(machine.words(machine.turns(axis)[0])).round(3).tolist()
             raise SetupError(f"access {access.id}, tool axis {access.direction}, cannot be turned to",
                              code="access_out_of_reach", subjects=(access.id, "machine.rotary_deg"), measured=both,
                              limit=setup.machine.rotary_deg,
@@ -187,7 +187,14 @@ def machine_kinematics(machine: Machine) -> Kinematics | None:
     if machine.kinematics is None:
         return None
     pivots = machine.pivots_mm
-    return Kinematics(machine.kinematics, None if pivots is None else tuple((x, y, z) for x, y, z in pivots))
+    return Kinematics(machine.kinematics, None if pivots is None else tuple((x, y, z) for x, y, z in pivots),
+                      _sense(machine))
+
+
+def _sense(machine: Machine) -> tuple[int, int]:
+    """Whether the words of the tilting and the turning axis count as the table turns, 1, or the other way, -1."""
+    tilting = (machine.kinematics or "AC")[-2]
+    return -1 if tilting in machine.iso_axes else 1, -1 if "C" in machine.iso_axes else 1
 
 
 def rotary_machine(machine: Machine) -> RotaryMachine | None:
@@ -202,14 +209,17 @@ def rotary_machine(machine: Machine) -> RotaryMachine | None:
         return None
     pivots = None if machine.pivots_mm is None else tuple((x, y, z) for x, y, z in machine.pivots_mm)
     try:
-        return RotaryMachine(machine.kinematics, pivots, rotary_limits(machine), machine.tcp)
+        limits, sense = rotary_limits(machine), _sense(machine)
+        return RotaryMachine(machine.kinematics, pivots, None if limits is None else said_limits(limits, sense),
+                             machine.tcp, sense)
     except OutputError as refusal:
         raise SetupError(refusal.message, code=refusal.code, subjects=refusal.subjects,
                          remedy=refusal.remedy) from None
 
 
 def rotary_limits(machine: Machine) -> NDArray[np.float64] | None:
-    """(2, 2) float64, rad, least and greatest angle of the tilting and the turning axis; None where not limited."""
+    """(2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, as programs say them; None
+    where not limited."""
     return None if machine.rotary_deg is None else np.radians(machine.rotary_deg)
 
 

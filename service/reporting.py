@@ -78,7 +78,7 @@ def accesses_of(ready: Prepared) -> list[dict[str, Any]]:
     out = []
     for v in ready.views:
         turn = None if machine is None else [r(a) for a in np.degrees(
-            machine.follow(v.direction[None], np.zeros(2))[0]).tolist()]
+            machine.words(machine.follow(v.direction[None], np.zeros(2))[0])).tolist()]
         out.append({"id": v.id, "axis": [r(x, 9) for x in v.direction.tolist()], "found": v.id not in given,
                     "rotary_deg": turn})
     return out

@@ -38,6 +38,8 @@ class Kinematics:
     pivots : mm, setup frame with both rotary axes at zero, or None where nobody said; table-table: a point on the
              tilting and one on the turning axis; head-table: (0, 0, spindle face up to the swivel) and a point on the
              turning axis; head-head: (0, 0, spindle face up to the swivel)
+    sense  : of the words of the two axes, 1 as above, -1 for a table axis whose positive angle turns the tool
+             right-handed as seen from the table (ISO 841), so the table the other way
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Kinematics:
 
     kind: str
     pivots: tuple[Point, ...] | None = None
+    sense: tuple[int, int] = (1, 1)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -92,7 +95,7 @@ class Kinematics:
 
         Returns (n, 3) float64 unit vectors, tip to spindle, setup frame.
         """
-        tilt, spin = turn.T
+        tilt, spin = self._right_handed(turn).T
         up = np.zeros((len(turn), 3))
         up[:, 2] = 1.0
         if self.turns_head:
@@ -108,6 +111,7 @@ class Kinematics:
 
         Returns (n, 3) float64, mm, setup frame. Raises VerificationError (no_pivots) where no pivots are given.
         """
+        turn = self._right_handed(turn)
         return self._on_part(joints + self._swing(turn, gauge), turn)
 
     def joints(self, tip: F64, turn: F64, gauge: F64 | float) -> F64:
@@ -119,6 +123,7 @@ class Kinematics:
 
         Returns (n, 3) float64, mm. Raises VerificationError (no_pivots) where no pivots are given.
         """
+        turn = self._right_handed(turn)
         return self._in_machine(tip, turn) - self._swing(turn, gauge)
 
     def slides(self, turn: F64) -> F64:
@@ -131,6 +136,7 @@ class Kinematics:
         out = np.tile(np.eye(3), (len(turn), 1, 1))
         if self.turns_head:
             return out
+        turn = self._right_handed(turn)
         for row in range(3):
             way = out[:, row].copy()
             if not self.tilts_head:
@@ -150,6 +156,10 @@ class Kinematics:
             raise VerificationError(f"the pivots of {self.kind} are not known", code="no_pivots",
                                     subjects=("machine.pivots_mm",), remedy="give machine.pivots_mm")
         return self.pivots
+
+    def _right_handed(self, turn: F64) -> F64:
+        """(n, 2) rad: how far heads and tables are turned, right-handed, for the angles of the words."""
+        return turn if self.sense == (1, 1) else turn * np.array(self.sense, dtype=np.float64)
 
     def _swing(self, turn: F64, gauge: F64 | float) -> Any:
         """(n, 3) mm, how far the head carries the tip off the joints: L (e_z - h)."""

@@ -10,6 +10,7 @@ import pytest
 
 from geometry.errors import OutputError, ProgramError, VerificationError
 from output.dialects import DIALECTS, Switches
+from output.kinematics import RotaryMachine, said_limits
 from output.linuxcnc import write_linuxcnc
 from output.walker import write_program
 from tests.golden_file import assert_golden
@@ -205,6 +206,38 @@ def test_whose_program_a_text_is():
     with pytest.raises(VerificationError) as unknown:
         read_program("M30\n", dialect="fagor")
     assert unknown.value.code == "unknown_dialect"
+
+
+@pytest.mark.parametrize("tcp", [True, False])
+@pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC"])
+def test_tables_that_count_the_other_way(kind, tcp):
+    """ISO 841: the words change their sign, and tips, tool axes, feeds and times are the same."""
+    work = clamped(kind, tcp)
+    machine = work.clamping.machine
+    other = replace(work, clamping=replace(work.clamping, machine=replace(machine, sense=(-1, -1))))
+    text = write_linuxcnc(other)
+    def turned(m):
+        return m[1] + ("" if m[2] or float(m[3]) == 0 else "-") + m[3]
+
+    code, usual = (t.split("M3 M8", 1)[1] for t in (text, write_linuxcnc(work)))
+    assert code == re.sub(rf"\b([{kind[-2]}C])(-?)(\d+\.\d*)", turned, usual)
+    iso = read_program(text, kinematics=Kinematics(kind, machine.pivots, (-1, -1)), gauge_length=work.clamping.gauges)
+    usual = read(work, write_linuxcnc(work), "linuxcnc")
+    assert np.abs(iso.end - usual.end).max() < 1e-9 and np.array_equal(iso.line, usual.line)
+    assert np.abs(iso.poses.end_axis - usual.poses.end_axis).max() < 1e-12
+    assert np.array_equal(iso.poses.end_turn, -usual.poses.end_turn)
+    assert np.allclose(iso.minutes, usual.minutes, equal_nan=True)
+
+
+def test_the_sense_of_iso_841():
+    """A table that says A30 C90 holds the part so that the tool stands as if it were turned by A, and then by C."""
+    a, c = np.radians([30.0, 90.0])
+    got = Kinematics("table-table-AC", None, (-1, -1)).axis(np.array([[a, c]]))[0]
+    tilted = np.array([0.0, -np.sin(a), np.cos(a)])
+    assert np.allclose(got, [-np.sin(c) * tilted[1], np.cos(c) * tilted[1], tilted[2]], atol=1e-12)
+    same = RotaryMachine("table-table-AC", None, None, True, (-1, -1))
+    assert np.allclose(same.axes(same.words(np.array([[a, c]])))[0], got, atol=1e-12)
+    assert said_limits(np.array([[-30.0, 110.0], [-360.0, 360.0]]), (-1, 1)).tolist() == [[-110, 30], [-360, 360]]
 
 
 @pytest.mark.parametrize("kind", ["table-table-AC", "head-head-BC"])
