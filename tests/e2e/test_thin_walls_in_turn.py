@@ -82,8 +82,8 @@ def test_tools_after_each_other_keep_it_too(tmp_path):
 
 
 def test_what_no_decomposition_calls_a_wall_is_planned_again_in_bands(tmp_path):
-    """A pin of 0.8 mm, 9.5 high."""
-    shape = base().union(cq.Workplane().circle(0.4).extrude(10.0).translate((0, 0, 2.5))).union(
+    """A pin of 0.6 mm, 9.5 high."""
+    shape = base().union(cq.Workplane().circle(0.3).extrude(10.0).translate((0, 0, 2.5))).union(
         box(2, 8, 6, 4.5, -4, 2.5))
     step = written(shape, tmp_path / "pin.step")
     ready = prepare(step, setup(), lambda *_: None)
