@@ -9,6 +9,7 @@ are changed with both rotary axes at zero, above the ball.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +80,12 @@ def home_of(clamping: Clamping) -> F64:
 
 
 def sections(plan: Workplan) -> list[Section]:
-    """All steps of a clamping with the ways between them.
+    """All steps of a clamping with the ways between them; errors as of ``each_section``."""
+    return list(each_section(plan))
+
+
+def each_section(plan: Workplan) -> Iterator[Section]:
+    """One step of a clamping after the other, with the ways between them, none kept.
 
     Raises
     ------
@@ -89,15 +95,14 @@ def sections(plan: Workplan) -> list[Section]:
     """
     if plan.clamping is None:
         raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
-    walk, out, steps = _Walk(plan.clamping), [], plan.steps
+    walk, steps = _Walk(plan.clamping), plan.steps
     for k, step in enumerate(steps):
         fresh = k == 0 or step.tool != steps[k - 1].tool or step.fresh or plan.restart
         last = k + 1 == len(steps) or steps[k + 1].tool != step.tool or steps[k + 1].fresh or plan.restart
         grid_path(step)
         before = walk.enter(step, fresh)
         legs = walk.through(step)
-        out.append(Section(step, fresh, last, tuple(before), tuple(legs), tuple(walk.home()) if last else ()))
-    return out
+        yield Section(step, fresh, last, tuple(before), tuple(legs), tuple(walk.home()) if last else ())
 
 
 class _Walk:
@@ -194,4 +199,4 @@ def _outside(clamping: Clamping) -> float:
     return clamping.radius / math.cos(TURN_STEP) + SPARE
 
 
-__all__ = ["Leg", "Section", "home_of", "sections"]
+__all__ = ["Leg", "Section", "each_section", "home_of", "sections"]

@@ -10,7 +10,7 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
-from output.clamping import Leg, sections
+from output.clamping import Leg, each_section
 from output.grid import GRID, I64, grid_path, link, to_grid, without_repeats
 from output.kinematics import RotaryMachine
 from output.model import Workplan
@@ -43,13 +43,13 @@ class Way:
 
 
 def ways(plan: Workplan) -> Iterator[Way]:
-    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``sections``.
+    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``each_section``.
 
     The rapids are those of the program: to a tool change from the clearance plane, and from there to it.
     """
     if plan.clamping is not None:
         machine = plan.clamping.machine
-        for s in sections(plan):
+        for s in each_section(plan):
             yield Way(s.step, s.fresh, *(_curves(legs, machine) for legs in (s.before, s.legs, s.after)))
         return
     clearance = int(to_grid(np.array([plan.clearance_plane]))[0])

@@ -76,6 +76,20 @@ class CutterMoves:
     cutters: tuple[Cutter, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Chunk:
+    """Moves of one path: tips, axes where they are not Z, what holds for all of them, and lines.
+
+    said : rapid, feed, speed, cutter, arrival, coolant
+    """
+
+    start: F64
+    end: F64
+    axes: tuple[F64, F64] | None
+    said: tuple[float, ...]
+    line: I32
+
+
 class Course:
     """What was come upon so far.
 
@@ -86,7 +100,7 @@ class Course:
     def __init__(self, name: str, lines: int) -> None:
         self.name, self._lines = name, lines
         self.cutters: list[Cutter] = []
-        self._chunks: list[F64] = []
+        self._chunks: list[_Chunk] = []
         self._count = 0
         self._here: F64 | None = None  # (6,) tip and axis
         self._tool: int | None = None
@@ -133,12 +147,18 @@ class Course:
 
     def moves(self) -> CutterMoves:
         """All moves so far."""
-        rows = np.concatenate(self._chunks) if self._chunks else np.zeros((0, 19))
-        a, b = rows[:, :6], rows[:, 6:12]
-        start, end, first, last = (np.ascontiguousarray(v) for v in (a[:, :3], b[:, :3], a[:, 3:], b[:, 3:]))
-        return CutterMoves(start, end, first, last, rows[:, 12] > 0, rows[:, 13].copy(), rows[:, 14].copy(),
-                           rows[:, 18] > 0, rows[:, 15].astype(np.int32), rows[:, 16].astype(np.int32),
-                           rows[:, 17] > 0, tuple(self.cutters))
+        chunks = self._chunks
+        count = np.array([len(c.start) for c in chunks], np.int64)
+        start, end = (np.concatenate([np.zeros((0, 3)), *tips]) for tips in zip(
+            *((c.start, c.end) for c in chunks), strict=True)) if chunks else (np.zeros((0, 3)), np.zeros((0, 3)))
+        first = last = np.broadcast_to(np.array(UP), (len(start), 3))
+        if any(c.axes is not None for c in chunks):
+            first, last = (np.concatenate([np.tile(UP, (len(c.start), 1)) if c.axes is None else c.axes[k]
+                                           for c in chunks]) for k in (0, 1))
+        said = np.repeat(np.array([c.said for c in chunks]).reshape(-1, 6), count, axis=0)
+        line = np.concatenate([np.zeros(0, np.int32), *(c.line for c in chunks)])
+        return CutterMoves(start, end, first, last, said[:, 0] > 0, said[:, 1].copy(), said[:, 2].copy(),
+                           said[:, 5] > 0, said[:, 3].astype(np.int32), line, said[:, 4] > 0, tuple(self.cutters))
 
     def program(self, numbers: Sequence[int], machine: Kinematics | None) -> Program:
         """The moves as a program.
@@ -246,9 +266,10 @@ class Course:
             raise VerificationError(f"{self.name} makes too many moves, {MOST_MOVES} are allowed",
                                     code="program_too_long", measured=self._count, limit=MOST_MOVES,
                                     remedy="split the job")
-        tail = np.tile([float(v) for v in row], (len(start), 1))
-        self._chunks.append(np.hstack([start, end, tail, lines[:, None],
-                                       np.tile([float(arrival), float(self.coolant)], (len(start), 1))]))
+        upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
+        axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
+        said = (*(float(v) for v in row), float(arrival), float(self.coolant))
+        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, said, lines.astype(np.int32)))
 
 
 def _between(start: F64, end: F64, share: F64) -> F64:

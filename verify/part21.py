@@ -20,6 +20,7 @@ from geometry.mesh import F64, I32
 
 SHOWN = 60  # characters of a text that an error quotes
 _CHUNK = 65_536
+_PIECE = 1 << 20
 _NUMBER = r"[-+]?[0-9]+\.[0-9]*(?:E[-+]?[0-9]+)?"
 _SKIP = re.compile(r"(?:\s++|/\*.*?\*/)*+", re.DOTALL)
 _BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
@@ -91,9 +92,8 @@ class Part21:
         self._named: dict[str, list[int]] = {}
         begin = self._frame()
         self._scan(begin)
-        newlines = np.flatnonzero(np.frombuffer(text.encode("ascii", "replace"), np.uint8) == 10)
-        self._breaks: NDArray[np.int64] = newlines
-        self.lines = len(newlines) + (0 if text.endswith("\n") else 1)
+        self._breaks = _newlines(text)
+        self.lines = len(self._breaks) + (0 if text.endswith("\n") else 1)
 
     def of(self, entity: str) -> list[int]:
         """Numbers of the instances of an entity, in the order they stand; of complex ones those it is a record of."""
@@ -272,6 +272,13 @@ class Part21:
             if number is not None:
                 raise self.error(number, str(problem)) from None
             raise self._broken(at, str(problem)) from None
+
+
+def _newlines(text: str) -> NDArray[np.int64]:
+    """(n,) int64: where lines of a text end, found piece by piece so that it is not held twice."""
+    found = [low + np.flatnonzero(np.frombuffer(text[low:low + _PIECE].encode("ascii", "replace"), np.uint8) == 10)
+             for low in range(0, len(text), _PIECE)]
+    return np.concatenate([np.zeros(0, np.int64), *found])
 
 
 def _entity_names(body: str) -> list[str]:
