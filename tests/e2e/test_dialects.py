@@ -24,7 +24,7 @@ cq = pytest.importorskip("cadquery")
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
 SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0},
          "operations": {"finishing": False}, "access": [{"work_offset": "G59.1"}],
-         "machine": {"dialects": ["siemens", "linuxcnc", "fanuc", "haas", "heidenhain"]}}
+         "machine": {"dialects": ["siemens", "linuxcnc", "fanuc", "haas", "heidenhain"], "restart_points": True}}
 NAMES = {d: f"program.{d}.{ending}" for d, ending in DIALECT_ENDINGS.items()}
 
 

@@ -188,10 +188,10 @@ def test_other_programs_of_these_controls_are_read():
     assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0] and siemens.blend == 0.005
     plain = read_program('BEGIN PGM T INCH\nBLK FORM 0.1 Z X+0 Y+0 Z-1\nTOOL CALL 1 Z S5000 F300 ; ball\n'
                          "CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\n* - cut\n"
-                         "L X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
+                         "CYCL DEF 32.0 TOLERANZ\nCYCL DEF 32.1\nL X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
                          dialect="heidenhain")
     assert not plain.remarks and plain.end[-1].tolist() == pytest.approx([25.4, 0.0, 50.8])
-    assert plain.feed[2] == pytest.approx(254.0)
+    assert plain.feed[2] == pytest.approx(254.0) and "cycle 32 is off" in plain.notes[0]
 
 
 def test_whose_program_a_text_is():

@@ -70,8 +70,12 @@ class Heidenhain(Control):
             return self._machine([int(w) for w in re.findall(r"M([0-9]+)", text)], "M0" if "STOP" in text else "")
         if text.startswith("PLANE"):
             return self._tilt(text)
-        if m := re.fullmatch(rf"CYCL DEF 32\.1 T({NUMBER})", text):
-            return [f"G64 P{float(m[1]):.6f}"]
+        if m := re.fullmatch(rf"CYCL DEF 32\.1(?: T({NUMBER}))?", text):
+            if float(m[1] or 0.0) != 0.0:
+                return [f"G64 P{float(m[1]):.6f}"]
+            self.notes.append("cycle 32 is off: machine parameters say how far the control rounds corners, and it is "
+                              "not in the error bound")
+            return []
         if m := re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA({NUMBER}))?", text):
             if m[1] and float(m[1]) > SMALL:
                 self.notes.append(f"cycle 32 lets rotary axes leave their way by {m[1]} deg: it is not in the error "
