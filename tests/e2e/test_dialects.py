@@ -1,4 +1,4 @@
-"""One small job for all five controls: each program listed, read back, proved on its own, and none of them if one lies."""
+"""One small job for all five controls: each program listed, read back, proved by itself, and none if one lies."""
 
 from __future__ import annotations
 
