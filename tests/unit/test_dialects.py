@@ -188,10 +188,29 @@ def test_other_programs_of_these_controls_are_read():
     assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0] and siemens.blend == 0.005
     plain = read_program('BEGIN PGM T INCH\nBLK FORM 0.1 Z X+0 Y+0 Z-1\nTOOL CALL 1 Z S5000 F300 ; ball\n'
                          "CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\n* - cut\n"
-                         "CYCL DEF 32.0 TOLERANZ\nCYCL DEF 32.1\nL X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
+                         "CYCL DEF 32.0 TOLERANZ\nCYCL DEF 32.1\n"
+                         "L X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
                          dialect="heidenhain")
     assert not plain.remarks and plain.end[-1].tolist() == pytest.approx([25.4, 0.0, 50.8])
     assert plain.feed[2] == pytest.approx(254.0) and "cycle 32 is off" in plain.notes[0]
+
+
+def test_arcs_in_plain_language():
+    """Half a circle round CC, back by the longer and by the shorter arc of a radius, and all the way round."""
+    head = "BEGIN PGM A MM\nTOOL CALL 1 Z S900\nM3\nL X+0 Y+0 FMAX\nL Z+5 FMAX\nL Z-1 F90\n"
+    p = read_program(head + "CC X+5 Y+0\nC X+10 Y+0 DR+ F200\nCR X+10 Y+6 R-5 DR+\nCR X+10 Y+0 R+5 DR-\n"
+                     "CC X+10 Y+3\nC X+10 Y+0 DR-\nL Z+5 FMAX\nM30\n", dialect="heidenhain")
+    def of(line):
+        return p.end[p.line == line]
+
+    assert of(8)[:, 1].min() == pytest.approx(-5.0, abs=2e-3) and (p.feed[p.line == 8] == 200.0).all()
+    assert of(9)[:, 0].max() == pytest.approx(10.0 + 4.0 + 5.0, abs=2e-3)
+    assert of(10)[:, 0].max() == pytest.approx(11.0, abs=0.05) or of(10)[:, 0].min() == pytest.approx(9.0, abs=0.05)
+    assert of(12)[-1].tolist() == [10.0, 0.0, -1.0] and of(12)[:, 1].max() == pytest.approx(6.0, abs=2e-3)
+    for wrong, said in (("C X+1 Y+1 DR+", "not stated"), ("CR X+1 DR+", "without a radius"),
+                        ("CC X+0 Y+0\nC X+1 Y+1 R+2 DR+", "with a radius"), ("CT X+1 Y+1", "cannot read")):
+        with pytest.raises(ProgramError, match=said):
+            read_program(head + f"{wrong}\nM30\n", dialect="heidenhain")
 
 
 def test_whose_program_a_text_is():

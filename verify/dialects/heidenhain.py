@@ -1,9 +1,9 @@
 """Heidenhain, conversational: a keyword opens each block, FMAX makes a rapid for one block, F stays.
 
-Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, M words, LBL, STOP, and of the cycles 247 (preset) and
-32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup frame turned about its X, then
-Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius compensation, incremental words (IX),
-arcs, Q parameters, calls and shifts are refused by name.
+Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C, CR, M words, LBL, STOP, of the cycles 247
+(preset) and 32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup frame turned about
+its X, then Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius compensation, incremental words
+(IX), other arcs, Q parameters, calls and shifts are refused by name.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from verify.dialects.base import NUMBER, BlockError, Control, zero_word
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 _LINE = re.compile(rf"L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?: +M[0-9]+)*)")
+_CENTRE = re.compile(rf"CC(?: +X({_NUM}))?(?: +Y({_NUM}))?")
+_ARC = re.compile(rf"(C|CR)((?: +[XYZ]{_NUM})*)(?: +R({_NUM}))? +DR([+-])(?: +R0)?(?: +(F{_NUM}))?")
 _TOOL = re.compile(rf'TOOL CALL(?: +"?([0-9]+)"?)?(?: +([XYZ]))?(?: +S({NUMBER}))?(?: +F({NUMBER}))?'
                    r"(?: +D[LR][+-]?0*\.?0*)*")
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
@@ -51,7 +53,8 @@ class Heidenhain(Control):
         super().__init__()
         self.preset = self.tcp = False
         self.plane: F64 | None = None  # columns are its axes in the setup frame
-        self.at = [math.nan] * 3  # mm, setup frame
+        self.at = [math.nan] * 3  # setup frame, mm or what the program counts in
+        self.centre = [math.nan] * 2
 
     def blocks(self, raw: str) -> list[str]:
         """By the keyword the block opens with."""
@@ -68,6 +71,11 @@ class Heidenhain(Control):
             return self._tool(m)
         if re.fullmatch(r"(?:STOP)?(?: *M[0-9]+)*", text):
             return self._machine([int(w) for w in re.findall(r"M([0-9]+)", text)], "M0" if "STOP" in text else "")
+        if m := _CENTRE.fullmatch(text):
+            self.centre = [c if w is None else float(w) for c, w in zip(self.centre, m.groups(), strict=True)]
+            return []
+        if m := _ARC.fullmatch(text):
+            return self._arc(m)
         if text.startswith("PLANE"):
             return self._tilt(text)
         if m := re.fullmatch(rf"CYCL DEF 32\.1(?: T({NUMBER}))?", text):
@@ -157,6 +165,22 @@ class Heidenhain(Control):
 
     def _switch(self, ms: list[int]) -> None:
         self.tcp = 129 not in ms and (self.tcp or 128 in ms)
+
+    def _arc(self, m: re.Match[str]) -> list[str]:
+        """C round the centre of CC, or CR by a radius, whose sign says which of both arcs."""
+        if self.plane is not None:
+            raise BlockError("an arc in a tilted plane")
+        start, words = list(self.at), self._setup(" ".join(m[2].split()), False)
+        block = f"{'G3' if m[4] == '+' else 'G2'} {words}"
+        if (m[1] == "CR") != (m[3] is not None):
+            raise BlockError(f"{m[1]} {'without' if m[1] == 'CR' else 'with'} a radius R")
+        if m[1] == "CR":
+            block += f" R{m[3]}"
+        elif any(math.isnan(v) for v in (*start[:2], *self.centre)):
+            raise BlockError("C round a centre (CC), or from a place, that the program has not stated")
+        else:
+            block += f" I{self.centre[0] - start[0]:.9f} J{self.centre[1] - start[1]:.9f}"
+        return [f"{block} {m[5]}" if m[5] else block]
 
     def _machine(self, ms: list[int], stop: str) -> list[str]:
         self._switch(ms)
