@@ -45,6 +45,7 @@ from service.programs import (
     turning_of,
 )
 from service.scoring import score
+from service.sheet import sheet_files
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
 from service.stepnc import stepnc_files
@@ -155,6 +156,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         files[MESH_NAME] = ("machined", "", None, data)
     if report["state"] == "proved":
         files.update(stepnc_files(written, look.part, tool_bodies(setup), proof_setup(ready, look), out))
+    files.update(sheet_files(ready, written, report, files))
     deliver(out, report, files)
     progress("done", 1.0)
     return report
@@ -237,7 +239,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
                    ending: str = "") -> dict[str, Any]:
-    """Prove any program against the part: gouges, contacts, rapids and limits, and what it leaves.
+    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids and limits, and what it leaves.
 
     No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
     frame of one access; where ``access`` is None in that of the first, on a machine with rotary axes in the setup's.

@@ -67,7 +67,8 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
 
 @app.command()
 def verify(part: Part, setup: SetupPath,
-           program: Annotated[Path, typer.Option("--program", metavar="FILE.ngc", help="The NC program.")],
+           program: Annotated[Path, typer.Option("--program", metavar="FILE", help="The NC program, or STEP-NC: "
+                                                                                      "AP238 or ISO 14649.")],
            access: Annotated[str | None, typer.Option(help="Access of the setup the program is for; default the "
                                                           "first.")] = None,
            dialect: Annotated[str | None, typer.Option(help="Control the program is for: linuxcnc, fanuc, haas, "
@@ -80,7 +81,7 @@ def verify(part: Part, setup: SetupPath,
            mesh_step: Annotated[float, typer.Option(help="mm between the nodes of machined.stl; 0 leaves it "
                                                          "out.")] = 0.2,
            mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
-    """Prove any program, also a foreign one; the report goes to stdout, what was found in short to stderr."""
+    """Prove any program or STEP-NC, also foreign ones; the report goes to stdout, what was found in short to stderr."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.chain import verify_program

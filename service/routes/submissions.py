@@ -47,8 +47,9 @@ def multipart(with_program: bool) -> dict[str, Any]:
     if with_program:
         properties["program"] = {"type": "string", "format": "binary",
                                  "description": "The NC program of a control that machine.dialects of the setup names; "
-                                                "Siemens and Heidenhain programs are known by their own words."}
-        encoding["program"] = {"contentType": "text/plain, application/octet-stream"}
+                                                "Siemens and Heidenhain programs are known by their own words. Or "
+                                                "STEP-NC, AP238 or ISO 14649, known by the FILE_SCHEMA of its header."}
+        encoding["program"] = {"contentType": "text/plain, model/step, application/octet-stream"}
     required = list(properties)
     properties["stock"] = {
         "type": "string", "format": "binary",

@@ -97,6 +97,11 @@ def test_a_zone_that_is_gone_over_again_is_proved_and_written_as_two_workingstep
     assert twice["machining_time_s"] == pytest.approx(total, abs=0.11)
     written = (tmp_path / "out" / "job.arm.stpnc").read_text()
     assert all(f"'{i} {twice['id']} " in written for i in twice["steps"])
+    for name in ("job.stpnc", "job.arm.stpnc"):  # what is proved of the program is found of both forms of STEP-NC too
+        again = run("verify", part, tmp_path, setup, "--program", str(tmp_path / "out" / name))
+        found = json.loads(again.stdout)
+        assert again.exit_code == 0 and not found["findings"]
+        assert found["coverage"] == pytest.approx(report["coverage"], abs=2e-3)
 
 
 @pytest.mark.parametrize("fault", ["unproved", "bad part", "bad setup"])
