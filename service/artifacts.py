@@ -20,7 +20,7 @@ from schemas.machine import DIALECT_ENDINGS
 
 PROGRAMS = tuple(f"{d}.{e}" for d, e in DIALECT_ENDINGS.items())
 RESULT_FILES = (*(f"program.{p}" for p in PROGRAMS), "job.stpnc", "job.arm.stpnc", "report.json", "zones.json",
-                "preview.png", "deviation.png", "machined.stl")
+                "preview.png", "deviation.png", "sheet.html", "sheet.pdf", "machined.stl")
 ACCESS_FILES = (*(f"program.*.{p}" for p in PROGRAMS), "job.*.stpnc", "machined.*.stl")  # of further accesses
 VERIFICATION_FILES = ("report.json", "deviation.png", "machined.stl")
 PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.stpnc", "job.*.stpnc", "zones.json")
@@ -71,7 +71,7 @@ def code_version() -> str:
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256()
     for package in PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
+        for path in sorted(p for p in (root / package).rglob("*") if p.suffix in (".py", ".html")):
             digest.update(f"{path.relative_to(root)}\0".encode())
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()

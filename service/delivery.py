@@ -14,15 +14,19 @@ Files = dict[str, tuple[str, str, str | None, bytes | Path]]
 
 def deliver(out: Path, report: dict[str, Any], files: Files) -> None:
     """List the files in the report, under ``files``, and write them into a folder, the report last."""
-    report["files"] = [{"name": name, "kind": kind, "access": access, "dialect": dialect or None,
-                        "sha256": _digest(data)}
-                       for name, (kind, dialect, access, data) in sorted(files.items())]
+    report["files"] = listed(files)
     for name, (*_, data) in files.items():
         if isinstance(data, Path):
             _move_whole(data, out / name)
         else:
             write_whole(out / name, data)
     write_whole(out / "report.json", json_bytes(report))
+
+
+def listed(files: Files) -> list[dict[str, Any]]:
+    """The entries of the files in a report, by name."""
+    return [{"name": name, "kind": kind, "access": access, "dialect": dialect or None, "sha256": _digest(data)}
+            for name, (kind, dialect, access, data) in sorted(files.items())]
 
 
 def json_bytes(data: dict[str, Any]) -> bytes:

@@ -18,7 +18,8 @@ from schemas.problem import Problem
 from service.artifacts import Artifacts
 from service.errors import NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
 
-MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml"}
+MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml",
+               ".html": "text/html; charset=utf-8", ".pdf": "application/pdf"}
 INTERNAL_FILES = frozenset({"state"})
 
 

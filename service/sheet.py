@@ -1,0 +1,259 @@
+"""Setup sheet of a job, as a web page and as a PDF: what planner and machinist have to know before the spindle turns.
+
+Both are made of one ``service.sheetmodel.Sheet``, so that they say the same. It holds no line of a program, and of a
+job that is not proved it says so before all else. No clock and no random number: the same input gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+
+from geometry.mesh import F64, TriangleMesh
+from geometry.toolbody import ToolBody
+from output.model import Workplan
+from output.walker import label_number, lowest_tip
+from schemas.setup import Setup
+from service.clampshot import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
+from service.convert import tool_bodies
+from service.delivery import Files, listed
+from service.prepare import Prepared
+from service.programs import access_of, gauge_lengths, proof_frame
+from service.reporting import material_name
+from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.sheetpdf import pdf_of
+from service.sheettables import (
+    NONE,
+    cautions_section,
+    files_table,
+    findings_section,
+    job_section,
+    number,
+    place,
+    proof_section,
+    remainder_table,
+    steps_table,
+    tools_table,
+    zones_table,
+)
+from service.sides import Look, Program
+from service.tooldrawing import draw_tool, svg_of
+
+ZONE_WORDS = (
+    "A zone is what one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; SCZ: "
+    "elsewhere.",
+    "Scallop: what stands over the surface between two passes, mm; as asked for, what 99 % of the samples keep, and "
+    "the most.",
+    "Covered: share of the zone that the proof found within the budget.")
+HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
+
+
+def sheet_files(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any], files: Files) -> Files:
+    """Both forms of the sheet of a job.
+
+    written : the programs, also those of an unproved job, of which nothing is told but heights
+    files   : what else is delivered; its map of the deviations goes onto the sheet
+
+    Raises
+    ------
+    OutputError
+        ``bad_epoch``: SOURCE_DATE_EPOCH is no number.
+    """
+    sheet = sheet_of(ready, written, {**report, "files": listed(files)}, _bytes_of(files, "deviation"))
+    return {HTML_NAME: ("sheet", "", None, html_of(sheet)), PDF_NAME: ("sheet", "", None, pdf_of(sheet))}
+
+
+def _bytes_of(files: Files, kind: str) -> bytes | None:
+    return next((data for of, _, _, data in files.values() if of == kind and isinstance(data, bytes)), None)
+
+
+def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any],
+             deviation: bytes | None) -> Sheet:
+    """What stands on the sheet of a job.
+
+    deviation : PNG of the map of the deviations, or None
+    """
+    setup = ready.setup
+    proved = report["state"] == "proved"
+    count = sum(report["finding_counts"].values())
+    verdict = ("The programs were simulated, and the proof found nothing." if proved else
+               f"Nothing may be run: the proof has {count} finding{'' if count == 1 else 's'}, and no program was "
+               "written. What follows is what was planned.")
+    title = setup.labels.get("order") or "zonemill job"
+    findings = findings_section(report)
+    sections = [job_section(report, setup, material_name(setup)), *([] if proved else [findings]),
+                cautions_section(report), *_clampings(ready, written, report),
+                _tools(setup, report), _steps(setup, written, report),
+                Section("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
+                Section("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
+                proof_section(report), Section("files", "Files", (files_table(report),))]
+    if deviation is not None:
+        sections.append(Section("deviation", "Deviation from the part", (Picture(
+            deviation, "The part coloured by what the proof measured: red where it is cut too deep, green within the "
+            "budget, blue where stock is left, hatched where no tool got."),)))
+    sha = report["inputs"]
+    foot = f"{title}: {report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}"
+    return Sheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
+
+
+def _clampings(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any]) -> list[Section]:
+    """A part that is turned by hand has a picture for each time it is clamped; where nothing is cut, for the first."""
+    names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
+    looks = [proof_frame(ready)] if ready.setup.machine.kind == "5-axis" else [Look.of(ready.view(n)) for n in names]
+    return [_clamping(ready, look, [p for p in written if len(looks) == 1 or p.access == look.id], report,
+                      len(looks) > 1) for look in looks]
+
+
+def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: Mapping[str, Any],
+              several: bool) -> Section:
+    setup, turns = ready.setup, ready.setup.machine.kind == "5-axis"
+    access = access_of(ready, look)
+    held = Clamped(look.part, _blank_mesh(ready, look.rotation), not ready.blank.stands_alone,
+                   tuple(corners_of(np.array(f.box_mm)) @ look.rotation.T for f in setup.fixtures),
+                   access.work_offset,
+                   tuple((v.id, look.rotation @ v.direction) for v in ready.views if turns or v.id == look.id))
+    names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
+    blank = ready.blank.corners(look.rotation)
+    p, axis = setup.placement, ready.view(look.id).direction.tolist()
+    frame = "the frame of the setup" if turns else f"the frame of access {look.id}"
+    pairs = [
+        ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
+        ("Work offset", access.work_offset),
+        ("Program zero", f"{place(p.origin_mm)} in the coordinates of the part's file; Z there along "
+                         f"{_direction(p.z_axis)}, X along {_direction(p.x_axis)}"),
+        *([] if turns else [("Tool axis", f"{look.id}: {_direction(axis)} of the setup is Z of the program")]),
+        ("Part", f"{_box(look.part.bounds)} in {frame}"),
+        (f"Blank, {setup.stock.kind.replace('_', ' ')}", _box(blank) + (
+            "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
+            f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
+        *_heights([p.work for p in programs])]
+    picture = clamp_picture(held, f"{look.id if several else 'Clamping'}: seen from the front right")
+    blocks: list[Block] = [Picture(picture, _seen(held, blank)), Facts(tuple(pairs))]
+    if turns:
+        blocks.append(_turned(report, (setup.machine.kinematics or "")[-2:]))
+    fixtures = tuple((f"fixture {k}", *(f"{number(a)} to {number(b)}" for a, b in zip(*box.tolist(), strict=True)))
+                     for k, box in enumerate((np.array([c.min(axis=0), c.max(axis=0)]) for c in held.fixtures), 1))
+    blocks.append(Table("Fixtures: boxes in the frame of the program that nothing may touch, mm",
+                        ("fixture", "X", "Y", "Z"), fixtures, (1.0, 1.5, 1.5, 1.5),
+                        none="The setup names no fixture: none is kept clear of."))
+    title = f"Clamping and program zero, {look.id}" if several else "Clamping and program zero"
+    return Section(f"clamping-{look.id}", title, tuple(blocks))
+
+
+def _seen(held: Clamped, blank: F64) -> str:
+    fixtures = f", {len(held.fixtures)} fixtures" if held.fixtures else ""
+    return (f"Part in its blank{fixtures}, program zero {held.zero} with its axes, and tool axes "
+            f"{', '.join(name for name, _ in held.comings)}; slanting and from above. The blank reaches {_box(blank)}.")
+
+
+def _heights(works: Sequence[Workplan]) -> list[tuple[str, str]]:
+    """Where rapids are free and how deep the tip goes, as the headers of the programs of one clamping have them."""
+    if not works:
+        return []
+    low, work = min(map(lowest_tip, works)), works[0]
+    below = float(work.stock.lower[2]) - low
+    deep = f"Z{number(low)}" + (f", {number(below)} below the blank: nothing may stand there" if below > 1e-3 else "")
+    if work.clamping is None:
+        return [("Clearance plane", f"Z{number(work.clearance_plane)}: above it rapids in X and Y are free"),
+                ("Lowest Z of the tip", deep)]
+    c = work.clamping
+    ball = f"the ball round {place(c.centre.tolist())} of radius {number(c.radius)}"
+    return [("Room to turn", f"part, blank and fixtures lie in {ball}; the tool turns outside it"),
+            ("Lowest Z of the tip", deep)]
+
+
+def _turned(report: Mapping[str, Any], letters: str) -> Table:
+    rows = tuple((a["id"], _direction(a["axis"]), " ".join(
+        letter + number(v) for letter, v in zip(letters, a["rotary_deg"] or (), strict=False)) or NONE,
+                  "found for what the others leave" if a["found"] else "of the setup") for a in report["accesses"])
+    return Table("Accesses: tool axes in the frame of the setup, and how the rotary axes stand for them",
+                 ("access", "tool axis", "rotary axes, deg", "where from"), rows,
+                 (1.0, 2.5, 2.5, 2.0))
+
+
+def _direction(axis: Sequence[float]) -> str:
+    """'+Z', or three components."""
+    for k, letter in enumerate("XYZ"):
+        if all(abs(v) < 1e-9 for j, v in enumerate(axis) if j != k):
+            return ("+" if axis[k] > 0.0 else "-") + letter
+    return " ".join(number(v, 6) for v in axis)
+
+
+def _box(box: F64) -> str:
+    return ", ".join(f"{axis} {number(a)} to {number(b)}" for axis, a, b in zip("XYZ", *box.tolist(), strict=True))
+
+
+def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
+    """The nominal blank in a frame; of one that is grown from the part the box round it."""
+    blank = ready.blank
+    solid = blank.proof_mesh(rotation)
+    if solid is not None:
+        return solid
+    if blank.bar is not None:
+        low, high = blank.bar.ends(rotation)
+        return bar_mesh(low, high, blank.bar.radius)
+    return box_mesh(corners_of(blank.bounds) @ rotation.T)
+
+
+def _tools(setup: Setup, report: Mapping[str, Any]) -> Section:
+    used = list(dict.fromkeys(s["tool"] for s in report["steps"]))
+    bodies, gauges = {b.id: b for b in tool_bodies(setup)}, gauge_lengths(setup)
+    cards = [_card(setup, bodies[name], gauges[bodies[name].number], report) for name in used]
+    return Section("tools", "Tools", (tools_table(report, setup, used), *cards))
+
+
+def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
+    tool = next(t for t in setup.tools if t.id == body.id)
+    fact = next(t for t in report["tools"] if t["id"] == body.id)
+    segments = tuple((f"Holder segment {k}", f"Ø{number(h.diameter)}" + (
+        f" to {number(h.diameter_top)}" if h.diameter_top != h.diameter else "") + f", {number(h.length)} long")
+        for k, h in enumerate(body.holder, 1)) or (("Holder", "not named in the setup: none was kept clear"),)
+    bends = fact["deflection_mm"]
+    pairs = (
+        ("Teeth", f"{tool.flutes}, {'cuts' if tool.center_cutting else 'does not cut'} to the centre"), *segments,
+        ("Gauge length", f"{number(gauge)}" + ("" if tool.gauge_given else ": stickout and holder, as none was given")),
+        ("Neck over its width", number(fact["slenderness"], 1)),
+        ("Bends", "not estimated" if bends is None else f"{number(bends)} mm at most, as estimated"),
+        ("In cut", f"{number(fact['minutes_in_cut'], 2)} min, {number(fact['metres_in_cut'], 2)} m"),
+        ("Cutters", f"{fact['cutters']}" + (f", each lasts {number(fact['life_min'])} min in cut" if fact["life_min"]
+                                            else ", life not counted")))
+    mind = tuple(f"{c['message']}; {c['remedy']}" for c in report["warnings"] if body.id in c["subjects"])
+    own = "" if body.id == f"T{body.number}" else f" {body.id}"
+    heading = f"T{body.number}{own}: {tool.kind} Ø{number(tool.diameter_mm)}"
+    return ToolCard(heading, draw_tool(body, gauge), Facts(pairs), mind)
+
+
+def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
+    planned, labels = {}, {}
+    for p in written:
+        for s in p.work.steps:
+            planned[s.id] = (s.access or p.access, s.top, s.bottom)
+            if p.work.restart and report["state"] == "proved":
+                labels[s.id] = f"N{label_number(p.work, s)}"
+    table = steps_table(report, planned, labels, {b.id: b.number for b in tool_bodies(setup)})
+    note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
+    begun = ("A program can be started at the label of any step.",) if labels else ()
+    return Section("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
+
+
+@cache
+def _template() -> Template:
+    env = Environment(loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,
+                      trim_blocks=True, lstrip_blocks=True)
+    env.filters["svg"] = svg_of
+    env.filters["data"] = lambda png: "data:image/png;base64," + base64.b64encode(png).decode()
+    return env.get_template("sheet.html")
+
+
+def html_of(sheet: Sheet) -> bytes:
+    """The sheet as one page that asks for nothing from elsewhere; every word of the user's is escaped."""
+    return (_template().render(sheet=sheet).rstrip() + "\n").encode()
+
+
+__all__ = ["HTML_NAME", "PDF_NAME", "html_of", "sheet_files", "sheet_of"]

@@ -1,0 +1,222 @@
+"""The report of a job as the tables of its setup sheet; every figure is the report's own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from output.text import decimal
+from schemas.setup import Setup
+from service.sheetmodel import Facts, Lines, Section, Table
+
+NONE = "-"
+SHORT_SHA = 16  # hex digits, as in the header of a program
+ZONE = re.compile(r"Z\d+\w*")
+KINDS = {
+    "program": "program", "stepnc": "STEP-NC, AP238", "stepnc-arm": "STEP-NC, ISO 14649", "zones": "zones as data",
+    "preview": "picture of part and paths", "deviation": "map of the deviations", "machined": "machined part as a mesh"}
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A figure for people; a dash where there is none."""
+    return NONE if value is None else decimal(value, digits)
+
+
+def minutes(seconds: float | None) -> str:
+    """Seconds as minutes."""
+    return NONE if seconds is None else decimal(seconds / 60.0, 2)
+
+
+def share(value: float | None) -> str:
+    """A share of 0..1 in percent, rounded down, so that 100 % is all of it."""
+    return NONE if value is None else f"{decimal(int(value * 10_000.0 + 1e-9) / 100.0, 2)} %"
+
+
+def place(at: Sequence[float | None] | None) -> str:
+    """'X1 Y2 Z3' of a point, mm."""
+    if at is None:
+        return NONE
+    return " ".join(f"{axis}{number(v, 2)}" for axis, v in zip("XYZ", at, strict=False))
+
+
+def ranged(values: Sequence[float | None], digits: int = 0) -> str:
+    """'600' or '180 to 600'."""
+    known = sorted({v for v in values if v is not None})
+    words = [decimal(v, digits) for v in known]
+    return NONE if not words else words[0] if words[0] == words[-1] else f"{words[0]} to {words[-1]}"
+
+
+def job_section(report: Mapping[str, Any], setup: Setup, material: str) -> Section:
+    """What the job is and what it takes."""
+    labels = [(f"Label {key}", value) for key, value in sorted(report["labels"].items())]
+    part, time, machine = report["part"], report["time"], setup.machine
+    size = [b - a for a, b in zip(*part["bbox_mm"], strict=True)]
+    programs = [f["name"] for f in report["files"] if f["kind"] == "program"]
+    axes = machine.kind if machine.kinematics is None else f"{machine.kind}, {machine.kinematics}"
+    return Section("job", "Job", (Facts((
+        *labels,
+        ("Material", material),
+        ("Machine", f"{axes}; {', '.join(machine.dialects)}"),
+        ("Units", "mm, mm/min, 1/min, degrees"),
+        ("Size of the part", " x ".join(number(v) for v in size)),
+        ("Programs", f"{len(programs)}, for {', '.join(machine.dialects)}" if programs else "none written"),
+        ("Time", f"{minutes(report['machining_time_s'])} min as simulated, {minutes(time['in_cut_s'])} of them in cut; "
+                 f"{time['tool_changes']} tool changes within programs"),
+        ("Coverage", f"{share(report['coverage'])} of the area to be machined is proved, "
+                     f"{share(report['reach_coverage'])} of what the tools reach"),
+        ("Part sha256", report["inputs"]["part_sha256"][:SHORT_SHA]),
+        ("Setup sha256", report["inputs"]["setup_sha256"][:SHORT_SHA]),
+        *(("Blank sha256", sha[:SHORT_SHA]) for sha in [report["inputs"].get("stock_sha256")] if sha),
+        ("Made by", f"zonemill {report['version']}"))),))
+
+
+def files_table(report: Mapping[str, Any]) -> Table:
+    """The files beside the sheet; nothing that drives a machine is among them where a job is not proved."""
+    rows = [(f["name"], KINDS.get(f["kind"], f["kind"]), f["access"] or NONE, f["sha256"][:SHORT_SHA])
+            for f in report["files"]]
+    return Table("Files", ("file", "what it is", "access", "sha256 begins"), tuple(rows), (3.0, 3.0, 1.0, 2.2))
+
+
+def cautions_section(report: Mapping[str, Any]) -> Section:
+    """What the machinist is to mind although it is no finding."""
+    told = [(c["kind"].replace("_", " "), ", ".join(c["subjects"]) or NONE, c["message"], c["remedy"])
+            for c in report["warnings"]]
+    known = {f"{c['message']}; {c['remedy']}" for c in report["warnings"]}
+    others = tuple(w for w in report["part"]["warnings"] if w not in known)
+    notes = tuple(report["proof"]["notes"])
+    table = Table("Cautions", ("kind", "of", "what", "what to do"), tuple(told), (1.2, 1.6, 4.0, 3.6),
+                  none="No caution.")
+    lists = (("Of the part and the plan", others), ("Notes of the proof", notes))
+    more = [Lines(title, lines) for title, lines in lists if lines]
+    return Section("mind", "To be minded", (table, *more))
+
+
+def findings_section(report: Mapping[str, Any]) -> Section:
+    """What the proof found."""
+    counts = report["finding_counts"]
+    rows = tuple((f["kind"], f["message"], _where(f), place(f.get("point")), _many(f)) for f in report["findings"])
+    more = sum(counts.values()) - len(rows)
+    told = tuple(f"{n} of kind {kind}" for kind, n in counts.items())
+    blocks: list[Table | Lines] = [Table(
+        "Findings of the proof", ("kind", "what", "where", "place, mm", "times"), rows, (1.3, 4.6, 2.2, 2.2, 0.8),
+        frozenset({4}), none="The proof found nothing.")]
+    if more > 0:
+        blocks.append(Lines("More", (f"{more} more are counted only: {', '.join(told)}",)))
+    return Section("findings", "Findings of the proof", tuple(blocks))
+
+
+def _where(f: Mapping[str, Any]) -> str:
+    words = [f["zone"], f["face"], f"line {f['line']}" if f["line"] else None,
+             f["program"] if f["program"] and f["line"] else None]
+    return " ".join(w for w in words if w) or NONE
+
+
+def _many(f: Mapping[str, Any]) -> str:
+    return str(f.get("count", 1))
+
+
+def tools_table(report: Mapping[str, Any], setup: Setup, used: Sequence[str]) -> Table:
+    """All tools of the setup: those in use in the order the programs take them, then the rest."""
+    facts, tools = {t["id"]: t for t in report["tools"]}, {t.id: t for t in setup.tools}
+    rows = []
+    for name in [*used, *(t for t in tools if t not in used)]:
+        tool, fact = tools[name], facts[name]
+        mine = [s for s in report["steps"] if s["tool"] == name]
+        neck = NONE if tool.neck_length_mm == tool.flute_length_mm else \
+            f"Ø{number(tool.neck_diameter_mm)} to {number(tool.neck_length_mm)}"
+        rows.append((
+            f"T{tool.number}" + ("" if name == f"T{tool.number}" else f" {name}"), tool.kind, number(tool.diameter_mm),
+            number(tool.corner_radius_mm), str(tool.flutes), number(tool.flute_length_mm), neck,
+            number(tool.shank_diameter_mm), number(tool.stickout_mm), number(tool.gauge_length_mm),
+            ranged([s["spindle_rpm"] for s in mine]), ranged([s["feed_mm_min"] for s in mine]),
+            number(fact["minutes_in_cut"], 2), str(fact["cutters"]) if mine else "not used"))
+    return Table("Tools in order of use, lengths from the tip in mm",
+                 ("tool", "kind", "Ø", "corner R", "teeth", "flutes", "neck", "shank Ø", "stickout", "gauge length",
+                  "S 1/min", "F mm/min", "min in cut", "cutters"), tuple(rows),
+                 (1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.7, 1.0, 1.4, 1.2, 1.3, 1.3, 1.1, 1.2), frozenset(range(2, 13)) - {6})
+
+
+def steps_table(report: Mapping[str, Any], planned: Mapping[str, tuple[str, float, float]],
+                labels: Mapping[str, str], numbers: Mapping[str, int]) -> Table:
+    """The steps in the order they are run.
+
+    planned : by id, the access in whose frame a step is, and its upper and lower end there, mm
+    labels  : by id, the label a program can be started at; numbers : T numbers by id of the tool
+    """
+    rows = []
+    for s in report["steps"]:
+        access, top, bottom = planned.get(s["id"], ("", None, None))
+        zones = s["zone"] or " ".join(w for w in s["name"].split() if ZONE.fullmatch(w)) or NONE
+        rows.append((s["id"], *((labels.get(s["id"], NONE),) if labels else ()), zones, access or NONE,
+                     f"{s['operation']}, {s['strategy']}", f"T{numbers[s['tool']]}" + (", fresh cutter" if
+                     s["fresh_cutter"] else ""), number(s["spindle_rpm"], 0), number(s["feed_mm_min"], 0),
+                     number(top), number(bottom), minutes(s["machining_time_s"])))
+    heads = ("step", *(("label",) if labels else ()), "zones", "access", "what", "tool", "S 1/min", "F mm/min",
+             "top Z", "bottom Z", "min")
+    widths = (1.0, *((1.0,) if labels else ()), 1.8, 1.1, 2.6, 1.2, 1.1, 1.1, 1.1, 1.2, 0.9)
+    return Table("Steps in the order they are run", heads, tuple(rows), widths,
+                 frozenset(range(len(heads) - 5, len(heads))), none="No step: nothing could be cut.")
+
+
+def zones_table(report: Mapping[str, Any]) -> Table:
+    """What each zone is and what the proof measured on it."""
+    rows = tuple((
+        z["id"], z["kind"], " ".join(w for w in (z["profile"], z["level"]) if w) or NONE, z["access"], z["tool"],
+        f"{z['form']}, {z['strategy']}", " ".join(z["faces"]), number(z["area_mm2"], 1),
+        number(z["scallop_mm"]["requested"], 4), number(z["scallop_mm"]["p99"], 4), number(z["scallop_mm"]["max"], 4),
+        share(z.get("coverage")), " ".join(z["steps"]) or NONE, minutes(z["machining_time_s"]))
+        for z in report["zones"])
+    return Table("Zones, with what the proof measured on them",
+                 ("zone", "kind", "profile, level", "access", "tool", "what", "faces", "mm²", "scallop asked", "p99",
+                  "most", "covered", "steps", "min"), rows,
+                 (1.0, 1.0, 1.3, 1.1, 0.9, 1.5, 2.2, 1.1, 1.2, 1.0, 1.0, 1.3, 1.1, 0.9),
+                 frozenset({7, 8, 9, 10, 11, 13}), none="No zone: no tool reaches anything of what was asked for.")
+
+
+def remainder_table(report: Mapping[str, Any]) -> Table:
+    """What stays, why, and what would do."""
+    rows = tuple((x["reason"], number(x["area_mm2"], 2), " ".join(x["faces"]), place(x["at_mm"]), needed(x))
+                 for x in report["remainder"])
+    return Table("Remainder: what stays uncut", ("why", "mm²", "faces", "about at, mm", "what would do"), rows,
+                 (1.9, 0.8, 2.2, 1.9, 4.2), frozenset({1}), none="Nothing stays: all area asked for is machined.")
+
+
+def needed(item: Mapping[str, Any]) -> str:
+    """What would reach an entry of the remainder, in words."""
+    need = item["would_need"]
+    words = [item["why_left"] or ""]
+    if item["tool_at_hand"]:
+        words.append(f"{item['tool_at_hand']} would reach it")
+    if "diameter_mm" in need:
+        round_end = f" R{number(need['corner_radius_mm'])}" if need["kind"] == "bull" else ""
+        words.append(f"{need['kind']} Ø{number(need['diameter_mm'])}{round_end}, "
+                     f"neck {number(need['neck_length_mm'])}, shank Ø{number(need['shank_diameter_mm'])}, "
+                     f"stickout {number(need['stickout_mm'])}")
+        if need.get("share", 1.0) < 1.0:
+            words.append(f"for {share(need['share'])} of it")
+    elif "kind" in need:
+        words.append(f"an{need['kind']}" if str(need["kind"]).startswith("other ") else str(need["kind"]))
+        if "slenderness" in need:
+            words.append(f"as a tool would be {number(need['slenderness'], 1)} times as long as thick")
+    if "access" in need:
+        words.append(f"along {need['access']}")
+    return ", ".join(w for w in words if w) or "no tool would"
+
+
+def proof_section(report: Mapping[str, Any]) -> Section:
+    """How well it was looked."""
+    proof, time = report["proof"], report["time"]
+    facts = Facts((
+        ("Samples measured", str(proof["samples"])),
+        ("Error of the measure", f"{number(proof['error_bound_mm'], 4)} mm at most"),
+        ("Deepest cut into the part", f"{number(report['gouge_max_mm'], 4)} mm"),
+        ("Length in cut", f"{number(proof['cutting_length_mm'], 0)} mm"),
+        ("Time in air", f"{minutes(time['in_air_s'])} min, {minutes(time['rapid_s'])} of them rapids; "
+                        f"{time['retracts']} times up")))
+    return Section("proof", "The proof", (facts,))
+
+
+__all__ = ["NONE", "SHORT_SHA", "cautions_section", "files_table", "findings_section", "job_section", "minutes",
+           "needed", "number", "place", "proof_section", "ranged", "remainder_table", "share", "steps_table",
+           "tools_table", "zones_table"]
