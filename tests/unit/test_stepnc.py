@@ -14,7 +14,7 @@ from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from output.stepnc_words import pass_plane_normal
 from tests.golden_file import assert_golden
-from tests.synthetic_plan import BALL, line, long_plan, plan, step, tiny
+from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
 from toolpath.motion import Motion, Trajectory
 
 WRITERS = {"tiny.arm.stpnc": write_stepnc_arm, "tiny.stpnc": write_stepnc_aim}
@@ -159,6 +159,64 @@ def test_aim_tools_list_their_operations_and_stock_is_a_block_in_class_two():
     assert [data[int(u[1:])].split("'")[1] for u in users] == ["S01 roughing layers", "S05 roughing layers"]
     assert "NUMERIC_MEASURE(-12000.)" in text and "NUMERIC_MEASURE(600.)" in text
     assert "BLOCK_SHAPE_REPRESENTATION" in text and "'rawpiece'" in text
+
+
+def elements(data, text, name):
+    """Entities and ids of the elements of a workplan."""
+    inside = re.search(rf"WORKPLAN\('{re.escape(name)}',\(([^)]*)\)", text).group(1)
+    return [re.match(r"(\w+)\('([^']*)'", data[int(n)]).groups() for n in re.findall(r"#(\d+)", inside)]
+
+
+def test_workplans_are_nested_by_setup_and_tool_axis():
+    text = write_stepnc_arm(clamped())
+    data = instances(text)
+    assert elements(data, text, "main workplan")[1] == ("WORKPLAN", "setup G54")
+    assert elements(data, text, "setup G54") == [
+        ("WORKPLAN", f"access {a}") for a in ("A1", "I1", "I2", "I1 again 2")]
+    steps = [name for entity, name in elements(data, text, "access I1") if entity == "MACHINING_WORKINGSTEP"]
+    assert [s.split()[0] for s in steps] == ["S02", "S03"]
+    channel = re.search(r"#(\d+)=CHANNEL", text).group(1)
+    assert len(re.findall(rf"WORKPLAN\([^;]*,#{channel},", text)) == 6
+    assert write_stepnc_aim(clamped()).count("=MACHINING_WORKPLAN(") == 1  # class 1 allows one
+
+
+def test_a_fresh_cutter_is_a_message_and_a_stop_before_the_step():
+    arm, aim = write_stepnc_arm(full()), write_stepnc_aim(full())
+    kinds = [entity for entity, _ in elements(instances(arm), arm, "setup G54")]
+    at = kinds.index("DISPLAY_MESSAGE")
+    assert kinds[at:at + 3] == ["DISPLAY_MESSAGE", "PROGRAM_STOP", "RAPID_MOVEMENT"]
+    assert "DISPLAY_MESSAGE('fresh cutter for S04','Fresh cutter in T1: change it and set its length')" in arm
+    assert aim.index("'display message'") < aim.index("'program stop'") < aim.index("MACHINING_WORKINGSTEP('S04")
+
+
+def test_faces_of_passes_that_follow_them_are_surfaces_and_others_outlines():
+    job = full()
+    text = write_stepnc_arm(job)
+    assert text.count("=REGION_SURFACE_LIST('S03 region Z3 F12 F13'") == 1 and text.count("=REGION_PROJECTION(") == 4
+    assert "B_SPLINE_SURFACE_WITH_KNOTS" in text and "RATIONAL_B_SPLINE_SURFACE(((1.,0.9,0.9,1.)" in text
+    assert "=BEZIER_SURFACE('F12',2,3," in text
+    some = full(surfaces={12: job.surfaces[12]})
+    assert "REGION_SURFACE_LIST" not in write_stepnc_arm(some)  # a feature of one of two faces would be too small
+
+
+def test_blank_assembly_teeth_and_life_are_said():
+    arm, aim = write_stepnc_arm(full()), write_stepnc_aim(shaped())
+    assert "RIGHT_CIRCULAR_CYLINDER('stock cylinder'," in arm and "BLOCK(" not in arm and ",20.,22.)" in arm
+    assert "CYLINDRICAL_SHAPE_REPRESENTATION('stock cylinder'" in aim
+    assert "=BALL_ENDMILL(" in arm and re.search(r"=BALL_ENDMILL\(#\d+,2,\.RIGHT\.", arm)
+    assert "CUTTING_COMPONENT(75.5,$,$,2700.,$)" in arm and re.search(r"T1: ball[^;]*,75\.5,\$,\$\)", arm)
+    assert "LENGTH_MEASURE(75.5)" in aim and "COUNT_MEASURE(4.)" in aim and "TIME_MEASURE(45.)" in aim
+    grown = write_stepnc_arm(full(cylinder=None, stock_words="part grown by 1 mm"))
+    assert "BLOCK('box round the stock'" in grown and "'stock part grown by 1 mm'" in grown
+
+
+def test_class_two_has_shapes_strategies_and_instructions_and_class_one_none():
+    one, two = write_stepnc_aim(full()), write_stepnc_aim(shaped())
+    for words in ("TESSELLATED_SOLID('part'", "'plane normal'", "'milling tolerances'", "'setup instructions'",
+                  "TRIANGULATED_FACE('F6'", "'uv'"):
+        assert words in two and words not in one
+    assert "class 2" in two and "class 1" in one and "scallop 0.01 mm" in one
+    assert two.count("=FREEFORM_MILLING_STRATEGY(") == 5 and "'security plane'" in one
 
 
 def test_zigzag_planes_follow_the_passes():
