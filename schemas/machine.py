@@ -45,6 +45,11 @@ class Machine(WireModel):
         description="Every step of a program begins behind a label as after a tool change, tool, length, zero, speed, "
                     "coolant and tool centre point control stated again, so that the program can be started there. On "
                     "a 5-axis machine the axes go back to 0 between steps.")] = False
+    max_program_kb: Annotated[Number | None, Field(
+        ge=1, le=1e6, description="Largest program a control takes, 1000 bytes. A larger one is parted, at a change of "
+                                  "the tool where it can be, into programs that run one after the other: "
+                                  "program.linuxcnc.ngc, program.part2.linuxcnc.ngc, each with its STEP-NC. null: not "
+                                  "limited.")] = None
     high_speed: Annotated[bool, Field(
         description="Say the word for fast contouring where a control has it as an option: G05.1 Q1 on fanuc, CYCLE832 "
                     "on siemens.")] = False

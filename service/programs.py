@@ -14,6 +14,7 @@ from geometry.toolbody import ToolBody
 from output.clamping import SWING, home_of
 from output.dialects import DIALECTS, Switches
 from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.parting import parts_of
 from output.walker import write_program
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
@@ -64,24 +65,28 @@ def programs_of(ready: Prepared, sides: Sequence[Side],
         return []
     if ready.setup.machine.kind == "5-axis":
         work = replace(clamped_workplan(ready, cutting), surfaces=_surfaces(ready, cutting, trimmed or {}))
-        return [_written(ready, ready.views[0].id, work)]
+        return _written(ready, ready.views[0].id, work)
     out = []
     for s in cutting:
         view = s.view
         work = replace(workplan(ready, s), surfaces=_surfaces(ready, [s], trimmed or {}))
         turn = None if view.is_first else view.rotation @ view.first.T
-        out.append(_written(ready, view.id, work, "" if view.is_first else f".{view.id}", turn))
+        out += _written(ready, view.id, work, "" if view.is_first else f".{view.id}", turn)
     return out
 
 
-def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> Program:
-    """The program of a plan for every control of the machine."""
+def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> list[Program]:
+    """The program of a plan for every control of the machine; several in order where one would be too large."""
     machine = ready.setup.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane)
-    work = replace(work, restart=machine.restart_points)
-    texts = {d: write_program(work, DIALECTS[d](switches)) for d in machine.dialects}
-    first = machine.dialects[0]
-    return Program(access, work, texts.pop(first), end, turn, first, texts)
+    dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
+    first, *_ = dialects
+    work, out = replace(work, restart=machine.restart_points), []
+    limit = machine.max_program_kb
+    for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):
+        texts = {d: write_program(part, control) for d, control in dialects.items()}
+        out.append(Program(access, part, texts.pop(first), f"{end}.part{k + 1}" if k else end, turn, first, texts))
+    return out
 
 
 def workplan(ready: Prepared, side: Side) -> Workplan:

@@ -92,6 +92,20 @@ def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypa
     assert not list(tmp_path.glob("program*")) and not list(tmp_path.glob("*.stpnc"))
 
 
+def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
+    """A step of 17 kB and two small ones for 20 kB: three programs, run one after the other on one blank."""
+    machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 20}
+    report = chain.plan(part, parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine})), tmp_path, quiet)
+    assert report["state"] == "proved" and report["coverage"] == 1.0
+    names = [f["name"] for f in report["files"] if f["kind"] == "program"]
+    ends = ("linuxcnc.ngc", "heidenhain.h")
+    assert names == sorted(f"program{k}.{end}" for k in ("", ".part2", ".part3") for end in ends)
+    assert all((tmp_path / n).stat().st_size <= 20_000 for n in names)
+    steps = [s["id"] for s in report["steps"]]
+    told = [s for n in names if n.endswith("ngc") for s in steps if f"({s} " in (tmp_path / n).read_text()]
+    assert sorted(told) == steps
+
+
 def test_programs_of_an_earlier_job_are_cleared(tmp_path):
     for name in (*NAMES.values(), "program.A2.fanuc.nc", "mine.nc"):
         (tmp_path / name).touch()
