@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from verify.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
 
+FARTHEST = 1e6  # in the unit of the file, of the coordinates of a path
 UNIT = 1e-3  # what the length of a tool axis may be off one
 
 
@@ -223,7 +224,7 @@ class Checked:
         """(4, 4) float64, mm: from an AXIS2_PLACEMENT_3D to what it is placed in; ``scale`` is mm in its unit."""
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
-        out[:3, 3] = scale * self.file.points(np.array([self.ref(number, entity, "location")], np.int64))[0]
+        out[:3, 3] = scale * self._places(number, np.array([self.ref(number, entity, "location")], np.int64))[0]
         up, along = (self.maybe(number, entity, a) for a in ("axis", "ref_direction"))
         z = np.array([0.0, 0.0, 1.0]) if up is None else self.vector(up)
         x = np.array([1.0, 0.0, 0.0]) if along is None else self.vector(along)
@@ -263,10 +264,16 @@ class Checked:
             self._check(number, "POLYLINE")
             numbers = np.array(self.one(number, "POLYLINE", "points"), np.int64)
         self._check_points(number, numbers)
+        return self._places(number, numbers), self.file.lines_of(numbers).astype(np.float64)
+
+    def _places(self, owner: int, numbers: NDArray[np.int64]) -> F64:
+        """(n, 3) float64: coordinates of points that an instance refers to."""
         points = self.file.points(numbers)
         for k in np.flatnonzero(np.isnan(points).any(axis=1)).tolist():  # those not written plainly
             points[k] = np.array(self.one(int(numbers[k]), "CARTESIAN_POINT", "coordinates"), np.float64)
-        return points, self.file.lines_of(numbers).astype(np.float64)
+        if (far := np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1))).size:
+            raise self.file.error(int(numbers[far[0]]), f", coordinates: numbers within {FARTHEST:g} expected", owner)
+        return points
 
     def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:
         """Refuse a polyline that refers to what is no point."""

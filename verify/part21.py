@@ -19,21 +19,22 @@ from geometry.errors import ProgramError
 from geometry.mesh import F64, I32
 
 SHOWN = 60  # characters of a text that an error quotes
+DEEPEST = 20  # lists in lists
 _CHUNK = 65_536
 _PIECE = 1 << 20
 _NUMBER = r"[-+]?[0-9]+\.[0-9]*(?:E[-+]?[0-9]+)?"
 _SKIP = re.compile(r"(?:\s++|/\*.*?\*/)*+", re.DOTALL)
 _BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
 _INSTANCE = re.compile(
-    rf"(?:\s++|/\*.*?\*/)*+\#([0-9]+)\s*+=\s*+(?:CARTESIAN_POINT\s*\(\s*'[^'\\]*+'\s*,\s*\(\s*({_NUMBER})\s*,\s*"
+    rf"(?:\s++|/\*.*?\*/)*+\#([0-9]{{1,18}}+)\s*+=\s*+(?:CARTESIAN_POINT\s*\(\s*'[^'\\]*+'\s*,\s*\(\s*({_NUMBER})\s*,\s*"
     rf"({_NUMBER})\s*,\s*({_NUMBER})\s*\)\s*\)\s*;|({_BODY});)", re.DOTALL)
 _STATEMENT = re.compile(rf"({_BODY});", re.DOTALL)
 _TOKEN = re.compile(
-    rf"(?:\s++|/\*.*?\*/)*+(?:(?P<ref>\#[0-9]+)|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]+)|'(?P<text>(?:[^']|'')*+)'"
+    rf"(?:\s++|/\*.*?\*/)*+(?:(?P<ref>\#[0-9]{{1,18}}+)|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+)|'(?P<text>(?:[^']|'')*+)'"
     r"|\.(?P<word>[A-Z][A-Z0-9_]*)\.|(?P<name>!?[A-Z][A-Z0-9_]*)|(?P<sign>[(),$*])|\"(?P<bits>[0-9A-F]+)\")", re.DOTALL)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*")
 _BRACKETS = re.compile(r"'[^']*'|/\*.*?\*/|([A-Z][A-Z0-9_]*)\s*\(|([()])", re.DOTALL)
-_POLYLINE = re.compile(r"POLYLINE\s*\(\s*'[^'\\]*'\s*,\s*\(((?:\s*\#[0-9]+\s*,)+\s*\#[0-9]+\s*)\)\s*\)\s*;")
+_POLYLINE = re.compile(r"POLYLINE\s*\(\s*'[^'\\]*'\s*,\s*\(((?:\s*\#[0-9]{1,18}\s*,)+\s*\#[0-9]{1,18}\s*)\)\s*\)\s*;")
 _DIRECTIVE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X4\\((?:[0-9A-F]{8})*)\\X0\\|\\X\\([0-9A-F]{2})|\\S\\(.)"
                         r"|\\P[A-I]\\|(\\\\)", re.DOTALL)
 
@@ -307,7 +308,7 @@ class _Tokens:
 
     def __init__(self, text: str) -> None:
         self._tokens = list(self._split(text))
-        self._at = 0
+        self._at = self._depth = 0
 
     @staticmethod
     def _split(text: str) -> Iterator[tuple[str, str]]:
@@ -345,14 +346,19 @@ class _Tokens:
     def _list(self) -> list[Value]:
         if self._next() != ("sign", "("):
             raise _Grammar("lacks an opening bracket")
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise _Grammar(f"has lists more than {DEEPEST} deep in each other")
         out: list[Value] = []
         if self._peek() == ("sign", ")"):
             self._at += 1
+            self._depth -= 1
             return out
         while True:
             out.append(self._value())
             sign = self._next()
             if sign == ("sign", ")"):
+                self._depth -= 1
                 return out
             if sign != ("sign", ","):
                 raise _Grammar(f"has {sign[1]!r} where a comma or a closing bracket was expected")

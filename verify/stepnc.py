@@ -66,7 +66,11 @@ def _course(text: str, name: str) -> Course:
         (stepnc_arm.SCHEMAS, stepnc_arm.read_arm), (stepnc_aim.SCHEMAS, stepnc_aim.read_aim)]
     for schemas, read in readers:
         if schemas & set(file.schemas):
-            read(file, course)
+            try:
+                read(file, course)
+            except RecursionError:
+                raise ProgramError(f"{name}: workplans or units hold themselves, or are too many in each other",
+                                   remedy="send a file whose references come to an end") from None
             return course
     known = sorted(stepnc_arm.SCHEMAS | stepnc_aim.SCHEMAS)
     raise ProgramError(f"{name} is a STEP file of schema {', '.join(file.schemas) or 'none'}, which is not STEP-NC",

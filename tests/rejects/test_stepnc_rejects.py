@@ -231,3 +231,38 @@ def test_text_that_breaks_the_grammar_is_refused_by_its_place(what, instead, mes
     assert what in text
     with pytest.raises(ProgramError, match=message):
         read_stepnc(text.replace(what, instead, 1))
+
+
+@pytest.mark.parametrize("write", [write_stepnc_arm, write_stepnc_aim], ids=["arm", "aim"])
+def test_whatever_is_done_to_the_text_the_answer_is_an_error_of_ours_or_a_reading(write):
+    rng, text = np.random.default_rng(5), write(tiny())
+    letters = "#0123456789.,()'$*;=/ \n\\EAX-+_\""
+    for _ in range(150):
+        at = int(rng.integers(len(text)))
+        letter = letters[int(rng.integers(len(letters)))]
+        broken_text = text[:at] + ("", letter, letter + text[at])[int(rng.integers(3))] + text[at + 1:]
+        try:
+            read_stepnc(broken_text, tools=tiny().tools)
+        except ProgramError as error:
+            assert error.message
+
+
+@pytest.mark.parametrize(("what", "instead"), [
+    ("#9=PLANE('security plane',#8);", "#9=PLANE(" + "(" * 5000 + ");"),
+    ("#9=PLANE('security plane',#8);", "#9=PLANE('security plane',#" + "9" * 5000 + ");"),
+    ("(0.,0.,25.)", "(0.,0.,1.E999)"),
+    ("(10.0000,0.0000,5.0000)", "(10.0000,0.0000,1.E999)"),
+    ("(10.0000,0.0000,5.0000)", "(10.0000,0.0000,5.E7)"),
+    ("WORKPLAN('setup G54',(", "WORKPLAN('setup G54',(#2,"),
+])
+def test_what_has_no_end_or_no_size_is_refused(what, instead):
+    text = write_stepnc_arm(tiny())
+    assert what in text
+    with pytest.raises(ProgramError):
+        read_stepnc(text.replace(what, instead, 1))
+
+
+def test_a_unit_that_is_made_of_itself_is_refused():
+    text = write_stepnc_aim(tiny())
+    with pytest.raises(ProgramError, match="hold themselves"):
+        read_stepnc(text.replace("#21=DERIVED_UNIT_ELEMENT(#18,-1.)", "#21=DERIVED_UNIT_ELEMENT(#23,-1.)"))
