@@ -20,6 +20,7 @@ FLOOR, CEILING = 80.0, 5.0  # where the tip stands, and how high the assembly ma
 MIDDLE, TIP_MIDDLE = 38.0, 97.0  # of the assembly and of the larger tip
 ASSEMBLY_ROOM, TIP_ROOM = (32.0, FLOOR - CEILING), (24.0, 46.0)  # width, height
 LEAST_SHOWN = 10.0  # mm of paper across the cutting part, below which the tip is drawn larger
+MOST_LABELS = 16
 APART, LETTER = 4.2, 2.9  # mm between labels; height of letters
 SCALES = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100)
 
@@ -177,7 +178,12 @@ def _diameters(body: ToolBody) -> list[tuple[float, float, str]]:
 
 def _label(entries: Sequence[tuple[float, float, str]], x: float, side: float, scale: float, strokes: list[Stroke],
            words: list[Word], middle: float) -> None:
-    """Words in a column beside the assembly, each with a line to its height, and none over another."""
+    """Words in a column beside the assembly, each with a line to its height, and none over another.
+
+    Of more than there is room for those at both ends are kept; all segments of a holder stand beside the drawing.
+    """
+    if len(entries) > MOST_LABELS:
+        entries = [*entries[:MOST_LABELS // 2], *entries[-MOST_LABELS // 2:]]
     wanted = [FLOOR - scale * h for h, _, _ in entries]
     placed: list[float] = []
     for y in wanted:  # upwards from the tip

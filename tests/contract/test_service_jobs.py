@@ -29,7 +29,7 @@ def test_a_job_is_accepted_computed_and_its_files_are_there(client, post, finish
                                                             "remainder"}
     files = client.get(job["links"]["files"]).json()
     assert [f["name"] for f in files["items"]] == ["deviation.png", "job.stpnc", "program.linuxcnc.ngc", "report.json",
-                                                   "zones.json"]
+                                                   "sheet.html", "sheet.pdf", "zones.json"]
     assert files["withheld"] is None
     for item in files["items"]:
         got = client.get(item["href"])
@@ -65,7 +65,8 @@ def test_programs_of_an_unproved_job_are_withheld_with_the_finding(client, post,
     job = finish(client, post(client, "gouge").json())
     assert job["state"] == "unproved"
     files = client.get(job["links"]["files"]).json()
-    assert [f["name"] for f in files["items"]] == ["deviation.png", "report.json", "zones.json"]
+    assert [f["name"] for f in files["items"]] == ["deviation.png", "report.json", "sheet.html", "sheet.pdf",
+                                                   "zones.json"]
     assert "gouge" in files["withheld"]
     # those that are there, and those that are not: which of them were written is nobody's business
     for name in ("program.linuxcnc.ngc", "program.A2.linuxcnc.ngc", "job.stpnc", "job.arm.stpnc", "job.A2.stpnc"):
@@ -92,6 +93,18 @@ def test_the_deviation_map_is_a_file_of_plans_and_verifications(client, post, fi
         assert "deviation.png" in [f["name"] for f in client.get(job["links"]["files"]).json()["items"]]
         answer = client.get(f"{job['links']['files']}/deviation.png")
         assert answer.status_code == 200 and answer.headers["content-type"] == "image/png"
+
+
+def test_the_setup_sheet_is_a_file_of_every_plan(client, post, finish):
+    for what in ("", "gouge"):
+        links = finish(client, post(client, what).json())["links"]
+        listed = {f["name"]: f["media_type"] for f in client.get(links["files"]).json()["items"]}
+        for name, kind in (("sheet.html", "text/html; charset=utf-8"), ("sheet.pdf", "application/pdf")):
+            answer = client.get(f"{links['files']}/{name}")
+            assert answer.status_code == 200 and answer.headers["content-type"] == listed[name] == kind
+            # labels are the user's words: the page is saved, not opened in the name of the service
+            assert answer.headers["content-disposition"].startswith("attachment")
+            assert answer.headers["x-content-type-options"] == "nosniff"
 
 
 def test_zones_and_verifications_are_jobs_too(client, post, finish):

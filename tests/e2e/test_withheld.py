@@ -62,7 +62,9 @@ def test_an_older_proved_program_is_gone_when_the_job_is_no_longer_proved(part, 
     report = json.loads(got.stdout)
     assert report["state"] == "unproved" and the_gouge(report["findings"])["program"] == PROGRAMS[0]
     left = {p.name for p in out.iterdir()}
-    assert left == {"report.json", "zones.json", "preview.png", "deviation.png", "program.mine.txt"}
+    assert left == {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf",
+                    "program.mine.txt"}
+    assert b"UNPROVED" in (out / "sheet.html").read_bytes()
     assert {f["name"] for f in report["files"]} == left - {"report.json", "program.mine.txt"}
     assert not [p for p in out.iterdir() if b"T1 M6" in p.read_bytes() or b"ISO-10303-21" in p.read_bytes()]
 
@@ -86,7 +88,8 @@ def test_over_http_the_answer_is_the_finding(part, tmp_path, monkeypatch):
         assert report["machined"] is None
         listed = client.get(job["links"]["files"]).json()
         names = {f["name"] for f in listed["items"]}
-        assert names == {"report.json", "zones.json", "preview.png", "deviation.png"} and "gouge" in listed["withheld"]
+        assert names == {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf"}
+        assert "gouge" in listed["withheld"]
         for name in PROGRAMS:
             answer = client.get(f"{job['links']['files']}/{name}")
             assert answer.status_code == 409 and answer.json()["code"] == "program_withheld"

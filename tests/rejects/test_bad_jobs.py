@@ -42,6 +42,9 @@ class Bad:
     setup: dict | str | None = None
     late: bool = False
 
+# what is delivered of a job that is not proved
+WITHOUT_PROGRAMS = {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf"}
+
 
 def tools(*given, **fields):
     return {**GOOD, "tools": list(given), **fields}
@@ -253,7 +256,7 @@ def test_a_job_in_which_no_tool_fits_is_unproved_and_says_what_would(client, sub
     assert job["state"] == "unproved"
     says_what_would_fit(client.get(job["links"]["report"]).json())
     names = {f["name"] for f in client.get(job["links"]["files"]).json()["items"]}
-    assert names == {"report.json", "zones.json", "preview.png", "deviation.png"}
+    assert names == WITHOUT_PROGRAMS
 
 
 @pytest.mark.slow
@@ -261,7 +264,7 @@ def test_the_command_ends_with_3_where_no_tool_fits(command, parts):
     done, out = command(parts["slot"], json.dumps(no_tool_fits(parts)))
     assert done.returncode == 3, done.stderr
     says_what_would_fit(json.loads(done.stdout))
-    assert {p.name for p in out.iterdir()} == {"report.json", "zones.json", "preview.png", "deviation.png"}
+    assert {p.name for p in out.iterdir()} == WITHOUT_PROGRAMS
 
 
 def test_no_process_outlives_the_jobs():

@@ -51,6 +51,8 @@ def plan(part_path, setup, out, progress, blank_path=None):
     (out / "program.linuxcnc.ngc").write_text("%\nG21\nM2\n%\n")
     (out / "job.stpnc").write_text("ISO-10303-21;\n")
     (out / "deviation.png").write_bytes(b"\x89PNG of the fake")
+    (out / "sheet.html").write_text("<!DOCTYPE html>\n<title>Sheet of the fake</title>\n")
+    (out / "sheet.pdf").write_bytes(b"%PDF-1.3 of the fake")
     report = _report(setup, state, findings)
     if blank_path is not None:
         report["inputs"]["stock_sha256"] = hashlib.sha256(blank_path.read_bytes()).hexdigest()

@@ -1,0 +1,236 @@
+"""The setup sheet of a plan made by hand: all that the report says, in both forms, and nothing it must not say."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import zlib
+from html.parser import HTMLParser
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.errors import OutputError
+from geometry.part import FaceInfo, Part
+from service.clampshot import box_mesh, corners_of
+from service.convert import parse_setup
+from service.delivery import Files
+from service.sheet import sheet_files
+from service.sheetpdf import latin
+from service.sides import Program
+from service.stock import blank_of
+from tests.synthetic_plan import plan, step
+from toolpath.motion import Workingstep
+
+HOSTILE = "<script>alert('Ø')</script> & \"4711\""
+FACES = " ".join(f"F{k}" for k in range(1, 900))
+SETUP = {
+    "tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 9, "neck_diameter_mm": 2.8,
+               "life_min": 20, "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 45, "gauge_length_mm": 81,
+               "holder": [{"diameter_mm": 20, "length_mm": 30}]},
+              {"id": "rougher", "number": 7, "kind": "bull", "diameter_mm": 8, "corner_radius_mm": 1,
+               "stickout_mm": 50},
+              {"id": "T9", "kind": "flat", "diameter_mm": 2}],
+    "stock": {"kind": "box", "box_mm": [[-1, -2, -3], [41, 22, 14]]},
+    "fixtures": [{"box_mm": [[-20, 0, -3], [-5, 20, 2]]}],
+    "placement": {"origin_mm": [1.5, 0, 7]}, "labels": {"order": HOSTILE, "customer": "Müller → 漢"}}
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, and the text between them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
+def pdf_text(data: bytes) -> str:
+    """All that is shown as text, in the order it stands in the file."""
+    out = []
+    for stream in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", data, re.DOTALL):
+        try:
+            page = zlib.decompress(stream)
+        except zlib.error:
+            continue
+        for shown in re.findall(rb"\(((?:[^()\\]|\\.)*)\) Tj", page):
+            out.append(re.sub(rb"\\(.)", rb"\1", shown).decode("latin-1"))
+    return " ".join(" ".join(out).split())
+
+
+def steps() -> tuple[Workingstep, ...]:
+    from service.convert import tool_bodies
+    one, two, _ = tool_bodies(parse_setup(json.dumps(SETUP)))
+    return (step(1, two, "layers", zone=None, faces=(), z=8.0), step(2, one, "zlevel", zone="Z1"),
+            step(3, one, "zigzag", zone="Z2", z=-4.0))
+
+
+def report_of(state: str, findings: list[dict[str, Any]]) -> dict[str, Any]:
+    zones = [{"id": f"Z{k}", "kind": "SCZ", "profile": "C4", "level": "simple", "access": "A1", "tool": "T1",
+              "form": "steep", "strategy": "zlevel", "area_mm2": 10.0 * k,
+              "faces": FACES.split() if k == 2 else ["F12"],
+              "scallop_mm": {"requested": 0.0125, "p50": None, "p99": 0.0117, "max": 0.0119}, "coverage": 0.99999,
+              "steps": [f"S0{k + 1}"], "machining_time_s": 66.0} for k in (1, 2)]
+    return {
+        "state": state, "labels": SETUP["labels"], "inputs": {"part_sha256": "ab" * 32, "setup_sha256": "cd" * 32},
+        "part": {"bbox_mm": [[0, 0, 0], [40, 20, 13]], "warnings": ["hot ; cool", "a face was mended"]},
+        "time": {"in_cut_s": 600.0, "in_air_s": 60.0, "rapid_s": 6.0, "retracts": 17, "tool_changes": 1},
+        "machining_time_s": 660.0, "coverage": 0.98765, "reach_coverage": 1.0, "gouge_max_mm": 0.0031,
+        "proof": {"samples": 31415, "error_bound_mm": 0.002, "cutting_length_mm": 2718.0,
+                  "notes": ["a note of the proof"]},
+        "steps": [{"id": s.id, "name": "S01 layers rougher Z1 Z2" if s.zone is None else s.name, "zone": s.zone,
+                   "tool": s.tool.id, "operation": s.operation, "strategy": s.strategy, "spindle_rpm": 12000.0,
+                   "feed_mm_min": 600.0 + k, "machining_time_s": 222.0, "fresh_cutter": k == 2}
+                  for k, s in enumerate(steps())],
+        "zones": zones, "findings": findings, "finding_counts": {"gouge": 3} if findings else {}, "accesses": [],
+        "remainder": [
+            {"reason": "gap", "area_mm2": 4.56, "faces": ["F7"], "at_mm": [1.0, 2.0, 3.0], "tool_at_hand": None,
+             "why_left": None, "would_need": {"kind": "ball", "diameter_mm": 0.8, "corner_radius_mm": 0.4,
+                                              "neck_length_mm": 14, "shank_diameter_mm": 4, "stickout_mm": 18,
+                                              "share": 0.7}},
+            {"reason": "pass", "area_mm2": 0.12, "faces": ["F8"], "at_mm": [1.0, 2.0, 3.0], "tool_at_hand": "T1",
+             "why_left": "no pass gets there", "would_need": {}},
+            {"reason": "undercut", "area_mm2": 9.0, "faces": ["F9"], "at_mm": [1.0, 2.0, 3.0], "tool_at_hand": None,
+             "why_left": None, "would_need": {"kind": "other process", "slenderness": 22.5, "access": "A1"}}],
+        "warnings": [{"kind": "tool_life", "subjects": ["T1", "S03"], "message": "T1 lasts for 20 min", "remedy":
+                      "have 2 cutters at hand", "measured": 25.0, "limit": 20.0, "at_mm": None}],
+        "tools": [{"id": t, "number": n, "minutes_in_cut": m, "metres_in_cut": 0.5 * m, "life_min": life, "cutters": c,
+                   "slenderness": 7.1, "deflection_mm": None if t == "T9" else 0.0231}
+                  for t, n, m, life, c in (("T1", 1, 25.125, 20.0, 2), ("rougher", 7, 9.5, None, 1),
+                                           ("T9", 9, 0.0, None, 0))],
+        "version": "0.1.0"}
+
+
+def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cut: bool = True) -> dict[str, bytes]:
+    setup = parse_setup(json.dumps(SETUP))
+    mesh = box_mesh(corners_of(np.array([[0.0, 0.0, 0.0], [40.0, 20.0, 13.0]])))
+    faces = tuple(FaceInfo(n, "plane", 1.0, False, 0.0, 0.0) for n in range(1, 7))
+    part = Part(mesh, faces, (), mesh.volume, mesh.bounds, "mm", 0.01, 0.2, 0.0, (), "ab" * 32)
+    view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
+    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
+                            view=lambda _name: view)
+    work = plan(*steps(), restart=True)
+    report = report_of(state, findings or [])
+    if not cut:
+        report |= {"steps": [], "zones": [], "tools": [{**t, "cutters": 0} for t in report["tools"]]}
+    files: Files = {"zones.json": ("zones", "", None, b"{}")}
+    if state == "proved":
+        files["program.linuxcnc.ngc"] = ("program", "linuxcnc", "A1", b"G21\n")
+    written = [Program("A1", work, "G21 (not to be seen)\n")] if cut else []
+    got = sheet_files(ready, written, report, files)  # type: ignore[arg-type]
+    assert {name: f[0] for name, f in got.items()} == {"sheet.html": "sheet", "sheet.pdf": "sheet"}
+    return {name: data for name, (*_, data) in got.items() if isinstance(data, bytes)}
+
+
+GOUGE = {"kind": "gouge", "message": "T1 cuts 0.2 mm into the part", "line": 77, "program": "program.linuxcnc.ngc",
+         "zone": "Z1", "face": "F12", "point": [1.0, 2.0, 3.0], "count": 5, "depth": 0.2, "limit": 0.01}
+
+
+@pytest.fixture(scope="module")
+def proved() -> dict[str, bytes]:
+    return made()
+
+
+@pytest.fixture(scope="module")
+def unproved() -> dict[str, bytes]:
+    return made("unproved", [GOUGE])
+
+
+def both(sheet: dict[str, bytes]) -> list[str]:
+    """The text of the page and that of the PDF."""
+    return [" ".join(" ".join(Page(sheet["sheet.html"].decode()).words).split()), pdf_text(sheet["sheet.pdf"])]
+
+
+def test_all_that_the_report_names_is_on_both(proved):
+    wanted = [
+        "PROVED", "S01", "S02", "S03", "N100", "N200", "N300", "Z1 Z2", "T7 rougher", "T9", "not used", "fresh cutter",
+        "12000", "600", "601", "602", "3.7", "11 min as simulated", "98.76 %", "99.99 %", "0.0125", "0.0117", "0.0119",
+        "F12", "F899", "4.56", "ball Ø0.8, neck 14, shank Ø4, stickout 18, for 70 % of it",
+        "no pass gets there, T1 would",
+        "another process, as a tool would be 22.5 times as long as", "G54", "X1.5 Y0 Z7", "Z25", "Z-4",
+        "4 below the blank",
+        "X -1 to 41, Y -2 to 22, Z -3 to 14", "X 0 to 40, Y 0 to 20, Z 0 to 13", "fixture 1", "-20 to -5",
+        "T1 lasts for 20 min", "have 2 cutters at hand", "a face was mended", "a note of the proof", "abababababababab",
+        "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof found nothing",
+        "program.linuxcnc.ngc", "31415", "Ti-6Al-4V"]
+    for text in both(proved):
+        assert [w for w in wanted if w not in text] == []
+        assert "not to be seen" not in text and "UNPROVED" not in text
+
+
+def test_what_users_write_stays_text(proved):
+    page = Page(proved["sheet.html"].decode())
+    assert not [t for t, _ in page.tags if t == "script"]
+    escaped = html.escape(HOSTILE).replace("&#x27;", "&#39;").replace("&quot;", "&#34;")
+    assert escaped in proved["sheet.html"].decode()
+    text, pdf = both(proved)
+    assert HOSTILE in text and "Müller → 漢" in text and "Müller ? ?" in pdf
+
+
+def test_the_page_asks_for_nothing_and_can_be_heard(proved):
+    page = Page(proved["sheet.html"].decode())
+    for tag, attributes in page.tags:
+        assert tag not in ("link", "script", "iframe", "object", "form")
+        for name in ("src", "href"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:image/png;base64,"))
+        if tag == "img":
+            assert len(attributes["alt"] or "") > 40
+        if tag == "svg":
+            assert attributes["role"] == "img" and attributes["aria-label"]
+        if tag == "th":
+            assert attributes["scope"] in ("row", "col")
+    assert ("html", {"lang": "en"}) in page.tags and "url(" not in proved["sheet.html"].decode()
+
+
+def test_the_same_job_gives_the_same_bytes(proved, monkeypatch):
+    assert made() == proved
+    assert b"/CreationDate (D:19700101000000Z)" in proved["sheet.pdf"]
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    again = made()
+    assert again["sheet.html"] == proved["sheet.html"] and b"D:20231114221320Z" in again["sheet.pdf"]
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(OutputError) as caught:
+        made()
+    assert caught.value.code == "bad_epoch"
+
+
+def test_an_unproved_job_says_so_and_why(unproved):
+    for text in both(unproved):
+        assert "UNPROVED Nothing may be run: the proof has 3 findings, and no program was written." in text
+        assert "T1 cuts 0.2 mm into the part" in text and "line 77" in text and "2 more are counted only" in text
+        assert "none written" in text and "N100" not in text and "not to be seen" not in text
+        assert text.index("T1 cuts 0.2") < text.index("Program zero")
+    large = Page(unproved["sheet.html"].decode())
+    assert ("p", {"class": "verdict unproved"}) in large.tags
+
+
+def test_a_job_that_cuts_nothing_has_a_sheet_too():
+    for text in both(made("unproved", [{**GOUGE, "kind": "nothing_cut", "line": 0, "program": "", "point": None}],
+                          cut=False)):
+        assert "nothing could be cut" in text and "No zone" in text and "T9" in text
+
+
+def test_the_pdf_is_whole(proved):
+    data = proved["sheet.pdf"]
+    assert data.startswith(b"%PDF-1.") and data.rstrip().endswith(b"%%EOF")
+    start = int(re.findall(rb"startxref\s+(\d+)", data)[-1])
+    assert data[start:].startswith(b"xref")
+    rows = re.findall(rb"(\d{10}) 00000 n", data[start:])
+    for number, row in enumerate(rows, 1):
+        assert data[int(row):].startswith(b"%d 0 obj" % number)
+    assert data.count(b"/Type /Page\n") >= 4 and data.count(b"/Subtype /Image") >= 1
+    assert f"of {data.count(b'/Type /Page' + bytes([10]))}" in pdf_text(data)
+
+
+def test_letters_the_pdf_has_not_are_spelt_out():
+    assert latin("Ø8 ±0.1 → Łódź\n漢") == "Ø8 ±0.1 ? Lódz ?"

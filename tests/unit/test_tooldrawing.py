@@ -1,0 +1,82 @@
+"""Drawings of tools: every part as large as the scale says, every word there and none over another."""
+
+from __future__ import annotations
+
+import itertools
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from geometry.toolbody import HolderSegment, ToolBody
+from service.tooldrawing import HEIGHT, LETTER, WIDTH, draw_tool, svg_of
+
+SVG = "{http://www.w3.org/2000/svg}"
+HOLDER = (HolderSegment(14.0, 20.0, 12.0), HolderSegment(20.0, 20.0, 30.0))
+BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
+BULL = ToolBody("T7", 7, 8.0, 1.0, 20.0, 8.0, 20.0, 8.0, 50.0)
+LONG = ToolBody("T9", 9, 0.4, 0.0, 0.8, 0.38, 6.0, 4.0, 60.0, (HolderSegment(63.0, 63.0, 160.0),) * 3)
+CROWDED = ToolBody("T3", 3, 1.0, 0.5, 1.0, 0.9, 1.2, 3.0, 1.4, (HolderSegment(40.0, 40.0, 0.3),) * 12)
+STACKED = ToolBody("T4", 4, 6.0, 0.0, 12.0, 6.0, 12.0, 6.0, 30.0, (HolderSegment(20.0, 22.0, 1.0),) * 50)
+TOOLS = [(BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0)]
+
+
+def read(body: ToolBody, gauge: float) -> ET.Element:
+    return ET.fromstring(svg_of(draw_tool(body, gauge)))
+
+
+def box(polygon: ET.Element) -> tuple[float, float, float, float]:
+    """Left, right, upper and lower end, mm of paper."""
+    places = [tuple(map(float, pair.split(","))) for pair in polygon.attrib["points"].split()]
+    xs, ys = zip(*places, strict=True)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+@pytest.mark.parametrize(("body", "gauge"), TOOLS, ids=lambda x: getattr(x, "id", ""))
+def test_every_part_is_drawn_to_scale(body, gauge):
+    root = read(body, gauge)
+    scale = float(root.attrib["data-scale"])
+    floor = None
+    wanted = [("flutes", body.diameter, 0.0, body.flute_length)]
+    if body.neck_length > body.flute_length:
+        wanted.append(("neck", body.neck_diameter, body.flute_length, body.neck_length))
+    wanted.append(("shank", body.shank_diameter, body.neck_length, body.stickout))
+    at = body.stickout
+    for h in body.holder:
+        wanted.append(("holder", max(h.diameter, h.diameter_top), at, at + h.length))
+        at += h.length
+    drawn = [p for p in root.iter(f"{SVG}polygon") if p.attrib["data-view"] == "assembly"]
+    assert [p.attrib["data-part"] for p in drawn] == [w[0] for w in wanted]
+    for polygon, (_, across, low, high) in zip(drawn, wanted, strict=True):
+        left, right, up, down = box(polygon)
+        floor = down if floor is None else floor
+        assert right - left == pytest.approx(scale * across, abs=0.003)
+        assert floor - down == pytest.approx(scale * low, abs=0.003)
+        assert floor - up == pytest.approx(scale * high, abs=0.003)
+
+
+def test_the_tip_is_drawn_larger_and_round_where_it_is_small():
+    root = read(BALL, 87.0)
+    (tip,) = [p for p in root.iter(f"{SVG}polygon") if p.attrib["data-view"] == "tip"]
+    left, right, _, down = box(tip)
+    assert right - left == pytest.approx(5.0 * 3.0, abs=0.003)
+    places = [tuple(map(float, pair.split(","))) for pair in tip.attrib["points"].split()]
+    round_end = [(x, y) for x, y in places if y > down - 7.4]
+    assert len(round_end) > 20
+    assert all((x - 97.0) ** 2 + (y - (down - 7.5)) ** 2 == pytest.approx(7.5 ** 2, rel=1e-3) for x, y in round_end)
+    assert not [p for p in read(BULL, 50.0).iter(f"{SVG}polygon") if p.attrib["data-view"] == "tip"] or \
+        float(read(BULL, 50.0).attrib["data-scale"]) * 8.0 < 10.0
+
+
+@pytest.mark.parametrize(("body", "gauge"), TOOLS, ids=lambda x: getattr(x, "id", ""))
+def test_words_are_on_the_paper_and_none_is_over_another(body, gauge):
+    words = draw_tool(body, gauge).words
+    assert all(0.0 < w.at[0] < WIDTH and LETTER <= w.at[1] + LETTER and w.at[1] <= HEIGHT for w in words)
+    for side in ("start", "end"):
+        lines = sorted(w.at[1] for w in words if w.anchor == side)
+        assert all(b - a > LETTER for a, b in itertools.pairwise(lines))
+
+
+def test_it_says_each_length_and_diameter():
+    said = [w.text for w in draw_tool(BALL, 90.0).words]
+    assert {"0 tip", "9 flutes", "20 neck", "45 stickout", "57 holder", "87 holder", "90 gauge length"} <= set(said)
+    assert {"Ø3", "Ø2.8 neck", "Ø6 shank", "Ø14 to 20", "Ø20", "assembly 1:2", "tip 5:1, corner R1.5"} <= set(said)
