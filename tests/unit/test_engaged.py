@@ -41,7 +41,8 @@ def twin(top, x0, y0, step, tips, ways, radius, corner, skin, window):
                 side = way[0] * wy - way[1] * wx
                 low, high = (math.asin(max(-1.0, min(1.0, (side + s * 0.5 * step) / edge))) for s in (-1.0, 1.0))
                 first, last = (min(max(int((a / math.pi + 0.5) * SECTORS), 0), SECTORS - 1) for a in (low, high))
-                first, last = first if side - step >= -edge else 0, last if side + step <= edge else SECTORS - 1
+                if over >= corner:
+                    first, last = first if side - step >= -edge else 0, last if side + step <= edge else SECTORS - 1
                 own |= set(range(first, last + 1))
         sets.append(own)
     out = []

@@ -9,7 +9,7 @@ import pytest
 from tests.pocket_case import OTHER, SETUP, TOOL, block, program, scored, text
 from verify.engagement import RESOLUTION, engaged_angles, engagements
 from verify.field import run_field, stock_field
-from verify.kernels.engaged import SECTORS, edge_radius, sector_bits
+from verify.kernels.engaged import SECTORS, sector_bits
 from verify.model import FindingKind, ProofSetup, StockKind
 from verify.prove import prove
 from verify.removal import Moves
@@ -56,8 +56,7 @@ def test_what_a_finishing_pass_skims_is_no_engagement():
 def test_sectors_are_counted_all_round_from_x():
     def bits(b, over=5.0, corner=0.0, wide=1e-9, way=(1.0, 0.0), twist=0.0):
         dx, dy = way
-        rho = edge_radius(over, 2.0, corner)
-        return int(sector_bits(-b * dy, b * dx, dx, dy, 1.0, rho, rho, wide, twist)) & 2**64 - 1
+        return int(sector_bits(-b * dy, b * dx, dx, dy, 1.0, over, 2.0, corner, wide, twist)) & 2**64 - 1
 
     assert [bits(b) for b in (1.9999, 1e-6, -1e-6, -1.9999, 2.001)] == [1 << 15, 1, 1 << 63, 1 << 48, 0]
     assert bits(1e-6, way=(0.0, 1.0)) == bits(1e-6, twist=0.5 * math.pi) == 1 << 16
@@ -66,8 +65,6 @@ def test_sectors_are_counted_all_round_from_x():
     assert bits(1.0, wide=1.1) == sum(1 << k for k in range(2, 17))
     # under its equator a ball is thinner
     assert bits(1.5, over=0.2, corner=2.0) == 0
-    # what it leaves of a place beside the way it takes until it is past it
-    assert int(sector_bits(0.0, 1.0, 1.0, 0.0, 1.0, 2.0, 1.0, 1e-9, 0.0)) == sum(1 << k for k in range(5, 17))
 
 
 def slot(points, tool, depth=3.0, lean=0.0):
@@ -103,18 +100,18 @@ BALL = replace(TOOL, corner_radius=TOOL.radius)
 @pytest.mark.parametrize("cut", [30.0, 0.5, 0.1, 0.02])
 @pytest.mark.parametrize(("tool", "depth"), [(TOOL, 3.0), (TOOL, 0.3), (BALL, 1.2)])
 def test_a_slot_is_a_slot_however_it_is_cut_into_moves(tool, depth, cut, lean):
-    """All of the front of a flat is in a slot, and of a ball all but what it takes off in skims beside its way."""
+    """All of the front of a flat is in a slot, and of a ball all but where it is no deeper in than r / 20."""
     if lean and (cut < 0.1 or depth < 1.0):
         pytest.skip("slow on the grid")
     angle = slot(straight(cut), tool, depth, lean)
-    assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(170 if tool is TOOL else 160)
+    assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(170 if tool is TOOL else 130)
 
 
 @pytest.mark.parametrize("tool", [TOOL, BALL])
 def test_turns_that_are_but_steps_of_one_way_hide_nothing(tool):
     for way in (straight(0.02, jog=5e-4), stairs(0.05), stairs(0.02), np.repeat(straight(0.1), 2, axis=0)):
         angle = slot(way, tool, 1.2)
-        assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(150)
+        assert np.quantile(angle[angle > 0.0], 0.1) >= math.radians(150 if tool is TOOL else 125)
 
 
 def test_what_lies_behind_after_a_corner_is_not_in_front():

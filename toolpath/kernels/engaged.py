@@ -2,8 +2,8 @@
 
 The front is the half circle ahead of the way of a tip, in sectors from its right (0) to its left. A node of the stock
 counts where it stands higher over the cutter than ``skin``. It stands for a strip one step wide, and meets the edge at
-the angles off the way of both sides of that, as seen from where the profile meets its height; the last one stands for
-all up to the side of the edge.
+the angles off the way of both sides of that, as seen from where the profile meets its height; beside the flank the
+last one stands for all up to the side of the edge.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def engaged(top, x0, y0, step, tips, ways, radius, corner, skin, window, out):
                     edge = radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
                 side = ways[k, 0] * wy - ways[k, 1] * wx
                 low, high = _sector((side - 0.5 * step) / edge), _sector((side + 0.5 * step) / edge)
-                if side + step > edge:
+                if over >= corner and side + step > edge:
                     high = SECTORS - 1
-                if side - step < -edge:
+                if over >= corner and side - step < -edge:
                     low = 0
                 bits[k] |= (np.int64(2) << high) - (np.int64(1) << low)
         joint, way, m = bits[k], 0.0, k

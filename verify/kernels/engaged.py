@@ -3,7 +3,8 @@
 The edge of a tool is a circle of 64 sectors, numbered from the X of a frame square to its axis (``verify.toolaxes``)
 towards its Y. A place at signed distance b beside the way D, where the profile has radius rho at the height of the
 stock, comes to the edge at the angle asin(b / rho) off D. Stock is known on lines or nodes a step apart, so each stands
-for a strip as wide, and the last one for all up to the side of the edge: a slot is never taken for less.
+for a strip as wide, and beside the flank the last one for all up to the side of the edge: a slot of a flat is never
+taken for less. Of a round end the last places beside its way are no deeper in than ``LEAST_DEPTH``.
 
 Sectors do not turn with the way, so those that were met on the way to a place can be put together with those met
 there, whatever way each of the moves between went: how a path is cut into moves makes no difference.
@@ -41,31 +42,32 @@ def edge_radius(over, radius, corner):
 
 
 @njit(**KERNEL)
+def bottom(aside, radius, corner):
+    """Height of the profile over the tip ``aside`` mm from the axis, aside <= radius."""
+    run = aside - radius + corner
+    return corner - math.sqrt(max(corner * corner - run * run, 0.0)) if run > 0.0 else 0.0
+
+
+@njit(**KERNEL)
 def _sector(angle):
     return int(math.floor(angle / (2.0 * math.pi) * SECTORS)) % SECTORS
 
 
 @njit(**KERNEL)
-def sector_bits(wx, wy, dx, dy, plan, upper, lower, wide, twist):
+def sector_bits(wx, wy, dx, dy, plan, over, radius, corner, wide, twist):
     """Bits of the sectors in which a strip ``wide`` mm across meets the edge.
 
     (wx, wy) : of its middle off the tip; (dx, dy), plan : the way and its length; twist : rad, of this X and Y in the
-    frame of the sectors; upper, lower : mm, radius of the profile where the stock ends above and where the cut does
+    frame of the sectors; over : mm of stock over the tip there
     """
-    b = (dx * wy - dy * wx) / plan
-    if upper <= 0.0 or abs(b) > upper:
+    b, edge = (dx * wy - dy * wx) / plan, edge_radius(over, radius, corner)
+    if edge <= 0.0 or abs(b) > edge:
         return np.int64(0)
     ahead = math.atan2(dy, dx) + twist
-    low, high = math.asin(max((b - 0.5 * wide) / upper, -1.0)), math.asin(min((b + 0.5 * wide) / upper, 1.0))
-    if b + wide > upper:  # no place beyond says where stock ends short of the edge
-        high = 0.5 * math.pi
-    if b - wide < -upper:
-        low = -0.5 * math.pi
-    if lower < upper:  # a round end is still at the place further down, until the way has passed it
-        if b >= 0.0:
-            high = max(high, math.asin(min((b + 0.5 * wide) / max(lower, 1e-12), 1.0)))
-        else:
-            low = min(low, math.asin(max((b - 0.5 * wide) / max(lower, 1e-12), -1.0)))
+    low, high = math.asin(max((b - 0.5 * wide) / edge, -1.0)), math.asin(min((b + 0.5 * wide) / edge, 1.0))
+    if over >= corner:  # no place beyond says where stock ends short of the side
+        high = 0.5 * math.pi if b + wide > edge else high
+        low = -0.5 * math.pi if b - wide < -edge else low
     bits, k, last = np.int64(0), _sector(ahead + low), _sector(ahead + high)
     for _ in range(SECTORS):
         bits |= np.int64(1) << k

@@ -22,7 +22,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.engaged import LEAST_DEPTH, edge_radius, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, bottom, sector_bits
 from verify.kernels.frustum import contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
@@ -128,9 +128,10 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                         if v > 0.0:
                             totals[2] = 1.0
                             plan = math.sqrt(dx * dx + dy * dy)
-                            if d <= 0.0 and plan > 0.0 and qz - 0.5 * dz > LEAST_DEPTH * cutter[0]:
-                                rho = edge_radius(qz - 0.5 * dz, cutter[0], r)
-                                sectors |= sector_bits(qx, qy, dx, dy, plan, rho, rho, h, twist)
+                            if d <= 0.0 and plan > 0.0:
+                                aside = min(abs(dx * qy - dy * qx) / plan, cutter[0])
+                                if qz - 0.5 * dz - bottom(aside, cutter[0], r) > LEAST_DEPTH * cutter[0]:
+                                    sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h, twist)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from verify.kernels.engaged import LEAST_DEPTH, WINDOW, edge_radius, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, WINDOW, sector_bits
 from verify.kernels.frustum import contact
 from verify.kernels.heights import INF, _cells, entered, lowest, lowest_within
 
@@ -120,9 +120,8 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                     begun[i - i0, j - j0], come[i - i0, j - j0] = way, low + gone
                 tip = a[2] + s * d[2]
                 if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
-                    engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan,
-                                           edge_radius(low + gone - tip, radius, corner),
-                                           edge_radius(max(low - tip, LEAST_DEPTH * radius), radius, corner), step, 0.0)
+                    engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius,
+                                           corner, step, 0.0)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
