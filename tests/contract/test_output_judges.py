@@ -1,6 +1,7 @@
 """What the writers make, judged by programs of others: the EXPRESS schemas and LinuxCNC's interpreter."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from output.linuxcnc import write_linuxcnc
 from output.model import Ap238
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
+from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
 from toolpath.motion import Motion
 from verify.reader import read_program
@@ -28,6 +30,9 @@ MORE = {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: 
     cylinder=None, stock_mesh=block_mesh(), stock_words="solid of a STEP file"), "a block": lambda: shaped(
     cylinder=None, stock_words=""), "turning, all": lambda: shaped(job=clamped())}
 TURNING = {"one clamping": clamped, "a head": lambda: clamped("head-head-AC", tcp=False)}
+
+RESTART = {"restart points": lambda: replace(plan(), restart=True),
+           "restart points on five axes": lambda: replace(clamped(), restart=True)}
 
 
 def flat_step():
@@ -81,7 +86,7 @@ def test_the_judge_is_awake(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not GCODE.exists(), reason="the interpreter script ../shared/tools/gcode_check.sh is not there")
-@pytest.mark.parametrize("job", (JOBS | TURNING).values(), ids=JOBS | TURNING)
+@pytest.mark.parametrize("job", (JOBS | TURNING | RESTART).values(), ids=JOBS | TURNING | RESTART)
 def test_linuxcnc_accepts(job, tmp_path):
     """Slow because the script installs LinuxCNC where it is absent."""
     if not shutil.which("rs274") and os.geteuid() != 0:
@@ -109,3 +114,17 @@ def test_the_verifiers_reader_finds_the_planned_path(job):
         distance, _ = cKDTree(read).query(planned[moving], p=np.inf)
         assert distance.max() <= 0.5e-4 + 1e-9
     assert np.nanmax(program.feed) == max(t.feed for s in wanted.steps for t in s.trajectories)
+
+
+@pytest.mark.skipif(rs274.RS274 is None, reason=rs274.ABSENT)
+def test_linuxcnc_runs_from_every_label_as_the_reader_does(tmp_path):
+    """Whoever starts there has run nothing before: the interpreter gets the text from the label on."""
+    lines = write_linuxcnc(RESTART["restart points"]()).splitlines(keepends=True)
+    labels = [k for k, line in enumerate(lines) if re.fullmatch(r"N[0-9]+", line.strip())]
+    assert len(labels) == 5
+    for k in labels:
+        text = "%\n" + "".join(lines[k:])
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        judged = rs274.judge(text, folder)
+        assert not judged.refused and rs274.difference(read_program(text), judged, gaps=True) == ""
