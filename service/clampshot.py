@@ -236,8 +236,9 @@ def _draw_heights(pen: ImageDraw.ImageDraw, camera: Camera, blank: TriangleMesh)
 
 
 def _legend(pen: ImageDraw.ImageDraw, held: Clamped) -> None:
-    entries = [("part", PART), ("box round the blank, which is the part grown" if held.grown else "blank", BLANK),
-               ("tool axis, from where tools come", COMING), ("program zero: the round target", None)]
+    entries = [("part", PART), ("box round the blank (the part grown)" if held.grown else "blank", BLANK),
+               ("tool axis, pointing the way tools come", COMING),
+               ("program zero: the round target, drawn also where it lies inside", None)]
     if held.fixtures:
         entries.insert(3, ("fixture: nothing may touch it", FIXTURE))
     x, y = 16.0, SIZE[1] - LEGEND + 18.0

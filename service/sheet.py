@@ -120,16 +120,17 @@ def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: 
                    tuple((v.id, look.rotation @ v.direction) for v in ready.views if turns or v.id == look.id))
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
     blank = ready.blank.corners(look.rotation)
-    p, axis = setup.placement, ready.view(look.id).direction.tolist()
+    axes = look.rotation @ _setup_axes(setup)
     frame = "the frame of the setup" if turns else f"the frame of access {look.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
         ("Work offset", access.work_offset),
-        ("Program zero", f"{place(p.origin_mm)} in the coordinates of the part's file; Z there along "
-                         f"{_direction(p.z_axis)}, X along {_direction(p.x_axis)}"),
-        *([] if turns else [("Tool axis", f"{look.id}: {_direction(axis)} of the setup is Z of the program")]),
+        ("Program zero", f"{place(setup.placement.origin_mm)} in the coordinates of the part's file, in which X of the "
+                         f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
+        *([] if turns else [("Tool axis", f"{look.id}: {_direction(look.rotation[2].tolist())} of the setup is Z of "
+                                          "the program")]),
         ("Part", f"{_box(look.part.bounds)} in {frame}"),
-        (f"Blank, {setup.stock.kind.replace('_', ' ')}", _box(blank) + (
+        (f"Blank, {setup.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, look.rotation) + (
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
         *_heights([p.work for p in programs])]
@@ -144,6 +145,21 @@ def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: 
                         none="The setup names no fixture: none is kept clear of."))
     title = f"Clamping and program zero, {look.id}" if several else "Clamping and program zero"
     return Section(f"clamping-{look.id}", title, tuple(blocks))
+
+
+def _setup_axes(setup: Setup) -> F64:
+    """(3, 3), unit: X, Y and Z of the setup frame as rows, in the coordinates of the part's file."""
+    x, z = (np.array(v) / np.linalg.norm(v) for v in (setup.placement.x_axis, setup.placement.z_axis))
+    return np.array([x, np.cross(z, x), z])
+
+
+def _round(ready: Prepared, rotation: F64) -> str:
+    """Of a round blank how thick it is, and where the middles of its ends lie in a frame."""
+    bar = ready.blank.bar
+    if bar is None:
+        return ""
+    low, high = (place(end) for end in bar.ends(rotation).tolist())
+    return f": Ø{number(2.0 * bar.radius)} from {low} to {high}"
 
 
 def _seen(held: Clamped, blank: F64) -> str:
@@ -211,14 +227,14 @@ def _tools(setup: Setup, report: Mapping[str, Any]) -> Section:
 def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
     tool = next(t for t in setup.tools if t.id == body.id)
     fact = next(t for t in report["tools"] if t["id"] == body.id)
-    segments = tuple((f"Holder segment {k}", f"Ø{number(h.diameter)}" + (
+    segments = tuple((f"Holder {k}", f"Ø{number(h.diameter)}" + (
         f" to {number(h.diameter_top)}" if h.diameter_top != h.diameter else "") + f", {number(h.length)} long")
         for k, h in enumerate(body.holder, 1)) or (("Holder", "not named in the setup: none was kept clear"),)
     bends = fact["deflection_mm"]
     pairs = (
         ("Teeth", f"{tool.flutes}, {'cuts' if tool.center_cutting else 'does not cut'} to the centre"), *segments,
         ("Gauge length", f"{number(gauge)}" + ("" if tool.gauge_given else ": stickout and holder, as none was given")),
-        ("Neck over its width", number(fact["slenderness"], 1)),
+        ("Slenderness", number(fact["slenderness"], 1)),
         ("Bends", "not estimated" if bends is None else f"{number(bends)} mm at most, as estimated"),
         ("In cut", f"{number(fact['minutes_in_cut'], 2)} min, {number(fact['metres_in_cut'], 2)} m"),
         ("Cutters", f"{fact['cutters']}" + (f", each lasts {number(fact['life_min'])} min in cut" if fact["life_min"]

@@ -108,7 +108,8 @@ def _head(p: _Pages) -> None:
 
 
 def _section(p: _Pages, section: Section) -> None:
-    p.need(LEAST_BELOW)
+    first = section.blocks[0]
+    p.need(_height(p, first) + 20.0 if isinstance(first, Picture) else LEAST_BELOW)
     p.ln(4)
     p.start_section(latin(section.title))
     p.write_as(12, "B")
@@ -184,10 +185,14 @@ def _cut(text: str) -> Iterator[str]:
     yield text
 
 
-def _picture(p: _Pages, picture: Picture) -> None:
+def _height(p: _Pages, picture: Picture) -> float:
+    """Of a picture as wide as the page, mm."""
     with Image.open(io.BytesIO(picture.png)) as image:
-        height = p.epw * image.height / image.width
-    p.need(height + 8.0)
+        return p.epw * image.height / image.width
+
+
+def _picture(p: _Pages, picture: Picture) -> None:
+    p.need(_height(p, picture) + 8.0)
     p.image(io.BytesIO(picture.png), x=p.l_margin, w=p.epw, alt_text=latin(picture.alt))
     p.write_as(7.5, "", QUIET)
     p.multi_cell(0, 3.8, latin(picture.alt), align="L", new_x="LMARGIN", new_y="NEXT")

@@ -13,6 +13,7 @@ from service.sheetmodel import Facts, Lines, Section, Table
 NONE = "-"
 SHORT_SHA = 16  # hex digits, as in the header of a program
 ZONE = re.compile(r"Z\d+\w*")
+OTHERS = {"other access": "another tool axis", "other process": "another process"}  # than milling along those at hand
 KINDS = {
     "program": "program", "stepnc": "STEP-NC, AP238", "stepnc-arm": "STEP-NC, ISO 14649", "zones": "zones as data",
     "preview": "picture of part and paths", "deviation": "map of the deviations", "machined": "machined part as a mesh"}
@@ -99,7 +100,7 @@ def findings_section(report: Mapping[str, Any]) -> Section:
     more = sum(counts.values()) - len(rows)
     told = tuple(f"{n} of kind {kind}" for kind, n in counts.items())
     blocks: list[Table | Lines] = [Table(
-        "Findings of the proof", ("kind", "what", "where", "place, mm", "times"), rows, (1.3, 4.6, 2.2, 2.2, 0.8),
+        "Findings of the proof", ("kind", "what", "where", "worst at, mm", "places"), rows, (1.3, 4.6, 2.2, 2.2, 0.8),
         frozenset({4}), none="The proof found nothing.")]
     if more > 0:
         blocks.append(Lines("More", (f"{more} more are counted only: {', '.join(told)}",)))
@@ -196,7 +197,7 @@ def needed(item: Mapping[str, Any]) -> str:
         if need.get("share", 1.0) < 1.0:
             words.append(f"for {share(need['share'])} of it")
     elif "kind" in need:
-        words.append(f"an{need['kind']}" if str(need["kind"]).startswith("other ") else str(need["kind"]))
+        words.append(OTHERS.get(need["kind"], str(need["kind"])))
         if "slenderness" in need:
             words.append(f"as a tool would be {number(need['slenderness'], 1)} times as long as thick")
     if "access" in need:

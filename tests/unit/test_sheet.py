@@ -24,6 +24,7 @@ from service.sides import Program
 from service.stock import blank_of
 from tests.synthetic_plan import plan, step
 from toolpath.motion import Workingstep
+from zones.view import access_rotation, turned
 
 HOSTILE = "<script>alert('Ø')</script> & \"4711\""
 FACES = " ".join(f"F{k}" for k in range(1, 900))
@@ -111,11 +112,15 @@ def report_of(state: str, findings: list[dict[str, Any]]) -> dict[str, Any]:
         "version": "0.1.0"}
 
 
-def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cut: bool = True) -> dict[str, bytes]:
-    setup = parse_setup(json.dumps(SETUP))
+def block() -> Part:
+    """40 x 20 x 13 mm."""
     mesh = box_mesh(corners_of(np.array([[0.0, 0.0, 0.0], [40.0, 20.0, 13.0]])))
     faces = tuple(FaceInfo(n, "plane", 1.0, False, 0.0, 0.0) for n in range(1, 7))
-    part = Part(mesh, faces, (), mesh.volume, mesh.bounds, "mm", 0.01, 0.2, 0.0, (), "ab" * 32)
+    return Part(mesh, faces, (), mesh.volume, mesh.bounds, "mm", 0.01, 0.2, 0.0, (), "ab" * 32)
+
+
+def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cut: bool = True) -> dict[str, bytes]:
+    setup, part = parse_setup(json.dumps(SETUP)), block()
     view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
     ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
                             view=lambda _name: view)
@@ -218,6 +223,30 @@ def test_a_job_that_cuts_nothing_has_a_sheet_too():
     for text in both(made("unproved", [{**GOUGE, "kind": "nothing_cut", "line": 0, "program": "", "point": None}],
                           cut=False)):
         assert "nothing could be cut" in text and "No zone" in text and "T9" in text
+
+
+def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
+    setup = parse_setup(json.dumps({**SETUP, "access": [{"id": "A1"}, {"id": "A2", "direction": [-1, 0, 0],
+                                                                       "work_offset": "G55"}]}))
+    part = block()
+    views = {}
+    for access in setup.access:
+        turn = access_rotation(access.direction)
+        views[access.id] = SimpleNamespace(id=access.id, rotation=turn, part=turned(part, turn), direction=turn[2])
+    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=tuple(views.values()),
+                            accesses=setup.access, view=lambda name: views[name])
+    first, second, third = steps()
+    written = [Program("A1", plan(first), "G21\n"), Program("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
+               Program("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
+    report = report_of("proved", [])
+    files: Files = {name: ("program", "linuxcnc", p.access, b"G21\n") for p in written for _, name, _ in p.files()}
+    for name, (*_, data) in sheet_files(ready, written, report, files).items():  # type: ignore[arg-type]
+        text = " ".join(" ".join(Page(data.decode()).words).split()) if name.endswith("html") else pdf_text(data)
+        standing = text.split("Clamping and program zero, A2")[-1]
+        assert "-X of the setup is Z of the program" in standing and "X of the program is +Y and Z is -X" in standing
+        assert "X 0 to 20, Y -13 to 0, Z -40 to 0 in the frame of access A2" in standing and "G55" in standing
+        assert "program.A2.linuxcnc.ngc, program.A2.part2.linuxcnc.ngc" in standing and "Z33" in standing
+        assert "Z25" not in standing.split("Tools in order of use")[0]
 
 
 def test_the_pdf_is_whole(proved):
