@@ -98,7 +98,7 @@ def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, A
             deviation, "The part coloured by what the proof measured: red where it is cut too deep, green within the "
             "budget, blue where stock is left, hatched where no tool got."),)))
     sha = report["inputs"]
-    foot = f"{title}: {report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}"
+    foot = f"{report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}; {title}"
     return Sheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
 
 

@@ -23,7 +23,7 @@ SOFT, LINE, PAPER = (238, 241, 245), (138, 146, 156), (255, 255, 255)
 FILLS = {"flutes": (106, 165, 221), "neck": (185, 195, 206), "shank": (213, 220, 228), "holder": (152, 161, 171)}
 STROKES = {"measure": 0.12, "axis": 0.08, "spindle": 0.35}
 POINTS_PER_MM = 72.0 / 25.4
-CELL = 360  # characters of a table cell; what is longer goes on in a row below, or it might not fit onto any page
+CELL = 240  # characters of a table cell; what is longer goes on in a row below, or it might not fit onto any page
 LEAST_BELOW = 34.0  # mm a heading needs below it, or it goes onto the next page with what follows
 BESIDE = 11  # facts beside the drawing of a tool; the rest stand below it
 
@@ -64,15 +64,22 @@ class _Pages(FPDF):
             return
         self.write_as(8, "B", INK if self.sheet.proved else BAD)
         state = "" if self.sheet.proved else "UNPROVED: nothing may be run. "
-        self.cell(0, 5, latin(state + self.sheet.title)[:120], new_x="LMARGIN", new_y="NEXT")
+        self.cell(0, 5, self.fitted(state + self.sheet.title, self.epw), new_x="LMARGIN", new_y="NEXT")
         self.ln(1)
 
     def footer(self) -> None:
         """What the sheet is of, and which page this is."""
         self.set_y(-FOOT)
         self.write_as(7, "", QUIET)
-        self.cell(self.epw - 24.0, 5, latin(self.sheet.foot)[:150])
+        self.cell(self.epw - 24.0, 5, self.fitted(self.sheet.foot, self.epw - 26.0))
         self.cell(24.0, 5, f"page {self.page_no()} of {{nb}}", align="R")
+
+    def fitted(self, text: str, width: float) -> str:
+        """As much of a text as goes into ``width`` mm."""
+        shown = latin(text)
+        while self.get_string_width(shown) > width - 2.0:
+            shown = shown.removesuffix("...")[:-1] + "..."
+        return shown
 
     def need(self, height: float) -> None:
         """A new page where less than ``height`` mm are left of this one."""

@@ -19,7 +19,8 @@ from service.clampshot import box_mesh, corners_of
 from service.convert import parse_setup
 from service.delivery import Files
 from service.sheet import sheet_files
-from service.sheetpdf import latin
+from service.sheetmodel import Facts, Section, Sheet
+from service.sheetpdf import latin, pdf_of
 from service.sides import Program
 from service.stock import blank_of
 from tests.synthetic_plan import plan, step
@@ -259,6 +260,12 @@ def test_the_pdf_is_whole(proved):
         assert data[int(row):].startswith(b"%d 0 obj" % number)
     assert data.count(b"/Type /Page\n") >= 4 and data.count(b"/Subtype /Image") >= 1
     assert f"of {data.count(b'/Type /Page' + bytes([10]))}" in pdf_text(data)
+
+
+def test_a_line_is_cut_where_it_does_not_fit():
+    sheet = Sheet("W" * 300, True, "fine", "W" * 300, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    text = pdf_text(pdf_of(sheet))
+    assert re.search(r" W{40,110}\.\.\. page 1 of 2", text) and text.count("W") > 2500
 
 
 def test_letters_the_pdf_has_not_are_spelt_out():
