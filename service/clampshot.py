@@ -112,9 +112,10 @@ def clamp_picture(held: Clamped, title: str) -> bytes:
     pen.text((16, 10), ascii_text(title), font=font(WORDS), fill=bytes_of(INK))
     pen.text((width + GUTTER + 16, 10), "From above (along Z); mm from program zero", font=font(WORDS),
              fill=bytes_of(INK))
-    _draw_heights(pen, slanting, held.blank)
+    named: list[tuple[float, float]] = []
     for name, tail, head in arrows:
-        _draw_arrow(pen, slanting, tail, head, name)
+        _draw_arrow(pen, slanting, tail, head, name, named)
+    _draw_heights(pen, slanting, held.blank)
     if near:
         _draw_zero(pen, slanting, (0, HEADER), 0.2 * size, held.zero)
         _draw_zero(pen, above, (width + GUTTER, HEADER), 0.2 * size, held.zero, flat=True)
@@ -173,7 +174,9 @@ def _at(camera: Camera, point: F64, corner: tuple[int, int]) -> tuple[float, flo
     return corner[0] + x, corner[1] + y
 
 
-def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, tail: F64, head: F64, name: str) -> None:
+def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, tail: F64, head: F64, name: str,
+                named: list[tuple[float, float]]) -> None:
+    """An arrow with its name behind its tail, further up where other names stand; ``named`` is where they do."""
     a, b = np.array(_at(camera, tail, (0, HEADER))), np.array(_at(camera, head, (0, HEADER)))
     ink, way = bytes_of(COMING), b - a
     length = float(np.hypot(*way))
@@ -185,7 +188,11 @@ def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, tail: F64, head: F64, 
         pen.polygon([tuple(b + 4.0 * along), tuple(b - barb * along + 0.45 * barb * across),
                      tuple(b - barb * along - 0.45 * barb * across)], fill=ink)
         a = a - 20.0 * along
-    pen.text(tuple(a), ascii_text(name), font=font(WORDS), anchor="mm", fill=ink, stroke_width=3,
+    x, y = float(a[0]), float(a[1])
+    while any(abs(x - u) < 2.0 * WORDS and abs(y - v) < WORDS for u, v in named):
+        y -= WORDS + 2.0
+    named.append((x, y))
+    pen.text((x, y), ascii_text(name), font=font(WORDS), anchor="mm", fill=ink, stroke_width=3,
              stroke_fill=bytes_of(PAPER))
 
 

@@ -132,6 +132,7 @@ def _block(p: _Pages, block: Block) -> None:
     elif isinstance(block, Table):
         _table(p, block)
     elif isinstance(block, Lines):
+        p.need(5.0 + 3.0 * 4.4)
         p.write_as(8.5, "I", QUIET)
         p.cell(0, 5, latin(block.title), new_x="LMARGIN", new_y="NEXT")
         p.write_as(8.5)

@@ -171,7 +171,7 @@ def zones_table(report: Mapping[str, Any]) -> Table:
     return Table("Zones, with what the proof measured on them",
                  ("zone", "kind", "profile, level", "access", "tool", "what", "faces", "mm²", "scallop asked", "p99",
                   "most", "covered", "steps", "min"), rows,
-                 (1.0, 1.0, 1.3, 1.1, 0.9, 1.5, 2.2, 1.1, 1.2, 1.0, 1.0, 1.3, 1.1, 0.9),
+                 (1.0, 1.0, 1.3, 1.1, 0.9, 1.9, 1.9, 1.1, 1.2, 1.0, 1.0, 1.3, 1.1, 0.9),
                  frozenset({7, 8, 9, 10, 11, 13}), none="No zone: no tool reaches anything of what was asked for.")
 
 
