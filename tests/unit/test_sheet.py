@@ -60,9 +60,9 @@ class Page(HTMLParser):
 def pdf_text(data: bytes) -> str:
     """All that is shown as text, in the order it stands in the file."""
     out = []
-    for stream in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", data, re.DOTALL):
+    for stream in re.findall(rb"stream\r?\n(.*?)\nendstream", data, re.DOTALL):
         try:
-            page = zlib.decompress(stream)
+            page = zlib.decompressobj().decompress(stream)  # what may stand between its end and the next word is left
         except zlib.error:
             continue
         for shown in re.findall(rb"\(((?:[^()\\]|\\.)*)\) Tj", page):
