@@ -14,14 +14,27 @@ from verify.findings import Source, chains, worst_of
 from verify.kernels.engaged import FRONT, window_angles
 from verify.model import Engagement, Finding, FindingKind
 from verify.removal import Moves
+from verify.stockpass import parts
 from verify.toolaxes import sector_frames
 
 RESOLUTION = 2 * math.pi / FRONT
 """rad: sectors at both ends of an engaged arc are counted whole."""
 
 
+def in_parts(moves: Moves, tools: Sequence[ToolBody]) -> tuple[Moves, NDArray[np.int64]]:
+    """Moves cut up as ``verify.stockpass.parts`` has them, p in all, and the row (p,) of the move each is of."""
+    first = parts(moves, tools)
+    count = np.diff(first)
+    of = np.repeat(np.arange(len(moves)), count)
+    share = (np.arange(len(of)) - first[of]) / count[of]
+    start, way = moves.start[of], moves.end[of] - moves.start[of]
+    ends = (share + 1.0 / count[of])[:, None]
+    return Moves(start + share[:, None] * way, start + ends * way, moves.feed[of], moves.tool[of],
+                 None if moves.axes is None else moves.axes.only(of)), of
+
+
 def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
-    """(m,) float64, rad, 0 to pi: engaged angle of each move; bits (m,) as ``StockPass.engaged``."""
+    """(m,) float64, rad, 0 to pi: engaged angle of each of m parts of moves; bits (m,) as ``StockPass.engaged``."""
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
     radius = np.array([t.radius for t in tools])
     return np.asarray(window_angles(bits, start, end, *sector_frames(moves.axes, len(moves)), moves.tool, moves.feed,
@@ -45,13 +58,15 @@ def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int
     return out
 
 
-def engagement_findings(angle: F64, moves: Moves, source: Source, limits: Mapping[int, float]) -> list[Finding]:
+def engagement_findings(angle: F64, moves: Moves, of: NDArray[np.int64], source: Source,
+                        limits: Mapping[int, float]) -> list[Finding]:
     """Where the engaged angle is above the limit of the tool, rad by T number; by neighbouring lines.
 
-    angle : (m,) float64, rad, as ``engaged_angles``
+    angle : (m,) float64, rad, as ``engaged_angles``; moves, of : parts of moves, as ``in_parts``
 
     Angles are known to ``RESOLUTION``, so a finding needs more than the limit and that.
     """
+    source = Source(source.names, source.program[of], source.line[of], source.tool[of])
     limit = np.array([limits.get(int(t), math.inf) for t in source.tool.tolist()])
     bad = np.flatnonzero(angle > limit + RESOLUTION)
     out = []

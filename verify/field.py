@@ -25,7 +25,17 @@ from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
 from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
-from verify.stockpass import StockPass, descents, end_radii, event_table, free_rapids, gather, noted, tables_for
+from verify.stockpass import (
+    StockPass,
+    descents,
+    end_radii,
+    event_table,
+    free_rapids,
+    gather,
+    noted,
+    parts,
+    tables_for,
+)
 from verify.toolaxes import ToolAxes, sector_frames
 
 F32 = NDArray[np.float32]
@@ -171,29 +181,32 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
     x, y = sector_frames(moves.axes, len(moves))
     twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
-    sums, spare = tables_for(threads, (len(moves), 5))
+    first = parts(moves, tools)
+    sums, spare = tables_for(threads, (len(moves), 4))
+    tables, blank_table = tables_for(threads, (int(first[-1]),))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
-            events, taken = event_table(), spare.get()
+            events, taken, engaged = event_table(), spare.get(), blank_table.get()
             n = field_tile(field.values, tile, field.origin, field.step, field.band, start, end, axes.axis,
-                           axes.about, axes.angle, twists, moves.feed, free, steep, moves.tool, cutters, ends,
+                           axes.about, axes.angle, twists, moves.feed, free, steep, first, moves.tool, cutters, ends,
                            bodies.rows, bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow,
-                           taken, events)
+                           taken, engaged, events)
             spare.put(taken)
+            blank_table.put(engaged)
             return noted(events), n
         return work
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
-    taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce([t[:, 2] for t in sums])
+    taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce(tables)
     end = ends[moves.tool]
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
     over = (np.pi * end**2 + 2.0 * end * aside)
-    stands = taken[:, 4] / VOLUME_UNITS
+    stands = taken[:, 3] / VOLUME_UNITS
     # straight down beside an edge only what stands on stock has dug; a few nodes alone do not say how much that is
     partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > LEAST_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
-    plunges = _plunges(moves, axes, taken[:, [1, 3]] / VOLUME_UNITS / over, end, earned,
+    plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end, earned,
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)
 

@@ -20,7 +20,7 @@ from verify.model import ProofSetup
 from verify.progress import Report, Stages
 from verify.removal import Moves
 from verify.stock import blank, run_bodies, run_stock
-from verify.stockpass import StockPass, end_radii, free_rapids
+from verify.stockpass import StockPass, end_radii, free_rapids, parts
 from verify.toolaxes import ToolAxes
 
 LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
@@ -78,7 +78,8 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
-    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, len(given)), spacing, upright, dip)
+    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
+                    spacing, upright, dip)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -135,16 +136,19 @@ def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fi
     return np.concatenate([met, more]), lost + away
 
 
-def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, count: int) -> StockPass:
-    """The pass in terms of the ``count`` moves given, where some were spread out."""
+def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, moves: Moves, given: Moves,
+               tools: Sequence[ToolBody]) -> StockPass:
+    """The pass in terms of the moves given, where some of them, rapids, were spread out."""
     if origin is None:
         return StockPass(events, run.lost + lost, run.cut, run.engaged, run.taken)
     events = events.copy()
     events[:, 0] = origin[events[:, 0].astype(np.int64)]
-    cut, taken = np.zeros(count, np.bool_), np.zeros(count)
+    cut, taken = np.zeros(len(given), np.bool_), np.zeros(len(given))
     cut[origin[run.cut]] = True
-    engaged = np.zeros(count, np.int64)
-    np.bitwise_or.at(engaged, origin, run.engaged)
+    first, there = parts(moves, tools), parts(given, tools)
+    engaged, of = np.zeros(there[-1], np.int64), np.repeat(np.arange(len(moves)), np.diff(first))
+    part = there[origin[of]] + (np.arange(len(of)) - first[of]) * moves.feed[of]
+    np.bitwise_or.at(engaged, part, run.engaged)
     if run.taken is not None:
         np.add.at(taken, origin, run.taken)
     return StockPass(events, run.lost + lost, cut, engaged, None if run.taken is None else taken)

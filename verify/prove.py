@@ -17,7 +17,7 @@ from verify.blank import stock_on_normals
 from verify.clash import DIP
 from verify.dogleg import box_findings
 from verify.duration import minutes_of, spent
-from verify.engagement import engaged_angles, engagement_findings, engagements
+from verify.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.findings import (
     Source,
     contact_findings,
@@ -108,14 +108,15 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     run = met.run
     fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
-    angle = engaged_angles(run.engaged, moves, tools)
+    stretches, of = in_parts(moves, tools)
+    angle = engaged_angles(run.engaged, stretches, tools)
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
                 *table_findings([p.program for p in read], tools, setup),
                 *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
-                *engagement_findings(angle, moves, source, setup.max_engaged), *unheld,
+                *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
     notes.extend(cuts.notes)
@@ -126,8 +127,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                      "at closer; give them as smaller boxes where tools go")
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids, engagements(angle, moves, tools),
-                  met.spacing, tuple(notes), support)
+    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids,
+                  engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
 
 
 def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str]) -> None:

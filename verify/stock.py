@@ -45,6 +45,7 @@ from verify.stockpass import (
     free_rapids,
     gather,
     noted,
+    parts,
     tables_for,
     ways_before,
 )
@@ -120,14 +121,15 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     skins, free = setup.plunge_skin * 2.0 * cutters[:, 0], free_rapids(moves)
     nx, ny = field.height.shape
-    tables, spare = tables_for(threads, (len(moves),))
+    first = parts(moves, tools)
+    tables, spare = tables_for(threads, (int(first[-1]),))
 
     def job(i: int, j: int) -> Callable[[], object]:
         def work() -> object:
             events, engaged = event_table(), spare.get()
             n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
-                           moves.start, moves.end, moves.feed, free, steep, earned, ways, moves.tool, cutters,
-                           end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
+                           moves.start, moves.end, moves.feed, free, steep, earned, ways, first, moves.tool,
+                           cutters, end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
                            setup.gouge_tolerance, cut, under, engaged, events)
             spare.put(engaged)
             return noted(events), n

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from verify.kernels.clash import ASIDE
+from verify.kernels.engaged import WINDOW
 from verify.removal import Moves
 
 EVENTS = 4096
@@ -55,13 +56,26 @@ def ways_before(moves: Moves) -> F64:
     return np.asarray(np.cumsum(aside) - aside + ANOTHER_TOOL * np.cumsum(cuts))
 
 
+def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
+    """(m + 1,) int64: the first of the even parts of each move that engaged angles are told in, and how many there are.
+
+    Feed moves of a tool that does not turn have parts of half a radius at most, so that what is met at one end of a
+    long move is not put together with what is met at the other; the rest are one each.
+    """
+    most = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    length = np.linalg.norm(moves.end - moves.start, axis=1)
+    whole = ~moves.feed if moves.axes is None else ~moves.feed | (moves.axes.angle > 0.0)
+    count = np.where(whole, 1, np.maximum(np.ceil(length / np.maximum(most, 1e-9) - 1e-9), 1)).astype(np.int64)
+    return np.concatenate([[0], np.cumsum(count)])
+
+
 @dataclass(frozen=True, eq=False)
 class StockPass:
     """What one pass over the stock found.
 
     events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
     cut    : (m,) bool, moves that took stock
-    engaged : (m,) int64, sectors of the cutter that met stock (``kernels.engaged``)
+    engaged : (p,) int64, sectors of the cutter that met stock (``kernels.engaged``), by parts of moves (``parts``)
     taken  : (m,) float64, mm³ by move, or None where that is not known
     under  : (m,) bool, moves whose flutes were under stock, or None where that makes no difference
     """

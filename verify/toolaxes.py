@@ -50,8 +50,8 @@ class ToolAxes:
         half = 0.5 * self.angle[:, None]
         return np.asarray(np.cos(half) * self.axis + np.sin(half) * np.cross(self.about, self.axis))
 
-    def only(self, chosen: NDArray[np.bool_]) -> ToolAxes:
-        """The axes where ``chosen`` (m,) bool is true."""
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> ToolAxes:
+        """The axes where ``chosen`` (m,) bool is true, or those of its rows."""
         return ToolAxes(self.axis[chosen], self.about[chosen], self.angle[chosen])
 
     @classmethod

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.pocket_case import OTHER, SETUP, TOOL, block, program, scored, text
-from verify.engagement import RESOLUTION, engaged_angles, engagements
+from verify.engagement import RESOLUTION, engaged_angles, engagements, in_parts
 from verify.field import run_field, stock_field
 from verify.kernels.engaged import SECTORS, sector_bits
 from verify.model import FindingKind, ProofSetup, StockKind
@@ -32,7 +32,8 @@ def side_cut(width, depth=2.0, tool=TOOL, cut=0.25, lean=0.0):
         u = np.tile([math.sin(lean), 0.0, math.cos(lean)], (len(moves), 1))
         moves = replace(moves, axes=ToolAxes.between(u, u))
         run = run_field(stock_field(PART.mesh, BLANK, 0.15), moves, [tool], BLANK)
-    return engaged_angles(run.engaged, moves, [tool]), moves, tool
+    parts, _ = in_parts(moves, [tool])
+    return engaged_angles(run.engaged, parts, [tool]), parts, tool
 
 
 @pytest.mark.parametrize("lean", [0.0, 1e-4])
@@ -77,10 +78,9 @@ def slot(points, tool, depth=3.0, lean=0.0):
         u = np.tile([math.sin(lean), 0.0, math.cos(lean)], (len(moves), 1))
         moves = replace(moves, axes=ToolAxes.between(u, u))
         run = run_field(stock_field(PART.mesh, BLANK, 0.15), moves, [tool], BLANK)
-    inside = np.any([(np.abs(p[:, :2]) < [14.0, 9.0]).all(axis=1) for p in (moves.start, moves.end)], axis=0)
-    if not inside.any():
-        inside[:] = True
-    return engaged_angles(run.engaged, moves, [tool])[inside]
+    parts, _ = in_parts(moves, [tool])
+    inside = np.all([(np.abs(p[:, :2]) < [14.0, 9.0]).all(axis=1) for p in (parts.start, parts.end)], axis=0)
+    return engaged_angles(run.engaged, parts, [tool])[inside]
 
 
 def straight(cut, jog=0.0):
@@ -118,9 +118,27 @@ def test_what_lies_behind_after_a_corner_is_not_in_front():
     """The tool goes along a side 1 mm in, and turns off it: no more than the side it goes along is in stock."""
     y = -15.0 - TOOL.radius + 1.0
     way = np.array([[-24.0, y], [0.0, y], [0.0, y - 0.2], [0.0, y - 2.0]])
-    angle = slot(way, TOOL)
-    assert angle[0] == pytest.approx(math.acos(1.0 - 1.0 / TOOL.radius), abs=RESOLUTION + 0.1)
-    assert (angle[1:] <= angle[0]).all()
+    moves = Moves(np.column_stack([way[:-1], np.full(3, -2.5)]), np.column_stack([way[1:], np.full(3, -2.5)]),
+                  np.ones(3, bool), np.zeros(3, np.int32))
+    parts, of = in_parts(moves, [TOOL])
+    angle = engaged_angles(run_stock(blank(PART.mesh, 0.15, BLANK), moves, [TOOL], BLANK).engaged, parts, [TOOL])
+    side = angle[(of == 0) & (parts.start[:, 0] > -18.0)]
+    assert side == pytest.approx(math.acos(1.0 - 1.0 / TOOL.radius), abs=RESOLUTION + 0.1)
+    assert (angle[of > 0] <= side.max()).all()
+
+
+def test_what_is_met_at_one_end_of_a_long_move_does_not_count_at_the_other():
+    """Along a side, 1 mm in, round the block in air, and across it from one side to the other in one move."""
+    tool, y = TOOL, -15.0 - TOOL.radius + 1.0
+    places = np.array([[-24.0, y, -2.5], [24.0, y, -2.5], [24.0, 30.0, -2.5], [0.0, 30.0, -2.5], [0.0, -30.0, -2.5]])
+    moves = Moves(places[:-1], places[1:], np.ones(4, bool), np.zeros(4, np.int32))
+    parts, of = in_parts(moves, [tool])
+    assert np.allclose(parts.start[of == 3][0], places[3]) and np.allclose(parts.end[-1], places[4])
+    assert np.linalg.norm(parts.end - parts.start, axis=1).max() <= 0.5 * tool.radius + 1e-9
+    angle = engaged_angles(run_stock(blank(PART.mesh, 0.15, BLANK), moves, [tool], BLANK).engaged, parts, [tool])
+    last = parts.end[:, 1]
+    assert angle[(of == 3) & (np.abs(last) < 11.0)].min() >= math.radians(170)
+    assert not angle[(of == 3) & ((last > 18.0) | (last < -18.0))].any() and not angle[(of == 1) & (last > -12.0)].any()
 
 
 def test_a_slot_above_the_limit_is_a_finding_on_its_line():

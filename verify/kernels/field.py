@@ -22,7 +22,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.engaged import LEAST_DEPTH, bottom, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, bottom, edge_radius, sector_bits
 from verify.kernels.frustum import contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
@@ -79,17 +79,19 @@ def _box(p, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, twist, totals):
+def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, twist, engaged, totals):
     """Lower the nodes of one brick by piece p.
 
     totals : added to: volume, volume by the end, 1 where stock was touched, the end's volume times the square of
              how far from the middle of the end it was, as a share of its radius, and the area on which it stands then
 
-    Returns the new top and the sectors of the cutter that met stock.
+    engaged : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
+
+    Returns the new top.
     """
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
     a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
-    top, sectors = -1e30, np.int64(0)
+    top = -1e30
     straight = p[30] == 0.0
     mx, my, mz = p[27], p[28], p[29]
     plan2 = mx * mx + my * my
@@ -131,7 +133,13 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             if d <= 0.0 and plan > 0.0:
                                 aside = min(abs(dx * qy - dy * qx) / plan, cutter[0])
                                 if qz - 0.5 * dz - bottom(aside, cutter[0], r) > LEAST_DEPTH * cutter[0]:
-                                    sectors |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r, h, twist)
+                                    # where the edge comes to the place
+                                    ahead = (qx * dx + qy * dy) / plan
+                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), cutter[0], r)
+                                    ahead -= math.sqrt(max(edge * edge - aside * aside, 0.0))
+                                    k_part = min(max(int(ahead / plan * len(engaged)), 0), len(engaged) - 1)
+                                    engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r,
+                                                                   h, twist)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
@@ -143,13 +151,12 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             totals[3] += own * min(off / end_radius, 1.0) ** 2
                         v = d
                 top = max(top, v)
-    return top, sectors
+    return top
 
 
 @njit(**KERNEL)
-def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist, totals):
-    """Lower the nodes of a tile by a cutting part on piece p; returns the sectors of it that met stock."""
-    sectors = np.int64(0)
+def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist, engaged, totals):
+    """Lower the nodes of a tile by a cutting part on piece p."""
     box = _box(p, 0.0, cutter[2], cutter[0] + band)
     nx, ny, nz = tops.shape
     a0, a1 = _bricks(box[0] - band, box[3] + band, origin[0], h, tile[0], nx)
@@ -167,10 +174,8 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist
                 qx, qy, qz, dx, dy, dz = view(p, x, y, origin[2] + (tile[4] + 4 * bk + 1.5) * h)
                 if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter[0], cutter[1], cutter[2]) - half >= top:
                     continue
-                tops[bi, bj, bk], met = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep,
-                                                   end_radius, twist, totals)
-                sectors |= met
-    return sectors
+                tops[bi, bj, bk] = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep, end_radius,
+                                              twist, engaged, totals)
 
 
 @njit(**KERNEL)
@@ -268,8 +273,8 @@ def _look(field, tops, solid, tile, h, origin, p, bodies, first, stop, cutter, s
 
 
 @njit(**KERNEL)
-def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, twists, feeds, free, steep, tool,
-               cutters, ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, events):
+def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, twists, feeds, free, steep, parts,
+               tool, cutters, ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, engaged, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
@@ -277,10 +282,12 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
     free  : (m,) bool, rapids that no clearance is asked of
     steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
     reach : (k,) float64, mm, how far each assembly reaches from the tip
-    taken : (m, 5) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
+    taken : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
             so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went;
-            third the sectors of the cutter that met stock, put together bit by bit; fourth what the end does times
-            the square of the share of its radius it is from the middle; fifth 1e-9 mm² of stock right under the end
+            third what the end does times the square of the share of its radius it is from the middle; fourth 1e-9
+            mm² of stock right under the end
+    parts : (m + 1,) int64, first row of each move in ``engaged`` (p,) int64, sectors of the cutter that met stock,
+            which are added to
 
     Returns the number of events found, which may exceed the table.
     """
@@ -319,15 +326,14 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
                 if trial[:, 0].max() > 0.0:
                     n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MOST_LOOKS))
         totals[:] = 0.0
-        sectors = np.int64(0)
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             # most of a long tool passes most tiles by: one look at the ball round the tile decides
             seen = _seen_tile(piece, cx, cy, cz, rad + band)
             near = not _beside(seen, 0.0, cutters[k, 2], cutters[k, 0] + grow)
             if near and feed:
-                sectors |= _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k],
-                                twists[m], totals)
+                _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], twists[m],
+                     engaged[parts[m]:parts[m + 1]], totals)
             elif near:
                 _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
             _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1], cutters[k], seen,
@@ -335,9 +341,8 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
-            taken[m, 3] += round(totals[3] * VOLUME_UNITS)
-            taken[m, 4] += round(totals[4] * VOLUME_UNITS)
-            taken[m, 2] |= sectors
+            taken[m, 2] += round(totals[3] * VOLUME_UNITS)
+            taken[m, 3] += round(totals[4] * VOLUME_UNITS)
             cuts += 1
             if cuts % 64 == 0:
                 changing = _solid(tops, band, solid)

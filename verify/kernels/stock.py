@@ -71,17 +71,18 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 @njit(cache=True, nogil=True)
 def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, gone_on, come, begun,
-           best):
+           engaged, best):
     """Lower the lines under one feed move.
 
     gone_on     : mm of way before the move
     come, begun : (nx, ny) of the block, height of a line before the cutter began to lower it, mm, and mm of way then
+    engaged     : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
 
-    Returns whether any stock went, the sectors of the cutter that met it, and whether the flutes were under stock.
+    Returns whether any stock went, and whether the flutes were under stock.
     """
     i0, i1, j0, j1 = box
     radius, corner, length = cutter
-    cut, engaged, under = False, np.int64(0), False
+    cut, under = False, False
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
@@ -120,8 +121,8 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                     begun[i - i0, j - j0], come[i - i0, j - j0] = way, low + gone
                 tip = a[2] + s * d[2]
                 if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
-                    engaged |= sector_bits(x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius,
-                                           corner, step, 0.0)
+                    engaged[min(int(s * len(engaged)), len(engaged) - 1)] |= sector_bits(
+                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
@@ -134,7 +135,7 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
                 if dug[i - i0, j - j0] > skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
-    return cut, engaged, under
+    return cut, under
 
 
 @njit(cache=True, nogil=True)
@@ -198,8 +199,8 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
 
 
 @njit(cache=True, nogil=True)
-def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, ways, tool, cutters,
-               ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, under, engaged, events):
+def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, ways, parts, tool,
+               cutters, ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, under, engaged, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
 
     steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
@@ -207,7 +208,8 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
     ways  : (m,) float64, mm, sideways way of feed moves before each; far off after a rapid or another tool
     slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
     under : (m,) uint8, set where the flutes were under stock, of which lines of one height cannot tell
-    engaged : (m,) int64, sectors of the cutter that met stock, added to
+    parts : (m + 1,) int64, first row of each move in ``engaged`` (p,) int64, sectors of the cutter that met stock,
+            which are added to
 
     Returns the number of events found, which may exceed the table.
     """
@@ -236,13 +238,12 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
             continue
         cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            went, sectors, below = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m],
-                                          earned[m], since, dug, ways[m], come, begun, best)
+            went, below = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m], earned[m],
+                                 since, dug, ways[m], come, begun, engaged[parts[m]:parts[m + 1]], best)
             if below:
                 under[m] = 1
             if went:
                 cut[m] = 1
-                engaged[m] |= sectors
                 lowered += 1
                 if lowered % REFRESH == 0:
                     top = _top(height, i0, i1, j0, j1)
