@@ -142,8 +142,11 @@ class Dialect:
         return [*self.comment(f"Fresh cutter in T{number}: change it and set its length"), "M0"]
 
     def spindle(self, speed: str, first: bool) -> list[str]:
-        """Turn clockwise at 1/min; ``first``: with the coolant, after a tool was taken."""
-        return [f"S{speed} M3 M8" if first else f"S{speed} M3"]
+        """Turn clockwise at 1/min; ``first``: with the coolant, after a tool was taken.
+
+        A block has one M word: many controls take no more.
+        """
+        return [f"S{speed} M3", *(["M8"] if first else [])]
 
     def rise(self) -> list[str]:
         """Before a step that can be started, where ``stop`` leaves the spindle low: up to machine zero."""

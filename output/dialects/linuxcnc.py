@@ -30,6 +30,10 @@ class LinuxCnc(Dialect):
         """The tool is put away first, as the control takes no tool that it has."""
         return ["T0 M6", *super().fresh(number)]
 
+    def spindle(self, speed: str, first: bool) -> list[str]:
+        """Both M words in one block: they are of two groups."""
+        return [" ".join(super().spindle(speed, first))]
+
     def rise(self) -> list[str]:
         """The control itself goes up to change a tool, but not for one that it has."""
         return ["G53 G0 Z0."]

@@ -115,10 +115,11 @@ def test_lines_are_short_ascii_and_name_the_steps(job, dialect):
 
 
 MUTATIONS = {
-    "fanuc": [("X2.4565", "X2.4576"), ("F240.", "F241."), ("S12000 M3 M8", "S11000 M3 M8"), ("M3 M8", "M3"),
-              ("T1 M6", "T2 M6"), ("G0 X2. Y0.", "G1 X2. Y0. F600."), ("A-3.2939", "A-3.2949"), ("G43.4", "G43"),
+    "fanuc": [("X2.4565", "X2.4576"), ("F240.", "F241."), ("S12000 M3", "S11000 M3"), ("M3\nM8", "M3"),
+              ("M3\nM8", "M3 M8"), ("T1 M6", "T2 M6"), ("G0 X2. Y0.", "G1 X2. Y0. F600."), ("A-3.2939", "A-3.2949"), ("G43.4", "G43"),
               ("G90\nG49", "G49")],
-    "haas": [("X2.4565", "X2.4576"), ("G234", "G43"), ("E0.001", "E0.002"), ("G154 P2", "G154 P3"), ("M8", "M9")],
+    "haas": [("X2.4565", "X2.4576"), ("G234", "G43"), ("E0.001", "E0.002"), ("G154 P2", "G154 P3"), ("M8", "M9"),
+             ("M3\nM8", "M3 M8")],
     "siemens": [("X2.4565", "X2.4576"), ("TRAORI", "TRAFOOF"), ("ADIS=0.001", "ADIS=0.002"), ("G505", "G506"),
                 ("T1 M6\nD1", "T1 M6\nD0"), ("G1 Z8 F240", "G0 Z8"), ("C-5.9036", "C-5.9046"), ("M8", "")],
     "heidenhain": [("X+2.4565", "X+2.4576"), ("M128", "M129"), ("32.1 T0.001", "32.1 T0.002"), ("Q339=+1", "Q339=+2"),
@@ -159,6 +160,7 @@ def test_a_move_left_out_or_put_in_is_found():
     ("fanuc", "M428", "word of LinuxCNC"), ("fanuc", "G54.1 P40", "a setup names"),
     ("fanuc", "X1.; Y2.", "ends a block"),
     ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
+    ("haas", "S900 M3 M8", "one M word in a block"),
     ("siemens", "R1=5", "unknown word"), ("siemens", "GOTOF ENDE", "unknown word"), ("siemens", "G500", "switches"),
     ("siemens", "X=IC(5)", "no plain number"), ("siemens", "CYCLE800(0)", "cycle or function"),
     ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
@@ -193,6 +195,12 @@ def test_other_programs_of_these_controls_are_read():
                          dialect="heidenhain")
     assert not plain.remarks and plain.end[-1].tolist() == pytest.approx([25.4, 0.0, 50.8])
     assert plain.feed[2] == pytest.approx(254.0) and "cycle 32 is off" in plain.notes[0]
+
+
+def test_two_m_words_in_a_block_of_a_fanuc_are_remarked_on():
+    """Parameter 3404#7 says what becomes of them."""
+    told = read_program("G21 G17 G90 G94 G54\nT1 M6\nS900 M3 M8\nG0 G43 Z9. H1\nM30\n", dialect="fanuc").remarks
+    assert [r.line for r in told] == [3] and "M3 and M8 in one block" in told[0].message
 
 
 def test_arcs_in_plain_language():

@@ -41,7 +41,10 @@ def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, s
             continue
         for note in control.notes:
             log.note(note)
+        for remark in control.remarks:
+            log.remark("control", remark, remark, number)
         control.notes.clear()
+        control.remarks.clear()
         for block in blocks:
             yield number, block
 

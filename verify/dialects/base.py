@@ -11,11 +11,13 @@ ZEROS = tuple(WORK_OFFSETS.values())
 class Control:
     """One control, asked line by line; what it keeps is what later lines depend on.
 
-    notes : what was understood and should be known; whoever asks takes them away
+    notes   : what was understood and should be known; whoever asks takes them away
+    remarks : what was understood and should not be run, of the line asked last; taken away likewise
     """
 
     def __init__(self) -> None:
         self.notes: list[str] = []
+        self.remarks: list[str] = []
 
     def blocks(self, raw: str) -> list[str]:
         """The blocks one line stands for, in the words of ``verify.words``; none for a line without effect.

@@ -39,6 +39,8 @@ class Fanuc(Control):
             raise BlockError(f"cannot read '{text[:60]}'")
         for letter, digits in words:
             self._check(letter, digits)
+        if len(ms := [a + b for a, b in words if a == "M"]) > 1:
+            self._several(" and ".join(ms))
         values = dict(words)
         codes = [float(b) for a, b in words if a == "G"]
         out = []
@@ -66,6 +68,11 @@ class Fanuc(Control):
         if letter in _PLACES and "." not in digits and number != 0:
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, as a "
                              "parameter of the machine has it", "write the decimal point: X10. is 10 mm everywhere")
+
+    def _several(self, ms: str) -> None:
+        """A block has several M words, named by ``ms``."""
+        self.remarks.append(f"{ms} in one block: whether both are carried out, or the last alone, a parameter says "
+                            "(3404#7); give each a block of its own")
 
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
         """One word in those of the reader; none where another one of the block has taken it in."""

@@ -22,6 +22,9 @@ class Haas(Fanuc):
             raise BlockError(f"F{digits} without a decimal point is counted in thousandths or not, as a setting has it",
                              f"write F{digits}.")
 
+    def _several(self, ms: str) -> None:
+        raise BlockError(f"{ms} in one block: Haas takes one M word in a block", "give each a block of its own")
+
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits
 
