@@ -74,3 +74,7 @@ class Siemens(Dialect):
     def tcp_off(self) -> list[str]:
         """The transformation off."""
         return ["TRAFOOF"]
+
+    def restated(self, zero: str) -> list[str]:
+        """TRAFOOF may leave the control without a zero (G500)."""
+        return [f"{zero} D1"]

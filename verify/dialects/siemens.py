@@ -2,6 +2,8 @@
 
 D1 is the only cutting edge whose length is known; a tool that is put in has it at once (machine data 20270). What a
 program computes (R parameters, DEF, IF, GOTO, subprograms) is refused by name, and so are frames of the program.
+TRAORI and TRAFOOF may switch the zero off (G500): a move after one of them, unless past all frames (SUPA, G53), is
+refused until a zero is stated again.
 """
 
 from __future__ import annotations
@@ -40,10 +42,11 @@ class Siemens(Control):
         super().__init__()
         self.tool = self.selected = 0
         self.loose = ""
+        self.lost = ""  # the word after which no zero has been stated
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move as it is; everything else word by word."""
-        if _PLAIN.fullmatch(raw):
+        if not self.lost and _PLAIN.fullmatch(raw):
             return [raw]
         if raw.startswith("%_N_"):
             return []
@@ -77,6 +80,11 @@ class Siemens(Control):
                 self._letter(m["letter"], m["digits"], codes, out, after)
             else:
                 out += self._name(m["word"])
+        if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
+            self.lost = ""
+        if self.lost and "G53" not in out and any(w[0] in "XYZABC" for w in out):
+            raise BlockError(f"a move after {self.lost} without a zero: the control may count from none (G500)",
+                             "state the zero (G54 to G57, G505 on) before anything moves")
         out += self._path(codes, values)
         if 4 in codes:
             out = [f"G4 P{w[1:]}" for w in out if w[0] == "F"]
@@ -165,6 +173,8 @@ class Siemens(Control):
             raise BlockError(f"unknown word {word[:40]}")
         if word == "TRAORI" and self.loose:
             self.notes.append(self.loose)
+        if known != "G53":
+            self.lost = word
         return [known]
 
     def _oriented(self, parts: list[str]) -> None:
