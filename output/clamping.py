@@ -62,7 +62,8 @@ class Section:
     """A step with the ways to it and, before a tool is put away, from it.
 
     fresh, last : its tool is put in before it, and the way to it begins at ``home`` then; it is put away after it.
-                  Where the plan has restart points all steps are both, though the tool stays
+                  Where the plan has restart points all steps are both, though the tool stays, and so are those
+                  between which the speed changes while the control keeps the tip: not every control can change it so
     before, legs, after : the way to its start, the step itself, back to ``home``
     """
 
@@ -97,12 +98,20 @@ def each_section(plan: Workplan) -> Iterator[Section]:
         raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
     walk, steps = _Walk(plan.clamping), plan.steps
     for k, step in enumerate(steps):
-        fresh = k == 0 or step.tool != steps[k - 1].tool or step.fresh or plan.restart
-        last = k + 1 == len(steps) or steps[k + 1].tool != step.tool or steps[k + 1].fresh or plan.restart
+        fresh = k == 0 or _parted(plan, steps[k - 1], step)
+        last = k + 1 == len(steps) or _parted(plan, step, steps[k + 1])
         grid_path(step)
         before = walk.enter(step, fresh)
         legs = walk.through(step)
         yield Section(step, fresh, last, tuple(before), tuple(legs), tuple(walk.home()) if last else ())
+
+
+def _parted(plan: Workplan, step: Workingstep, follower: Workingstep) -> bool:
+    """Whether the tool is put away between two steps and put in again."""
+    if plan.restart or follower.fresh or follower.tool != step.tool:
+        return True
+    # a Heidenhain says a speed by TOOL CALL, which M128 does not allow
+    return plan.clamping is not None and plan.clamping.machine.tcp and follower.spindle_rpm != step.spindle_rpm
 
 
 class _Walk:

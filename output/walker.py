@@ -228,6 +228,8 @@ class _Turning(_Walk):
             if self.plan.restart:
                 self._label(step)
                 self.lines += self._modes()
+            elif self.tool == step.tool and not step.fresh:  # for its speed alone: not changed, it stays low by itself
+                self.lines += self.dialect.rise()
             self._put_in(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
@@ -244,7 +246,7 @@ class _Turning(_Walk):
         for leg in section.after:
             self._leg(leg)
         if section.last and self.machine.tcp:
-            self.lines += self.dialect.tcp_off()
+            self.lines += [*self.dialect.tcp_off(), *self.dialect.restated(self.zero)]
             self.rapid = None
 
     def _in_plane(self, legs: Sequence[Leg]) -> None:

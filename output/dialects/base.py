@@ -149,7 +149,7 @@ class Dialect:
         return [f"S{speed} M3", *(["M8"] if first else [])]
 
     def rise(self) -> list[str]:
-        """Before a step that can be started, where ``stop`` leaves the spindle low: up to machine zero."""
+        """Before a step with the tool that is in the spindle, where ``stop`` leaves it low: up to machine zero."""
         return []
 
     def stop(self) -> list[str]:
@@ -162,6 +162,10 @@ class Dialect:
 
     def tcp_off(self) -> list[str]:
         """It does not any more; rotary axes stand at 0, the tip over the part."""
+        return []
+
+    def restated(self, zero: str) -> list[str]:
+        """What has to be said again after ``tcp_off``, with a tool in the spindle, before anything moves."""
         return []
 
     @property

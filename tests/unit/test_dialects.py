@@ -25,10 +25,18 @@ from verify.reader import read_program
 OTHERS = ("fanuc", "haas", "siemens", "heidenhain")
 SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4"), "planes": Switches(planes=True)}
 TURNED = clamped("table-table-BC", swings=False)
+
+
+def faster(work):
+    """Each step at a speed of its own."""
+    return replace(work, steps=tuple(replace(s, spindle_rpm=9000.0 + 500 * k) for k, s in enumerate(work.steps)))
+
+
 JOBS = {
     "five steps": plan(), "tiny": tiny(), "further zero": replace(tiny(), work_offset="G59.2"),
     "restart": replace(plan(), restart=True), "3+2": TURNED, "five axes": clamped(),
     "head": clamped("head-table-BC"), "restart on five axes": replace(clamped(), restart=True),
+    "speeds": faster(plan()), "speeds on five axes": faster(clamped()),
     "fresh cutters": replace(plan(), steps=tuple(replace(s, fresh=k > 1) for k, s in enumerate(plan().steps))),
 }
 
@@ -116,12 +124,13 @@ def test_lines_are_short_ascii_and_name_the_steps(job, dialect):
 
 MUTATIONS = {
     "fanuc": [("X2.4565", "X2.4576"), ("F240.", "F241."), ("S12000 M3", "S11000 M3"), ("M3\nM8", "M3"),
-              ("M3\nM8", "M3 M8"), ("T1 M6", "T2 M6"), ("G0 X2. Y0.", "G1 X2. Y0. F600."), ("A-3.2939", "A-3.2949"), ("G43.4", "G43"),
-              ("G90\nG49", "G49")],
+              ("M3\nM8", "M3 M8"), ("T1 M6", "T2 M6"), ("G0 X2. Y0.", "G1 X2. Y0. F600."),
+              ("A-3.2939", "A-3.2949"), ("G43.4", "G43"), ("G90\nG49", "G49")],
     "haas": [("X2.4565", "X2.4576"), ("G234", "G43"), ("E0.001", "E0.002"), ("G154 P2", "G154 P3"), ("M8", "M9"),
              ("M3\nM8", "M3 M8")],
     "siemens": [("X2.4565", "X2.4576"), ("TRAORI", "TRAFOOF"), ("ADIS=0.001", "ADIS=0.002"), ("G505", "G506"),
-                ("T1 M6\nD1", "T1 M6\nD0"), ("G1 Z8 F240", "G0 Z8"), ("C-5.9036", "C-5.9046"), ("M8", "")],
+                ("T1 M6\nD1", "T1 M6\nD0"), ("G1 Z8 F240", "G0 Z8"),
+                ("ORIMKS ORIAXES\nG54 D1\n", "ORIMKS ORIAXES\nD1\n"), ("C-5.9036", "C-5.9046"), ("M8", "")],
     "heidenhain": [("X+2.4565", "X+2.4576"), ("M128", "M129"), ("32.1 T0.001", "32.1 T0.002"), ("Q339=+1", "Q339=+2"),
                    ("F240", "FMAX"), ("L Z+9 R0 FMAX", "L Z+9 R0 F600"), ("S12000", "S12001"), (" M8", " M9")],
 }
@@ -201,6 +210,36 @@ def test_two_m_words_in_a_block_of_a_fanuc_are_remarked_on():
     """Parameter 3404#7 says what becomes of them."""
     told = read_program("G21 G17 G90 G94 G54\nT1 M6\nS900 M3 M8\nG0 G43 Z9. H1\nM30\n", dialect="fanuc").remarks
     assert [r.line for r in told] == [3] and "M3 and M8 in one block" in told[0].message
+
+
+def test_a_zero_is_stated_after_every_change_of_the_transformation():
+    """Of a Siemens: without it a move is refused, past all frames it is not."""
+    text = write(clamped(), "siemens")
+    ends = re.findall(r"TRAFOOF\n(.*)\n", text)
+    assert len(ends) > 1 and set(ends) == {"G54", "G54 D1"}
+    head = "G710 G17 G90 G94 G54\nT1 M6\nD1\nS900 M3\nG0 Z9\n"
+    for word in ("TRAORI", "TRAFOOF", "TRAORI(1)"):
+        for move in ("X1", "G0 X1 Y1", "G1 Z8 F90", "X=3", "A0"):
+            with pytest.raises(ProgramError, match="without a zero"):
+                read_program(f"{head}{word}\n{move}\nM30\n", dialect="siemens",
+                             kinematics=Kinematics("table-table-AC"))
+        read_program(f"{head}{word}\nSUPA G0 Z0 D0\nG505\nX1\nM30\n", dialect="siemens",
+                     kinematics=Kinematics("table-table-AC"))
+
+
+def test_a_tool_is_called_and_machine_zero_sought_with_m128_off():
+    """A change of speed too: the spindle goes up between two such steps."""
+    work = JOBS["speeds on five axes"]
+    for shop in SHOPS.values():
+        text = write(work, "heidenhain", shop)
+        kept = re.findall(r"\bM128\b.*?\bM129\b", text.split("from the tip:")[1], flags=re.DOTALL)
+        assert len(kept) == len(work.steps)
+        assert not any("TOOL CALL" in k or "M91" in k or " S9" in k for k in kept)
+    for line, said in (("TOOL CALL S900", "TOOL CALL while M128"), ("TOOL CALL 2 Z S900", "TOOL CALL while M128"),
+                       ("L Z+0 R0 FMAX M91", "M91 while M128")):
+        with pytest.raises(ProgramError, match=said):
+            read_program(f"BEGIN PGM A MM\nTOOL CALL 1 Z S900\nM3\nM128\n{line}\nM30\n", dialect="heidenhain",
+                         kinematics=Kinematics("table-table-AC"))
 
 
 def test_arcs_in_plain_language():

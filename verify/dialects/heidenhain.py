@@ -139,6 +139,8 @@ class Heidenhain(Control):
     def _tool(self, m: re.Match[str]) -> list[str]:
         if m[2] not in (None, "Z"):
             raise BlockError(f"TOOL CALL with the tool axis {m[2]}: only Z is read")
+        if self.tcp:
+            raise BlockError("TOOL CALL while M128 keeps the tip", "say M129 before, and M128 behind it again")
         out = [f"S{m[3]}"] if m[3] else []
         out += [f"F{m[4]}"] if m[4] else []
         if m[1]:
@@ -149,6 +151,8 @@ class Heidenhain(Control):
     def _straight(self, places: str, feed: str | None, ms: list[int]) -> list[str]:
         if self.plane is not None and 91 in ms:
             raise BlockError("M91 in a tilted plane")
+        if self.tcp and 91 in ms:
+            raise BlockError("M91 while M128 keeps the tip", "say M129 in a block before")
         words = self._setup(" ".join(places.split()), 91 in ms)
         self._switch(ms)
         if not ms:
