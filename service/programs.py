@@ -76,11 +76,14 @@ def programs_of(ready: Prepared, sides: Sequence[Side],
 
 
 def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> list[Program]:
-    """The program of a plan for every control of the machine; several in order where one would be too large."""
+    """The program of a plan for every control of the machine; several in order where one would be too large.
+
+    The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
+    """
     machine = ready.setup.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
-    first, *_ = dialects
+    first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     work, out = replace(work, restart=machine.restart_points), []
     limit = machine.max_program_kb
     for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):

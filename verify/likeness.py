@@ -1,8 +1,9 @@
 """Are two programs the same to the part? Move for move, so that the proof of one is the proof of the other.
 
 Compared is what a reading gives: where the tip goes, how the tool stands, rapid or feed, how long a feed move takes,
-the tool, its speed, the coolant, dwells, and what is unknown of a way. Moves that go nowhere are left out on both
-sides, for controls differ in how they say "home".
+the tool, its speed, the coolant, dwells, and what is unknown of a way; how the machine is left where a tool is changed,
+where somebody is waited for, and at the end; and what is taken for granted. Moves that go nowhere are left out on both
+sides, for controls differ in how they say "home". How far a path is left is compared where both programs bound it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from geometry.errors import InternalError, ProgramError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
+from verify.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
-from verify.program import Program
+from verify.program import Pause, Program
 from verify.progress import Report, Stages, silent
 from verify.sequence import read_all
 
@@ -40,7 +42,11 @@ def difference(proved: Program, other: Program) -> str:
             return f"line {remark.line} of {other.name}: {remark.message}"
     if proved.dwell != other.dwell:
         return f"{other.name} waits {other.dwell:g} s, {proved.name} {proved.dwell:g} s"
-    if other.blend > proved.blend + 1e-12:
+    if taken := [word for word in other.assumed if word not in proved.assumed]:
+        return f"{other.name} does not say {', '.join(taken)} before its first move"
+    if other.unbounded and other.dialect in CONTROLS and CONTROLS[other.dialect].bounds_path:
+        return f"{other.name} does not bound what the control leaves the path by"
+    if not (other.unbounded or proved.unbounded) and other.blend > proved.blend + 1e-12:
         return (f"{other.name} lets the control leave the path by {other.blend:g} mm, {proved.name} by "
                 f"{proved.blend:g} mm")
     mine, yours = _moving(proved), _moving(other)
@@ -55,6 +61,43 @@ def difference(proved: Program, other: Program) -> str:
         more = proved if len(mine) > n else other
         row = int((mine if len(mine) > n else yours)[n])
         return f"line {more.line[row]} of {more.name} has no counterpart"
+    return _careless(proved) or _careless(other) or _paused(proved, other, mine, yours)
+
+
+def _careless(p: Program) -> str:
+    """Where a program changes a tool, or ends, as none that is written here does; '' where nowhere.
+
+    A fresh cutter is put in by hand: on every control the spindle is away from the part then.
+    """
+    control, changes = CONTROLS.get(p.dialect), 0
+    for pause in p.pauses:
+        least = 0 if pause.what in ("M0", "M1") else None if control is None else control.home_from
+        if least is not None and (changes >= least or pause.what != "tool change"):
+            if not pause.home:
+                return f"line {pause.line} of {p.name}: {pause.what}, and the spindle was not sent home before"
+            if control is not None and control.gives_up_length and pause.counted:
+                return f"line {pause.line} of {p.name}: {pause.what}, and the length offset is not off"
+        changes += pause.what == "tool change"
+    return ""
+
+
+def _paused(proved: Program, other: Program, mine: NDArray[np.int64], yours: NDArray[np.int64]) -> str:
+    """The first pause that the programs do not make alike, after the same of the moves given; '' where none."""
+    def told(pause: Pause, moving: NDArray[np.int64]) -> tuple[object, ...]:
+        tool = pause.tool if pause.what == "tool change" else 0
+        return (pause.what, tool, int(np.searchsorted(moving, pause.moves)), pause.speed, pause.coolant, pause.tcp,
+                pause.relative)
+
+    # LinuxCNC puts the old tool away to take a fresh one by the same number
+    first, second = ([x for x in p.pauses if x.what != "tool change" or x.tool] for p in (proved, other))
+    for a, b in zip(first, second, strict=False):
+        if told(a, mine) != told(b, yours):
+            return (f"line {b.line} of {other.name} ({b.what}) and line {a.line} of {proved.name} ({a.what}) differ in "
+                    "what is left running, or in where they stand")
+    if len(first) != len(second):
+        more, rest = (proved, first) if len(first) > len(second) else (other, second)
+        pause = rest[min(len(first), len(second))]
+        return f"line {pause.line} of {more.name} ({pause.what}) has no counterpart"
     return ""
 
 

@@ -11,7 +11,7 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.cycles import FEED
 from verify.posing import TurnLog
-from verify.program import Remark, Stop
+from verify.program import Pause, Remark, Stop
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
@@ -26,7 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based, the one being read
-    speeds, unknown, stops, blend, changes : as in ``Program``
+    speeds, unknown, stops, blend, changes, unbounded, pauses : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -48,6 +48,8 @@ class Log:
         self.stops: list[Stop] = []
         self.blend = 0.0
         self.changes = 0
+        self.unbounded = False
+        self.pauses: list[Pause] = []
         self.turned = TurnLog()
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from verify.kinematics import Kinematics
 from verify.log import Log
-from verify.program import NAN, Stop
+from verify.program import NAN, Pause, Stop
 from verify.rotary import Rotary
 from verify.saved import SavedModes
 from verify.words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
@@ -79,7 +79,11 @@ class Modes(Rotary):
 
     def _spindle(self, ms: list[int]) -> None:
         s = self.s
+        for m in (0, 1):
+            if m in ms:
+                self.pause(f"M{m}", s.tool)
         if 6 in ms:
+            self.pause("tool change", s.selected)
             self.stop("tool change")
             if s.selected != s.tool:
                 self.log.changes += s.tool > 0
@@ -140,6 +144,13 @@ class Modes(Rotary):
             up = tuple(self.machine.axis(np.radians([s.turn]))[0].tolist())
         if s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z):
             self.log.stops.append(Stop(self.log.line, what, s.tool, (x, y, z), up))
+
+    def pause(self, what: str, tool: int) -> None:
+        """Note how the program leaves the machine where it waits, or ends."""
+        s, log = self.s, self.log
+        counted = s.offset is not None or self.stated.isdisjoint({43, 43.4, 49})
+        log.pauses.append(Pause(log.line, what, tool, log.count, s.speed if s.turning else 0.0, s.coolant, s.tcp,
+                                s.relative, s.home, counted))
 
     def _motion(self, g: float) -> None:
         """A cycle begun anew keeps nothing of the one before."""

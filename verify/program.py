@@ -35,6 +35,31 @@ class Stop:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
+@dataclass(frozen=True)
+class Pause:
+    """How a program leaves the machine where it changes a tool, waits for somebody (M0, M1) or ends.
+
+    what    : 'tool change', 'M0', 'M1' or 'end of the program'
+    tool    : T number that is put in, 0 for none; of other pauses the one in the spindle
+    moves   : that were made before it
+    speed   : 1/min, 0 where the spindle stands;  coolant, tcp : whether it runs, whether the control keeps the tip
+    relative : whether coordinates are incremental (G91)
+    home    : whether the spindle was sent to a place of the machine's own and has not come down since
+    counted : whether a length offset is in force, or may be, as no word has said
+    """
+
+    line: int
+    what: str
+    tool: int
+    moves: int
+    speed: float
+    coolant: bool
+    tcp: bool
+    relative: bool
+    home: bool
+    counted: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """How the tool stands on the part, move by move.
@@ -75,6 +100,9 @@ class Program:
     speed   : (m,) float64, 1/min, at which the spindle turns, 0 where it stands
     coolant : (m,) bool
     changes : times a tool was taken out of the spindle for another, or for nothing
+    dialect : whose words it was written in
+    unbounded : whether no word bounds, somewhere, what the control leaves the path by: ``blend`` does not hold there
+    pauses  : in order
     """
 
     name: str
@@ -98,6 +126,9 @@ class Program:
     speed: F64 = field(default_factory=lambda: np.zeros(0))
     coolant: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
     changes: int = 0
+    dialect: str = "linuxcnc"
+    unbounded: bool = False
+    pauses: tuple[Pause, ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)
@@ -112,6 +143,7 @@ class State:
     turn      : deg, the rotary axes, tilting one first
     tcp_word, tcp_switch : tool centre point control by G43.4, by M428
     speed     : as S, nan before the first
+    sent      : whether Z was ever sent to a place of the machine's own
     parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
     cycle     : words of the drilling cycle in force, and where its series began
     table     : mm, by how much G10 moved the zero of the work offset
@@ -137,6 +169,7 @@ class State:
     retract_to_r: bool = False
     cycle: dict[str, float] = field(default_factory=dict)
     parked: bool = False
+    sent: bool = False
     turn: list[float] = field(default_factory=lambda: [0.0, 0.0])
     tcp_word: bool = False
     tcp_switch: bool = False
@@ -154,6 +187,11 @@ class State:
     def length_off(self) -> bool:
         """Whether Z of the control is not that of the tip, for want of the length offset of the tool."""
         return self.tool > 0 and self.offset != self.tool
+
+    @property
+    def home(self) -> bool:
+        """Whether Z was sent to a place of the machine's own and has not been stated since."""
+        return self.sent and math.isnan(self.position[2])
 
     @property
     def turning(self) -> bool:

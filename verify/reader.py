@@ -49,6 +49,7 @@ class Reader(Motion):
             blocks = Flow(lines, self).blocks()
         percents = self._scan(_told(blocks, len(lines), report))
         self.stop("end of the program")
+        self.pause("end of the program", self.s.tool)
         if not self.s.ended and percents < 2 and not log.errors:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
         log.raise_errors()
@@ -65,7 +66,8 @@ class Reader(Motion):
                        table[:, 9].astype(np.int32), self.dwell, dict(log.speeds), len(lines), log.remarks(),
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
-                       log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes)
+                       log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
+                       dialect, log.unbounded, tuple(log.pauses))
 
     def served(self, key: int | str) -> float:
         """A parameter that the control keeps by itself (``verify.served``)."""

@@ -57,6 +57,7 @@ class Rotary:
     def _leave(self, named: Sequence[bool]) -> None:
         """Linear axes went to a place of the machine's own; with the part or tool turned all of X, Y, Z follow."""
         s = self.s
+        s.sent |= named[2]
         every = s.tcp and s.tilted and any(named)
         s.position = [NAN if n or every else p for n, p in zip(named, s.position, strict=True)]
 

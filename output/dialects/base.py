@@ -51,8 +51,8 @@ class Dialect:
     name    : in ``machine.dialects`` and in file names;  title : in headers;  ending : of files, without the point
     line    : longest line, characters
     zeros   : words for the zeros of ``ZEROS``, in that order
-    path    : 'Path mode ...', what the header says of how far the control may leave the path; None where no word of
-              the program bounds it
+    path    : 'Path mode ...', what the header says of how far the control may leave the path
+    bounds_path : whether a word of the program bounds it
     """
 
     name = title = ending = ""
@@ -60,6 +60,7 @@ class Dialect:
     zeros: tuple[str, ...] = ZEROS
     length_words = "G43 H is the tool number"
     tcp_words = ""
+    bounds_path = True
 
     def __init__(self, switches: Switches) -> None:
         self.switches = switches

@@ -18,6 +18,7 @@ class Fanuc(Dialect):
 
     name, title, ending = "fanuc", "Fanuc", "nc"
     line = 72
+    bounds_path = False
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G54.1 P1", "G54.1 P2", "G54.1 P3")
     tcp_words = "G43.4: the control keeps the tool tip on the part while axes turn; G49: it does not any more"
     tcp_word = "G43.4"

@@ -14,6 +14,7 @@ class Haas(Fanuc):
     """Next Generation Control."""
 
     name, title = "haas", "Haas"
+    bounds_path = True
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G154 P1", "G154 P2", "G154 P3")
 
     def __init__(self, switches: Switches) -> None:

@@ -155,6 +155,53 @@ def test_planted_differences_are_found(dialect, change):
         pass  # refused outright: found as well
 
 
+@pytest.mark.parametrize("job", ["five steps", "fresh cutters", "restart", "five axes"])
+def test_any_of_two_may_be_the_one_that_is_proved(job):
+    work = JOBS[job]
+    read_all = {d: read(work, write(work, d), d) for d in DIALECTS}
+    assert {d for d, p in read_all.items() if p.unbounded} == {"fanuc"}
+    for first in DIALECTS:
+        for second in DIALECTS:
+            assert difference(read_all[first], read_all[second]) == "", (first, second)
+
+
+LEFT_OUT = ("G21", "G54", "G91 G28 Z0.", "G49", "M5", "M9", "M0", "M8", "G90", "T7 M6")
+
+
+@pytest.mark.parametrize("line", LEFT_OUT)
+@pytest.mark.parametrize("job", ["fresh cutters", "five axes", "speeds on five axes"])
+def test_a_line_left_out_of_a_fanuc_program_is_found(job, line):
+    """Each of them wherever it stands, one at a time, whichever program it is held against."""
+    work = JOBS[job]
+    lines = write(work, "fanuc").splitlines(keepends=True)
+    firsts = [read(work, write(work, d), d) for d in ("linuxcnc", "siemens", "heidenhain")]
+    for k in [k for k, text in enumerate(lines) if text.strip() == line]:
+        try:
+            other = read(work, "".join([*lines[:k], *lines[k + 1:]]), "fanuc")
+        except ProgramError:
+            continue
+        assert all(difference(first, other) for first in firsts), k + 1
+
+
+@pytest.mark.parametrize(("dialect", "line"), [
+    ("siemens", "SUPA G0 Z0 D0"), ("siemens", "G641 ADIS=0.001 ADISPOS=0.001"), ("siemens", "M5"), ("siemens", "M0"),
+    ("heidenhain", "L Z+0 R0 FMAX M91"), ("heidenhain", "CYCL DEF 32.1 T0.001"), ("heidenhain", "M0"),
+    ("haas", "G187 P3 E0.001"), ("haas", "G91 G28 Z0."), ("linuxcnc", "T0 M6"), ("linuxcnc", "M0"), ("linuxcnc", "M9")])
+def test_a_line_left_out_of_the_others_is_found(dialect, line):
+    work = JOBS["fresh cutters"]
+    lines = write(work, dialect).splitlines(keepends=True)
+    first = read(work, write(work, "linuxcnc" if dialect != "linuxcnc" else "haas"),
+                 "linuxcnc" if dialect != "linuxcnc" else "haas")
+    places = [k for k, text in enumerate(lines) if re.sub(r"^[0-9]+ ", "", text.strip()) == line]
+    assert places
+    for k in places:
+        try:
+            other = read(work, "".join([*lines[:k], *lines[k + 1:]]), dialect)
+        except ProgramError:
+            continue
+        assert difference(first, other), k + 1
+
+
 def test_a_move_left_out_or_put_in_is_found():
     work = tiny()
     text = write_linuxcnc(work)

@@ -39,6 +39,7 @@ def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, s
             if len(log.errors) >= MAX_ERRORS:
                 return
             continue
+        log.unbounded = control.unbounded
         for note in control.notes:
             log.note(note)
         for remark in control.remarks:

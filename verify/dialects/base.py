@@ -13,11 +13,27 @@ class Control:
 
     notes   : what was understood and should be known; whoever asks takes them away
     remarks : what was understood and should not be run, of the line asked last; taken away likewise
+    unbounded : whether no word says, somewhere, how far the control may leave the path
+    bounds_path : whether it has such a word
+    home_from : from which tool change on, counted from 0, a program that was written here has sent the spindle home
+                before; None: the control goes up by itself
+    gives_up_length : whether no length offset is in force there either
     """
+
+    bounds_path = True
+    home_from: int | None = None
+    gives_up_length = False
 
     def __init__(self) -> None:
         self.notes: list[str] = []
         self.remarks: list[str] = []
+        self.unbounded = False
+        self._free = False
+
+    def bound(self, known: bool) -> None:
+        """From here on a word says how far the control may leave the path, or no longer does."""
+        self._free |= not known
+        self.unbounded = self._free
 
     def blocks(self, raw: str) -> list[str]:
         """The blocks one line stands for, in the words of ``verify.words``; none for a line without effect.

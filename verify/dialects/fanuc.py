@@ -26,6 +26,11 @@ class Fanuc(Control):
     title = "Fanuc"
     further = 54.1
     bounds_path = False
+    home_from, gives_up_length = 0, True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.unbounded = True
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move as it is; everything else word by word."""

@@ -15,6 +15,7 @@ class Haas(Fanuc):
 
     title = "Haas"
     further = 154.0
+    bounds_path = True
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)
@@ -35,7 +36,9 @@ class Haas(Fanuc):
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine says how far the control rounds corners; "
                                   "it is not in the error bound")
+                self.bound(False)
                 return []
+            self.bound(True)
             return [f"G64 P{values['E']}"]
         if code in (5.1, 54.1):
             raise BlockError(f"unknown word G{code:g}: Haas has G187 and G154")

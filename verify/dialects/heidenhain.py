@@ -49,8 +49,11 @@ def _turn(axis: int, angle: float) -> F64:
 class Heidenhain(Control):
     """TNC 320 to 640, iTNC 530, TNC7."""
 
+    home_from = 1
+
     def __init__(self) -> None:
         super().__init__()
+        self.unbounded = True
         self.preset = self.tcp = False
         self.plane: F64 | None = None  # columns are its axes in the setup frame
         self.at = [math.nan] * 3  # setup frame, mm or what the program counts in
@@ -79,7 +82,8 @@ class Heidenhain(Control):
         if text.startswith("PLANE"):
             return self._tilt(text)
         if m := re.fullmatch(rf"CYCL DEF 32\.1(?: T({NUMBER}))?", text):
-            if float(m[1] or 0.0) != 0.0:
+            self.bound(float(m[1] or 0.0) != 0.0)
+            if not self.unbounded:
                 return [f"G64 P{float(m[1]):.6f}"]
             self.notes.append("cycle 32 is off: machine parameters say how far the control rounds corners, and it is "
                               "not in the error bound")

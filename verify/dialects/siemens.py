@@ -38,8 +38,11 @@ def is_siemens(text: str) -> bool:
 class Siemens(Control):
     """840D sl, 828D and ONE."""
 
+    home_from, gives_up_length = 1, True
+
     def __init__(self) -> None:
         super().__init__()
+        self.unbounded = True
         self.tool = self.selected = 0
         self.loose = ""
         self.lost = ""  # the word after which no zero has been stated
@@ -97,6 +100,7 @@ class Siemens(Control):
         if 641 in codes:
             if "ADIS" not in values:
                 raise BlockError("G641 without ADIS in its block: how far corners are rounded is not known")
+            self.bound(True)
             return [f"G64 P{max(values['ADIS'], values.get('ADISPOS', 0.0)):.6f}"]
         if "ADIS" in values or "ADISPOS" in values:
             raise BlockError("ADIS without G641 in its block")
@@ -136,6 +140,7 @@ class Siemens(Control):
         if 505 <= n <= 599:
             return [zero_word(n - 500, f"G{n}")]
         if n == 60:
+            self.bound(True)
             return ["G61"]
         if n == 4 or n == 641 or n in _UNBOUNDED:
             return []
@@ -194,9 +199,11 @@ class Siemens(Control):
             if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
                 self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
                                   "in the error bound")
+                self.bound(False)
                 return []
             if not re.fullmatch(NUMBER, parts[0]):
                 raise BlockError(f"CYCLE832({arguments}): its tolerance is no plain number")
             self._oriented(parts)
+            self.bound(True)
             return [f"G64 P{float(parts[0]):.6f}"]
         raise BlockError(f"{name[:40]}( ): a cycle or function the reader does not know")
