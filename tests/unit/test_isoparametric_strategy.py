@@ -159,6 +159,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
             self.residual = SimpleNamespace(residual=np.ones(4))
             self.strategy, self.depths = _Strategy("zlevel", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
+            self.settled = False
 
         def _along_borders(self):
             return _Strategy("isoparametric", 1.0, None, False), ()
