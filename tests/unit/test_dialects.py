@@ -218,6 +218,7 @@ def test_a_move_left_out_or_put_in_is_found():
     ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
     ("haas", "S900 M3 M8", "one M word in a block"),
     ("siemens", "R1=5", "unknown word"), ("siemens", "GOTOF ENDE", "unknown word"), ("siemens", "G500", "switches"),
+    ("siemens", "G70", "F in what the machine"),
     ("siemens", "X=IC(5)", "no plain number"), ("siemens", "CYCLE800(0)", "cycle or function"),
     ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
     ("heidenhain", "L IX+5", "cannot read"), ("heidenhain", "L X+5 RL F100", "cannot read"),
@@ -247,10 +248,12 @@ def test_other_programs_of_these_controls_are_read():
     plain = read_program('BEGIN PGM T INCH\nBLK FORM 0.1 Z X+0 Y+0 Z-1\nTOOL CALL 1 Z S5000 F300 ; ball\n'
                          "CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\n* - cut\n"
                          "CYCL DEF 32.0 TOLERANZ\nCYCL DEF 32.1\n"
-                         "L X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\nL Z+2 FMAX M5\nEND PGM T INCH\n",
+                         "L X+0 Y+0 R0 FMAX M13\nL Z+1 FMAX\nL Z-0.1 F10\nL X+1\n"
+                         "CR X+2 Y+0 R+9 DR- F40\nL X+1 F10\nL Z+2 FMAX M5\nEND PGM T INCH\n",
                          dialect="heidenhain")
     assert not plain.remarks and plain.end[-1].tolist() == pytest.approx([25.4, 0.0, 50.8])
-    assert plain.feed[2] == pytest.approx(254.0) and "cycle 32 is off" in plain.notes[0]
+    assert plain.feed[2] == pytest.approx(25.4) == plain.feed[-2] and plain.feed[5] == pytest.approx(101.6)
+    assert "cycle 32 is off" in plain.notes[0]
 
 
 def test_two_m_words_in_a_block_of_a_fanuc_are_remarked_on():

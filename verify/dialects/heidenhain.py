@@ -3,7 +3,7 @@
 Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C, CR, M words, LBL, STOP, of the cycles 247
 (preset) and 32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup frame turned about
 its X, then Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius compensation, incremental words
-(IX), other arcs, Q parameters, calls and shifts are refused by name.
+(IX), other arcs, Q parameters, calls and shifts are refused by name. F of an INCH program counts tenths of an inch.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Heidenhain(Control):
     def __init__(self) -> None:
         super().__init__()
         self.unbounded = True
-        self.preset = self.tcp = False
+        self.preset = self.tcp = self.inch = False
         self.plane: F64 | None = None  # columns are its axes in the setup frame
         self.at = [math.nan] * 3  # setup frame, mm or what the program counts in
         self.centre = [math.nan] * 2
@@ -69,6 +69,7 @@ class Heidenhain(Control):
         if not text or text.startswith(_IDLE) or re.fullmatch(r'LBL +(?:[0-9]+|"[^"]*")', text):
             return []
         if m := _BEGIN.fullmatch(text):
+            self.inch = m[1] == "INCH"
             return [f"G{21 if m[1] == 'MM' else 20} G17 G90 G94 G40"]
         if m := _TOOL.fullmatch(text):
             return self._tool(m)
@@ -146,7 +147,7 @@ class Heidenhain(Control):
         if self.tcp:
             raise BlockError("TOOL CALL while M128 keeps the tip", "say M129 before, and M128 behind it again")
         out = [f"S{m[3]}"] if m[3] else []
-        out += [f"F{m[4]}"] if m[4] else []
+        out += [self._feed(f"F{m[4]}")] if m[4] else []
         if m[1]:
             self.at[2] = math.nan
             out = [f"T{m[1]} M6", *out, *([f"G43 H{m[1]}"] if int(m[1]) else [])]
@@ -158,6 +159,7 @@ class Heidenhain(Control):
         if self.tcp and 91 in ms:
             raise BlockError("M91 while M128 keeps the tip", "say M129 in a block before")
         words = self._setup(" ".join(places.split()), 91 in ms)
+        feed = self._feed(feed) if feed and feed != "FMAX" else feed
         self._switch(ms)
         if not ms:
             return [f"G0 {words}" if feed == "FMAX" else f"G1 {words} {feed}" if feed else f"G1 {words}"]
@@ -170,6 +172,10 @@ class Heidenhain(Control):
         before = [_WORDS.get(m, f"M{m}") for m in ms if m in _START]
         after = [_WORDS.get(m, f"M{m}") for m in ms if m in _END]
         return [*before, *([block] if block else []), *after]
+
+    def _feed(self, word: str) -> str:
+        """The F word in what the program counts in, a minute: F10 is an inch a minute in an INCH program."""
+        return f"F{0.1 * float(word[1:]):.9f}" if self.inch else word
 
     def _switch(self, ms: list[int]) -> None:
         self.tcp = 129 not in ms and (self.tcp or 128 in ms)
@@ -188,7 +194,7 @@ class Heidenhain(Control):
             raise BlockError("C round a centre (CC), or from a place, that the program has not stated")
         else:
             block += f" I{self.centre[0] - start[0]:.9f} J{self.centre[1] - start[1]:.9f}"
-        return [f"{block} {m[5]}" if m[5] else block]
+        return [f"{block} {self._feed(m[5])}" if m[5] else block]
 
     def _machine(self, ms: list[int], stop: str) -> list[str]:
         self._switch(ms)

@@ -24,7 +24,7 @@ SMALL = 0.01
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{2}\s*\(|SUPA|G710|G700|G641|G642|G645"
                     r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
 _SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
-_UNITS = {700: 20, 70: 20, 710: 21, 71: 21}
+_UNITS = {700: 20, 710: 21, 71: 21}
 _IDLE = frozenset({"ORIMKS", "ORIAXES", "FFWON", "FFWOF", "SOFT", "BRISK", "COMPOF", "DIAMOF", "CFTCP"})
 _UNBOUNDED = frozenset({64, 642, 643, 644, 645})
 _M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
@@ -135,6 +135,9 @@ class Siemens(Control):
     def _code(self, n: int) -> list[str]:
         if n in _SAME:
             return [f"G{n}"]
+        if n == 70:
+            raise BlockError("G70 counts places in inches and F in what the machine is set up for",
+                             "write G700, which counts F in inches too")
         if n in _UNITS:
             return [f"G{_UNITS[n]}"]
         if 505 <= n <= 599:
