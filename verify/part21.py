@@ -4,6 +4,9 @@ Comments may stand wherever blanks may, statements may be split into lines as th
 the directives ``\\X\\``, ``\\X2\\``, ``\\X4\\``, ``\\S\\``. Instances are parsed when they are asked for; points of
 three coordinates, of which paths have millions, are read all at once. What the grammar does not allow is refused by
 its place, what an instance lacks by its number and name: ``#123 POLYLINE, points: ...``.
+
+Files come from anybody, so every expression has to give up in one pass: repetitions are possessive, and what may begin
+anywhere is not begun again inside a run of its own letters.
 """
 
 from __future__ import annotations
@@ -20,23 +23,32 @@ from geometry.mesh import F64, I32
 
 SHOWN = 60  # characters of a text that an error quotes
 DEEPEST = 20  # lists in lists
+LONGEST = 128  # letters of a name; the longest of the schemas have some 60
 _CHUNK = 65_536
 _PIECE = 1 << 20
-_NUMBER = r"[-+]?[0-9]+\.[0-9]*(?:E[-+]?[0-9]+)?"
-_SKIP = re.compile(r"(?:\s++|/\*.*?\*/)*+", re.DOTALL)
+_FLAGS = re.DOTALL | re.ASCII  # blanks are those of ASCII: numpy reads lists of references and knows no others
+_NUMBER = r"[-+]?[0-9]++\.[0-9]*+(?:E[-+]?[0-9]++)?+"
+_BLANKS = r"(?:\s++|/\*.*?\*/)*+"
+_WORD = rf"[A-Z][A-Z0-9_]{{0,{LONGEST - 1}}}+(?![A-Z0-9_])"
+_SKIP = re.compile(_BLANKS, _FLAGS)
 _BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
 _INSTANCE = re.compile(
-    rf"(?:\s++|/\*.*?\*/)*+\#([0-9]{{1,18}}+)\s*+=\s*+(?:CARTESIAN_POINT\s*\(\s*'[^'\\]*+'\s*,\s*\(\s*({_NUMBER})\s*,\s*"
-    rf"({_NUMBER})\s*,\s*({_NUMBER})\s*\)\s*\)\s*;|({_BODY});)", re.DOTALL)
-_STATEMENT = re.compile(rf"({_BODY});", re.DOTALL)
+    rf"{_BLANKS}\#([0-9]{{1,18}}+)\s*+=\s*+(?:CARTESIAN_POINT\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(\s*+({_NUMBER})\s*+,\s*+"
+    rf"({_NUMBER})\s*+,\s*+({_NUMBER})\s*+\)\s*+\)\s*+;|({_BODY});)", _FLAGS)
+_STATEMENT = re.compile(rf"({_BODY});", _FLAGS)
+_ASIDE = re.compile(r"'[^']*+'|/\*.*?\*/", _FLAGS)
+_ENDING = re.compile(rf"ENDSEC\s*+;{_BLANKS}(END-ISO-10303-21\s*+;)?", _FLAGS)
 _TOKEN = re.compile(
-    rf"(?:\s++|/\*.*?\*/)*+(?:(?P<ref>\#[0-9]{{1,18}}+)|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+)|'(?P<text>(?:[^']|'')*+)'"
-    r"|\.(?P<word>[A-Z][A-Z0-9_]*)\.|(?P<name>!?[A-Z][A-Z0-9_]*)|(?P<sign>[(),$*])|\"(?P<bits>[0-9A-F]+)\")", re.DOTALL)
-_NAME = re.compile(r"[A-Z][A-Z0-9_]*")
-_BRACKETS = re.compile(r"'[^']*'|/\*.*?\*/|([A-Z][A-Z0-9_]*)\s*\(|([()])", re.DOTALL)
-_POLYLINE = re.compile(r"POLYLINE\s*\(\s*'[^'\\]*'\s*,\s*\(((?:\s*\#[0-9]{1,18}\s*,)+\s*\#[0-9]{1,18}\s*)\)\s*\)\s*;")
-_DIRECTIVE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X4\\((?:[0-9A-F]{8})*)\\X0\\|\\X\\([0-9A-F]{2})|\\S\\(.)"
-                        r"|\\P[A-I]\\|(\\\\)", re.DOTALL)
+    rf"{_BLANKS}(?:(?P<ref>\#[0-9]{{1,18}}+(?![0-9]))|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+(?![0-9]))"
+    rf"|'(?P<text>(?:[^']++|'')*+)'|\.(?P<word>{_WORD})\.|(?P<name>!?{_WORD})|(?P<sign>[(),$*])"
+    r"|\"(?P<bits>[0-9A-F]++)\")", _FLAGS)
+_NAME = re.compile(r"[A-Z][A-Z0-9_]*+")
+_BRACKETS = re.compile(rf"'[^']*+'|/\*.*?\*/|(?<![A-Z0-9_])({_NAME.pattern})|([()])", _FLAGS)
+_OPENING = re.compile(rf"{_BLANKS}\(?+{_BLANKS}({_WORD})", _FLAGS)
+_POLYLINE = re.compile(r"POLYLINE\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(((?:\s*+\#[0-9]{1,18}+\s*+,)++\s*+\#[0-9]{1,18}+\s*+)\)"
+                       r"\s*+\)\s*+;", _FLAGS)
+_DIRECTIVE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*+)\\X0\\|\\X4\\((?:[0-9A-F]{8})*+)\\X0\\|\\X\\([0-9A-F]{2})"
+                        r"|\\S\\([ -~])|\\P[A-I]\\|(\\\\)", _FLAGS)
 
 
 class Ref(int):
@@ -91,9 +103,10 @@ class Part21:
         self._records: dict[int, list[Record]] = {}
         self._spans: dict[int, tuple[int, int]] = {}
         self._named: dict[str, list[int]] = {}
+        self._point_ids = self._point_at = np.zeros(0, np.int64)
+        self._breaks = _newlines(text)
         begin = self._frame()
         self._scan(begin)
-        self._breaks = _newlines(text)
         self.lines = len(self._breaks) + (0 if text.endswith("\n") else 1)
 
     def of(self, entity: str) -> list[int]:
@@ -158,7 +171,7 @@ class Part21:
         if self._point(number) >= 0:
             entity = " CARTESIAN_POINT"
         elif span is not None:
-            words = re.match(r"\s*\(?\s*([A-Z][A-Z0-9_]*)", self._text[span[1]:span[1] + 200])
+            words = _OPENING.match(self._text[span[1]:span[1] + 2 * LONGEST])
             entity = f" {words.group(1)}" if words else ""
         line = (f"line {self.line(number)}",) if self.has(number) and self._breaks.size else ()
         subjects = (f"#{number}", *((f"#{also}",) if also is not None else ()), *line)
@@ -191,14 +204,13 @@ class Part21:
             found = _STATEMENT.match(self._text, at)
             if found is None:
                 raise self._broken(at, "the text breaks off before the data section")
-            words = " ".join(re.sub(r"/\*.*?\*/", " ", found.group(1), flags=re.DOTALL).split())
+            words = " ".join(_ASIDE.sub(" ", found.group(1)).split())
             if not sections and words != "ISO-10303-21":
                 raise self._broken(at, "a STEP file begins with ISO-10303-21;")
             if words.startswith("DATA"):
                 break
             if "(" in words:
-                (record,) = self._values(found.group(1), at)
-                self.header[record[0]] = record[1]
+                self.header.update(self._values(found.group(1), at))
             sections.append(words)
             at = found.end()
         self.schemas = tuple(str(s).split("{")[0].strip().upper() for s in self._schema_list())
@@ -236,6 +248,8 @@ class Part21:
                     raise self._broken(found.start(1), f"#{number} stands twice")
                 self._spans[number] = found.start(1), found.start(5)
                 for name in _entity_names(body):
+                    if len(name) > LONGEST:
+                        raise self.error(number, _too_long(name))
                     self._named.setdefault(name, []).append(number)
             at = found.end()
         pack()
@@ -251,7 +265,7 @@ class Part21:
 
     def _end(self, at: int) -> None:
         at = _SKIP.match(self._text, at).end()  # type: ignore[union-attr]
-        tail = re.compile(r"ENDSEC\s*;(?:\s++|/\*.*?\*/)*+(END-ISO-10303-21\s*;)?", re.DOTALL).match(self._text, at)
+        tail = _ENDING.match(self._text, at)
         if tail is None:
             raise self._broken(at, "an instance, #number=NAME(...);, or the end of the section was expected")
         if tail.group(1) is None:
@@ -290,13 +304,15 @@ def _entity_names(body: str) -> list[str]:
         return [found.group()] if found else []
     out, depth = [], 0
     for m in _BRACKETS.finditer(body):
-        if m.group(1):
-            if depth == 1:
-                out.append(m.group(1))
-            depth += 1
+        if m.group(1) and depth == 1:
+            out.append(m.group(1))
         elif m.group(2):
             depth += 1 if m.group(2) == "(" else -1
     return out
+
+
+def _too_long(name: str) -> str:
+    return f"has a name of {len(name)} letters, {name[:20]}..., {LONGEST} are allowed"
 
 
 class _Grammar(Exception):
@@ -319,6 +335,10 @@ class _Tokens:
                 rest = _SKIP.match(text, at)
                 if rest is not None and rest.end() == len(text):
                     return
+                at = len(text) if rest is None else rest.end()
+                name = _NAME.match(text, at)
+                if name is not None and len(name.group()) > LONGEST:
+                    raise _Grammar(_too_long(name.group()))
                 raise _Grammar(f"holds {text[at:at + SHOWN].strip()!r}, which is no value")
             yield str(found.lastgroup), found.group(str(found.lastgroup))
             at = found.end()
