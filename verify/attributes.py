@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from verify.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
 
-FARTHEST = 1e6  # in the unit of the file, of the coordinates of a path
+FARTHEST = 1e6  # mm, of the coordinates of a path and the sizes of a tool
 UNIT = 1e-3  # what the length of a tool axis may be off one
+LONGEST_VECTOR = 1e9  # of ratios of a direction; squares of much more have no place in a float
 
 
 class Kind:
@@ -47,7 +48,9 @@ class Real(Kind):
     def problem(self, value: Value, file: Part21) -> str | None:
         if not isinstance(value, float) or not math.isfinite(value):
             return f"a real number expected, not {shown(value)}"
-        return None if self.above < value <= self.most else f"a number over {self.above:g} expected, not {value:g}"
+        if value > self.most:
+            return f"a number up to {self.most:g} expected, not {value:g}"
+        return None if value > self.above else f"a number over {self.above:g} expected, not {value:g}"
 
 
 @dataclass(frozen=True)
@@ -188,16 +191,25 @@ class Checked:
         return self.file.of(entity)
 
     def get(self, number: int, *entities: str) -> Record:
-        """Name and values of an instance, which is of one of some entities; ProgramError where it is of none."""
-        for record in self.file.records(number):
+        """Name and values of an instance, which is of one of some entities; ProgramError where it is of none.
+
+        An entity that its form writes alone is refused among the records of a complex instance, and the other way
+        round: its values were held against no table.
+        """
+        records = self.file.records(number)
+        for record in records:
             if record[0] in entities:
+                if record[0] not in (self._records if len(records) > 1 else self._table):
+                    raise self.file.error(number, f"has {record[0]} {'among' if len(records) > 1 else 'without'} "
+                                                  "other records, as its form does not write it")
                 return record
         raise self.file.error(number, f"is to be {' or '.join(entities)}")
 
     def one(self, number: int, entity: str, attribute: str) -> Value:
         """One attribute of an instance."""
-        names = [name for name, _ in self._kinds(number, entity)]
-        return self.get(number, entity)[1][names.index(attribute)]
+        values = self.get(number, entity)[1]
+        kinds = self._records[entity] if len(self.file.records(number)) > 1 else self._table[entity]
+        return values[[name for name, _ in kinds].index(attribute)]
 
     def ref(self, number: int, entity: str, attribute: str) -> int:
         """The number of the instance that an attribute refers to; ProgramError where it refers to none."""
@@ -220,11 +232,17 @@ class Checked:
         value = self.one(number, entity, attribute)
         return value if isinstance(value, float) else None
 
+    def within(self, number: int, what: str, value: float, least: float, most: float) -> float:
+        """The value, which has a sane size; ProgramError, naming the instance, where it has none."""
+        if not least <= value <= most:  # nor where it is nan
+            raise self.file.error(number, f", {what}: {least:g} to {most:g} expected, not {value:g}")
+        return value
+
     def placement(self, number: int, scale: float = 1.0) -> F64:
         """(4, 4) float64, mm: from an AXIS2_PLACEMENT_3D to what it is placed in; ``scale`` is mm in its unit."""
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
-        out[:3, 3] = scale * self._places(number, np.array([self.ref(number, entity, "location")], np.int64))[0]
+        out[:3, 3] = self._places(number, np.array([self.ref(number, entity, "location")], np.int64), scale)[0]
         up, along = (self.maybe(number, entity, a) for a in ("axis", "ref_direction"))
         z = np.array([0.0, 0.0, 1.0]) if up is None else self.vector(up)
         x = np.array([1.0, 0.0, 0.0]) if along is None else self.vector(along)
@@ -239,9 +257,10 @@ class Checked:
         """(3,) float64, unit: a DIRECTION."""
         ratios = self.one(number, "DIRECTION", "direction_ratios")
         out = np.array([v for v in ratios if isinstance(v, float)] if isinstance(ratios, list) else [])
-        length = float(np.linalg.norm(out))
+        length = float(np.linalg.norm(out)) if len(out) and np.abs(out).max() <= LONGEST_VECTOR else 0.0
         if len(out) != 3 or length < 1e-12:
-            raise self.file.error(number, ", direction_ratios: three numbers that are not all 0 expected")
+            raise self.file.error(number, f", direction_ratios: three numbers within {LONGEST_VECTOR:g} that are not "
+                                          "all 0 expected")
         return out / length
 
     def unit_axes(self, number: int, words: str, axes: F64, count: int) -> F64:
@@ -254,25 +273,25 @@ class Checked:
                                           f"{size[bad[0]]:.6g}")
         return axes / size[:, None]
 
-    def _kinds(self, number: int, entity: str) -> Attributes:
-        return self._records[entity] if len(self.file.records(number)) > 1 else self._table[entity]
-
-    def curve(self, number: int) -> tuple[F64, F64]:
-        """Points (n, 3) of a polyline, and the lines (n,) of the file they stand in, as floats."""
+    def curve(self, number: int, scale: float = 1.0) -> tuple[F64, F64]:
+        """Points (n, 3) of a polyline, times ``scale``, and the lines (n,) of the file they stand in, as floats."""
         numbers = self.file.plain_polyline(number)
         if numbers is None:
             self._check(number, "POLYLINE")
             numbers = np.array(self.one(number, "POLYLINE", "points"), np.int64)
         self._check_points(number, numbers)
-        return self._places(number, numbers), self.file.lines_of(numbers).astype(np.float64)
+        return self._places(number, numbers, scale), self.file.lines_of(numbers).astype(np.float64)
 
-    def _places(self, owner: int, numbers: NDArray[np.int64]) -> F64:
-        """(n, 3) float64: coordinates of points that an instance refers to."""
+    def _places(self, owner: int, numbers: NDArray[np.int64], scale: float) -> F64:
+        """(n, 3) float64: coordinates of points that an instance refers to, times ``scale``."""
         points = self.file.points(numbers)
         for k in np.flatnonzero(np.isnan(points).any(axis=1)).tolist():  # those not written plainly
             points[k] = np.array(self.one(int(numbers[k]), "CARTESIAN_POINT", "coordinates"), np.float64)
+        with np.errstate(over="ignore"):  # what has no place in a float any more is far away too
+            points = points * scale
         if (far := np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1))).size:
-            raise self.file.error(int(numbers[far[0]]), f", coordinates: numbers within {FARTHEST:g} expected", owner)
+            raise self.file.error(int(numbers[far[0]]), f", coordinates: numbers within {FARTHEST / scale:g} expected",
+                                  owner)
         return points
 
     def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import VerificationError
+from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64, I32
 from verify.cycles import FEED, RAPID
 from verify.dividing import MOST_TURN
@@ -23,6 +23,10 @@ from verify.log import MOST_MOVES
 from verify.program import Poses, Program, Remark, Stop
 
 SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
+LEAST_FEED, MOST_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for
+MOST_SPEED = 1e7  # 1/min
+MOST_DWELL = 1e7  # s
+HALF_TURN = math.pi - 1e-4  # rad: a move that turns the tool as far does not say which way
 EVERY = 7  # X, Y and Z of ``Program.unknown``
 TURNED = 8
 UP = (0.0, 0.0, 1.0)
@@ -255,6 +259,11 @@ class Course:
     def _add(self, start: F64, end: F64, row: tuple[bool, float, float, float], lines: F64, arrival: bool) -> None:
         """Write moves (n, 6); one that turns the tool far is cut into pieces."""
         angle = np.arccos(np.clip((start[:, 3:] * end[:, 3:]).sum(axis=1), -1.0, 1.0))
+        if (over := np.flatnonzero(angle > HALF_TURN)).size:
+            at = int(lines[over[0]])
+            raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn, which says "
+                               "no way round", subjects=(f"line {at}",),
+                               remedy="give the path points with axes between")
         pieces = np.maximum(np.ceil(angle / MOST_TURN), 1.0).astype(np.int64)
         if (pieces > 1).any():
             which = np.repeat(np.arange(len(start)), pieces)

@@ -16,6 +16,7 @@ import numpy as np
 from geometry.errors import ProgramError
 from geometry.mesh import F64
 from verify.attributes import (
+    FARTHEST,
     FLAG,
     Attributes,
     Checked,
@@ -33,9 +34,9 @@ from verify.attributes import (
     attributes,
     shown,
 )
-from verify.course import Course, Cutter
+from verify.course import MOST_DWELL, Course, Cutter
 from verify.part21 import Part21, Ref, Typed
-from verify.stepnc_arm import shape_of, tool_number
+from verify.stepnc_arm import sane_rates, shape_of, tool_number
 
 SCHEMAS = frozenset({"MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA", "INTEGRATED_CNC_SCHEMA"})
 _METHOD = {"name": Text(), "description": Text(), "consequence": Text(), "purpose": Text()}
@@ -183,6 +184,7 @@ _PREFIX = {None: 1.0, "KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CEN
            "MICRO": 1e-6, "NANO": 1e-9}
 _BASE = {"METRE": ("length", 1000.0), "SECOND": ("time", 1.0 / 60.0), "RADIAN": ("angle", 1.0),
          "STERADIAN": ("solid angle", 1.0)}  # mm and min
+_SMALLEST, _LARGEST, _MOST_POWER = 1e-12, 1e12, 3.0  # of units, and of one in another; those in use are far within
 _FEED, _SPEED = {"length": 1.0, "time": -1.0}, {"turn": 1.0, "time": -1.0}
 _SYMBOLS = {
     "priority": ("required", "suggested"),
@@ -387,7 +389,8 @@ class _Aim:
         if len(own) > 1:
             raise self.file.error(number, f"has {len(own)} MACHINING_TECHNOLOGY_RELATIONSHIP, one at most is due")
         if kind == "feedstop":
-            self.course.dwell += 60.0 * self._measure(number, "dwell", {"time": 1.0})
+            dwell = 60.0 * self._measure(number, "dwell", {"time": 1.0})
+            self.course.dwell += self.data.within(number, "'dwell', s", dwell, 0.0, MOST_DWELL)
             return
         tips, lines = self._curve(number, "basic curve", lengths=True)
         if "tool axis" in named:
@@ -411,8 +414,7 @@ class _Aim:
         if len(items) != 1:
             raise self.file.error(found[1], f", items: one POLYLINE expected, not {len(items)}")
         self.data.get(items[0], "POLYLINE")
-        points, lines = self.data.curve(items[0])
-        return points * (self._scale(found[1]) if lengths else 1.0), lines
+        return self.data.curve(items[0], self._scale(found[1]) if lengths else 1.0)
 
     def _scale(self, representation: int) -> float:
         """mm in the unit of the points of a representation."""
@@ -448,9 +450,11 @@ class _Aim:
             for element in self.data.refs(number, entity, "elements"):
                 inner, size = self._unit(self.data.ref(element, "DERIVED_UNIT_ELEMENT", "unit"))
                 exponent = self.data.real(element, "DERIVED_UNIT_ELEMENT", "exponent") or 0.0
+                self.data.within(element, "exponent", exponent, -_MOST_POWER, _MOST_POWER)
                 for dimension, power in inner.items():
                     dimensions[dimension] = dimensions.get(dimension, 0.0) + power * exponent
                 factor *= size**exponent
+        self.data.within(number, "the size of the unit in mm, min and turns", factor, _SMALLEST, _LARGEST)
         self.units[number] = dimensions, factor
         return dimensions, factor
 
@@ -480,10 +484,8 @@ class _Aim:
     def _rates(self, technology: int) -> tuple[float, float]:
         """mm/min and 1/min clockwise."""
         if technology not in self.rates:
-            feed = self._measure(technology, "feedrate", _FEED)
-            if not feed > 0.0:
-                raise self.file.error(technology, f"has the feedrate {feed:g} mm/min")
-            self.rates[technology] = feed, -self._measure(technology, "spindle", _SPEED)
+            feed, speed = (self._measure(technology, *of) for of in (("feedrate", _FEED), ("spindle", _SPEED)))
+            self.rates[technology] = sane_rates(self.data, technology, feed, -speed)
         return self.rates[technology]
 
     def _tools_by_operation(self) -> dict[int, int]:
@@ -522,6 +524,7 @@ class _Aim:
                 if dimensions != wanted:
                     raise self.file.error(item, f"'{name}' is in a unit of {dimensions or 'nothing'}, "
                                                 f"{wanted or 'nothing'} is due")
+                self.data.within(item, f"'{name}'", sizes[name], 0.0, FARTHEST)
         kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
         diameter = sizes.get("effective cutting diameter", 0.0)
         if not diameter > 0.0:

@@ -16,6 +16,7 @@ import numpy as np
 from geometry.errors import ProgramError
 from geometry.mesh import F64
 from verify.attributes import (
+    FARTHEST,
     FLAG,
     LOGICAL,
     Checked,
@@ -30,7 +31,7 @@ from verify.attributes import (
     Whole,
     attributes,
 )
-from verify.course import Course, Cutter
+from verify.course import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
 from verify.part21 import Part21, Ref, Typed, Value
 
 SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
@@ -110,7 +111,7 @@ TABLE: Table = {
     "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(("POLYLINE",)),
                                              its_toolaxis=Maybe(To(("POLYLINE",))),
                                              surface_normal=Maybe(To(("POLYLINE",)))),
-    "FEEDSTOP": attributes(**_PATH, dwell=Real()),
+    "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MOST_DWELL)),
     "MILLING_TECHNOLOGY": attributes(
         feedrate=Maybe(Real(0.0)), feedrate_reference=OneOf(("TCP", "CCP")), cutspeed=Maybe(Real(0.0)),
         spindle=Maybe(Real()), feedrate_per_tooth=Maybe(Real(0.0)), synchronize_spindle_with_feed=FLAG,
@@ -121,13 +122,13 @@ TABLE: Table = {
         oriented_spindle_stop=Maybe(To(("DIRECTION",))), its_process_model=Maybe(To()), other_functions=Many(To())),
     "MILLING_CUTTING_TOOL": attributes(
         its_id=Text(), its_tool_body=To(_CUTTERS), its_cutting_edge=Many(To(("CUTTING_COMPONENT",)), 1),
-        overall_assembly_length=Maybe(Real(0.0)), direction_for_spindle_orientation=Maybe(To(("DIRECTION",))),
+        overall_assembly_length=Maybe(Real(0.0, FARTHEST)), direction_for_spindle_orientation=Maybe(To(("DIRECTION",))),
         tool_holder_diameter_for_spindle_orientation=Maybe(Real())),
     **{name: attributes(**_BLADE) for name in _CUTTERS},
     "MILLING_TOOL_DIMENSION": attributes(
-        diameter=Real(0.0), tool_tip_half_angle=Maybe(Real()), tool_circumference_angle=Maybe(Real()),
-        cutting_edge_length=Maybe(Real(0.0)), edge_radius=Maybe(Real(-1e-9)), edge_center_vertical=Maybe(Real()),
-        edge_center_horizontal=Maybe(Real())),
+        diameter=Real(0.0, FARTHEST), tool_tip_half_angle=Maybe(Real()), tool_circumference_angle=Maybe(Real()),
+        cutting_edge_length=Maybe(Real(0.0, FARTHEST)), edge_radius=Maybe(Real(-1e-9, FARTHEST)),
+        edge_center_vertical=Maybe(Real()), edge_center_horizontal=Maybe(Real())),
     "CUTTING_COMPONENT": attributes(
         tool_offset_length=Real(), its_material=Maybe(To(("MATERIAL",))), technological_data=Maybe(To()),
         expected_tool_life=Maybe(Real(0.0)), its_technology=Maybe(To(("MILLING_TECHNOLOGY",)))),
@@ -328,7 +329,7 @@ class _Arm:
             raise self.file.error(technology, ", spindle: a real number, 1/s, expected; cutting speeds are not read")
         if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
             raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
-        return (math.nan if feed is None else feed * MM_MIN), -RPM * spindle
+        return sane_rates(self.data, technology, math.nan if feed is None else feed * MM_MIN, -RPM * spindle)
 
     def _cutter(self, number: int) -> Cutter:
         name = str(self.data.one(number, "MILLING_CUTTING_TOOL", "its_id"))
@@ -363,6 +364,13 @@ def tool_number(name: str) -> int | None:
     return int(found.group(1)) if found else None
 
 
+def sane_rates(data: Checked, technology: int, feed: float, speed: float) -> tuple[float, float]:
+    """Feed, mm/min, nan where none is said, and speed, 1/min; ProgramError where one is of a size no machine has."""
+    if not math.isnan(feed):
+        data.within(technology, "feedrate in mm/min", feed, LEAST_FEED, MOST_FEED)
+    return feed, data.within(technology, "spindle in 1/min", speed, -MOST_SPEED, MOST_SPEED)
+
+
 def shape_of(diameter: float, corner: float) -> str:
     """'ball', 'bull' or 'flat' by diameter and corner radius, mm."""
     if corner <= 0.0:
@@ -370,4 +378,4 @@ def shape_of(diameter: float, corner: float) -> str:
     return "ball" if corner >= 0.5 * diameter - 1e-6 else "bull"
 
 
-__all__ = ["SCHEMAS", "read_arm", "shape_of", "tool_number"]
+__all__ = ["SCHEMAS", "read_arm", "sane_rates", "shape_of", "tool_number"]
