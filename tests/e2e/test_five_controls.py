@@ -83,13 +83,23 @@ def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypa
 
     def lying(work, dialect):
         text = write(work, dialect)
-        return text.replace(" M8", " M9") if dialect.name == "haas" else text
+        return text.replace("\nM8\n", "\nM9\n") if dialect.name == "haas" else text
 
     monkeypatch.setattr(programs, "write_program", lying)
     with pytest.raises(InternalError) as refused:
         chain.plan(part, parse_setup(json.dumps(SETUP)), tmp_path, quiet)
     assert refused.value.code == "programs_differ" and refused.value.subjects == (NAMES["siemens"], NAMES["haas"])
     assert not list(tmp_path.glob("program*")) and not list(tmp_path.glob("*.stpnc"))
+
+
+@pytest.mark.parametrize("order", [["fanuc", "linuxcnc"], ["fanuc", "heidenhain", "haas"], ["fanuc"]], ids=str)
+def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
+    """In whatever order the machine names them; what it says is in the error bound."""
+    report = chain.plan(part, parse_setup(json.dumps({**SETUP, "machine": {"dialects": order}})), tmp_path, quiet)
+    assert report["state"] == "proved"
+    assert sorted(f["dialect"] for f in report["files"] if f["kind"] == "program") == sorted(order)
+    assert any("parameters of the machine" in note for note in report["proof"]["notes"])
+    assert (report["proof"]["error_bound_mm"] > 0.0015) == (len(order) > 1)
 
 
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
