@@ -96,6 +96,7 @@ class Workplan:
     part_mesh       : the part, faces by number, or None where nobody wants it written
     assemblies      : by T number; surfaces : by face number, in the frame of the plan, where strategies follow them
     ap238           : what the AP238 file is for
+    number, number_words : of the program, where a control tells programs apart by numbers, and what is said beside it
     """
 
     name: str
@@ -119,6 +120,8 @@ class Workplan:
     assemblies: Mapping[int, Assembly] = field(default_factory=dict)
     surfaces: Mapping[int, NurbsSurface] = field(default_factory=dict)
     ap238: Ap238 = Ap238.CC1
+    number: int = 1000
+    number_words: str = ""
 
     def assembly(self, tool: ToolBody) -> Assembly:
         """What is known of a tool; without more, it is as long as shank and holder stick out of the spindle."""

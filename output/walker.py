@@ -55,7 +55,8 @@ def write_program(plan: Workplan, dialect: Dialect) -> str:
     tolerance = decimal(path_tolerance(plan))
     walked = [] if plan.clamping is None else sections(plan)
     low, high = plan.stock.lower.tolist(), plan.stock.upper.tolist()
-    head = [*dialect.opening(plan.name, low, high), *_header(plan, dialect, zero, tolerance)]
+    head = [*dialect.opening(plan.name, low, high), *dialect.numbered(plan.number, plan.number_words),
+            *_header(plan, dialect, zero, tolerance)]
     if plan.clamping is not None:
         turning = _Turning(plan, dialect, zero, tolerance, plan.clamping)
         turning.run(walked)
@@ -207,7 +208,8 @@ class _Turning(_Walk):
 
     def run(self, walked: list[Section]) -> None:
         """All lines after the header."""
-        self.lines += self.dialect.comment("The spindle goes up to machine zero before the rotary axes turn to 0")
+        self.lines += self.dialect.comment("The spindle goes up to machine zero before the rotary axes turn to 0: Z0 "
+                                           "there is taken to be the top of its travel")
         if not self.plan.restart:
             self.lines += self._modes()
         for section in walked:
@@ -339,7 +341,8 @@ def label_number(plan: Workplan, step: Workingstep) -> int:
 def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
     low, high = plan.stock.lower, plan.stock.upper
     box = ", ".join(f"{a} {decimal(low[i], 3)} to {decimal(high[i], 3)}" for i, a in enumerate("XYZ"))
-    restart = ["Every step can be started at its label: it states tool, length, zero, speed and coolant again"]
+    restart = ["Every step can be started at its label: it states tool, length, zero, speed and coolant again",
+               "Start at a label only when all steps before it have been cut: no way was proved through their stock"]
     texts = [
         f"Program {plan.name}, zonemill {plan.version}, {d.title}, {_axes_words(plan)}",
         f"Part sha256 {plan.part_sha256[:16]}, setup sha256 {plan.setup_sha256[:16]}",
@@ -351,6 +354,7 @@ def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
         *_heights(plan, d),
         *(restart if plan.restart else ()),
         d.path(tolerance),
+        *d.needs,
         "Tools, all lengths in mm from the tip:",
         *(tool_name(t) for t in _tools_in_use(plan)),
         *plan.comments,

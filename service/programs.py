@@ -32,6 +32,7 @@ from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
+FIRST_NUMBER, PARTS, LAST_NUMBER = 1000, 100, 7000  # from 8000 on numbers may be locked
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
 
 
@@ -84,12 +85,23 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
-    work, out = replace(work, restart=machine.restart_points), []
+    index = [view.id for view in ready.views].index(access)
+    work, out = replace(work, restart=machine.restart_points, number_words=f"access {access} part 999"), []
     limit = machine.max_program_kb
     for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):
+        part = replace(part, number=program_number(index, k), number_words=f"access {access} part {k + 1}")
         texts = {d: write_program(part, control) for d, control in dialects.items()}
         out.append(Program(access, part, texts.pop(first), f"{end}.part{k + 1}" if k else end, turn, first, texts))
     return out
+
+
+def program_number(access: int, part: int) -> int:
+    """Four digits at most, from 1000 on, another for each part of each access; both count from 0.
+
+    >>> program_number(0, 0), program_number(2, 1), program_number(5, 99)
+    (1000, 1201, 1599)
+    """
+    return FIRST_NUMBER + (PARTS * access + part) % LAST_NUMBER
 
 
 def workplan(ready: Prepared, side: Side) -> Workplan:

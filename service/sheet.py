@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
+from output.dialects import DIALECTS, Switches
 from output.model import Workplan
 from output.walker import label_number, lowest_tip
 from schemas.setup import Setup
@@ -44,6 +45,7 @@ from service.sheettables import (
 )
 from service.sides import Look, Program
 from service.tooldrawing import draw_tool, svg_of
+from toolpath.motion import Workingstep
 
 ZONE_WORDS = (
     "A zone is what one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; SCZ: "
@@ -251,11 +253,19 @@ def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) 
         for s in p.work.steps:
             planned[s.id] = (s.access or p.access, s.top, s.bottom)
             if p.work.restart and report["state"] == "proved":
-                labels[s.id] = f"N{label_number(p.work, s)}"
+                labels[s.id] = _label(p, s)
     table = steps_table(report, planned, labels, {b.id: b.number for b in tool_bodies(setup)})
     note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
-    begun = ("A program can be started at the label of any step.",) if labels else ()
+    words = "A program can be started at the label of any step, when all steps before it have been cut."
+    begun = (words,) if labels else ()
     return Section("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
+
+
+def _label(program: Program, step: Workingstep) -> str:
+    """The label of a step on each control, told once where several have the same."""
+    said = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
+            for d, _, _ in program.files())
+    return ", ".join(dict.fromkeys(said))
 
 
 @cache

@@ -11,6 +11,7 @@ from schemas.setup import Setup
 from service.sheetmodel import Facts, Lines, Section, Table
 
 NONE = "-"
+SHORT_LABEL = 8  # characters of a label that fit into a narrow column
 SHORT_SHA = 16  # hex digits, as in the header of a program
 ZONE = re.compile(r"Z\d+\w*")
 OTHERS = {"other access": "another tool axis", "other process": "another process"}  # than milling along those at hand
@@ -155,7 +156,9 @@ def steps_table(report: Mapping[str, Any], planned: Mapping[str, tuple[str, floa
                      number(top), number(bottom), minutes(s["machining_time_s"])))
     heads = ("step", *(("label",) if labels else ()), "zones", "access", "what", "tool", "S 1/min", "F mm/min",
              "top Z", "bottom Z", "min")
-    widths = (1.0, *((1.0,) if labels else ()), 1.8, 1.1, 2.6, 1.2, 1.1, 1.1, 1.1, 1.2, 0.9)
+    longest = max(map(len, labels.values()), default=0)
+    wide = 1.0 if longest <= SHORT_LABEL else 2.0
+    widths = (1.0, *((wide,) if labels else ()), 1.8, 1.1, 2.6, 1.2, 1.1, 1.1, 1.1, 1.2, 0.9)
     return Table("Steps in the order they are run", heads, tuple(rows), widths,
                  frozenset(range(len(heads) - 5, len(heads))), none="No step: nothing could be cut.")
 

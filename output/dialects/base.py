@@ -53,6 +53,7 @@ class Dialect:
     zeros   : words for the zeros of ``ZEROS``, in that order
     path    : 'Path mode ...', what the header says of how far the control may leave the path
     bounds_path : whether a word of the program bounds it
+    needs   : what the header says of the machine that no word of the program sees to
     """
 
     name = title = ending = ""
@@ -61,6 +62,7 @@ class Dialect:
     length_words = "G43 H is the tool number"
     tcp_words = ""
     bounds_path = True
+    needs: tuple[str, ...] = ()
 
     def __init__(self, switches: Switches) -> None:
         self.switches = switches
@@ -104,6 +106,10 @@ class Dialect:
     def opening(self, name: str, low: Sequence[float], high: Sequence[float]) -> list[str]:
         """Before the header; corners of the stock box (3,), mm."""
         return ["%"]
+
+    def numbered(self, number: int, words: str) -> list[str]:
+        """Behind ``opening``: the number of the program and what it is, where the control has such numbers."""
+        return []
 
     def closing(self, name: str) -> list[str]:
         """After the last tool is put away."""

@@ -12,6 +12,9 @@ from __future__ import annotations
 
 from output.dialects.base import Dialect
 
+NAMED = 40
+"""Characters of what stands beside the number of a program."""
+
 
 class Fanuc(Dialect):
     """Comments in capitals, of the characters that all of them show."""
@@ -19,6 +22,8 @@ class Fanuc(Dialect):
     name, title, ending = "fanuc", "Fanuc", "nc"
     line = 72
     bounds_path = False
+    needs = ("Machine zero of Z is taken to be the top of its travel",
+             "Needed: parameters 1401#1 LRP 1 and, on five axes, 19696#5 WKP 0")
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G54.1 P1", "G54.1 P2", "G54.1 P3")
     tcp_words = "G43.4: the control keeps the tool tip on the part while axes turn; G49: it does not any more"
     tcp_word = "G43.4"
@@ -37,12 +42,17 @@ class Fanuc(Dialect):
         return f"Path mode {mode}: parameters of the machine say how far the control may leave the written path"
 
     def opening(self, name: str, low: object, high: object) -> list[str]:
-        """A program number of its own folder; % before it."""
-        return ["%", "O1000"]
+        """The number follows."""
+        return ["%"]
+
+    def numbered(self, number: int, words: str) -> list[str]:
+        """One file of a job would take the place of another in the control if they had the same."""
+        return [" ".join([f"O{number}", *self.comment(words[:NAMED])[:1 if words else 0]])]
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
         """The unit has a block of its own, and the length is given up at home."""
-        return ["G21", "G17 G90 G94 G40 G80 G64", *self.home(), "G49"]
+        slow = ["G05.1 Q0"] if self.switches.high_speed else []  # a run that was broken off may have left it on
+        return [*slow, "G21", "G17 G90 G94 G40 G80 G64", *self.home(), "G49"]
 
     def home(self) -> list[str]:
         """The spindle to its reference point, no other axis."""

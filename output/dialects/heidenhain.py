@@ -20,6 +20,7 @@ class Heidenhain(Dialect):
 
     name, title, ending = "heidenhain", "Heidenhain TNC", "h"
     zeros = tuple(f"preset {n}" for n in range(1, 10))
+    needs = ("Machine zero of Z is taken to be the top of its travel",)
     length_words = "TOOL CALL counts the length of the tool table"
     tcp_words = "M128: the control keeps the tool tip on the part while axes turn; M129: it does not any more"
 

@@ -16,6 +16,7 @@ class Siemens(Dialect):
 
     name, title, ending = "siemens", "Siemens 840D", "mpf"
     zeros = ("G54", "G55", "G56", "G57", "G505", "G506", "G507", "G508", "G509")
+    needs = ("Machine zero of Z is taken to be the top of its travel",)
     length_words = "D1 holds the length of its tool"
     tcp_words = "TRAORI: the control keeps the tool tip on the part while axes turn; TRAFOOF: it does not any more"
 

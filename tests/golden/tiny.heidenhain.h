@@ -12,30 +12,33 @@
 11 ; Clearance plane Z 25: above it rapids in XY are free
 12 ; Lowest Z of the tip 4.5
 13 ; Every step can be started at its label: it states tool, length, zero, speed and coolant again
-14 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm
-15 ; Tools, all lengths in mm from the tip:
-16 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-17 LBL "S01"
-18 CYCL DEF 32.0 TOLERANCE
-19 CYCL DEF 32.1 T0.001
-20 CYCL DEF 247 DATUM SETTING ~
+14 ; Start at a label only when all steps before it have been cut: no way was proved through their
+15 ; stock
+16 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm
+17 ; Machine zero of Z is taken to be the top of its travel
+18 ; Tools, all lengths in mm from the tip:
+19 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+20 LBL "S01"
+21 CYCL DEF 32.0 TOLERANCE
+22 CYCL DEF 32.1 T0.001
+23 CYCL DEF 247 DATUM SETTING ~
     Q339=+1 ;DATUM NUMBER
-21 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-22 TOOL CALL 1 Z S12000
-23 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
-24 M3
-25 M8
-26 L Z+25 R0 FMAX
-27 L X+0 Y+0 R0 FMAX
-28 L Z+6 R0 FMAX
-29 L Z+5 R0 F200
-30 L X+10 R0 F600
-31 L Y+2.5
-32 L X+0 Z+4.5
-33 L Z+6
-34 L Z+25 R0 FMAX
-35 M5
-36 M9
-37 L Z+0 R0 FMAX M91
-38 M30
-39 END PGM demo MM
+24 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+25 TOOL CALL 1 Z S12000
+26 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+27 M3
+28 M8
+29 L Z+25 R0 FMAX
+30 L X+0 Y+0 R0 FMAX
+31 L Z+6 R0 FMAX
+32 L Z+5 R0 F200
+33 L X+10 R0 F600
+34 L Y+2.5
+35 L X+0 Z+4.5
+36 L Z+6
+37 L Z+25 R0 FMAX
+38 M5
+39 M9
+40 L Z+0 R0 FMAX M91
+41 M30
+42 END PGM demo MM

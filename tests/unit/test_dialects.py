@@ -292,6 +292,19 @@ def test_a_tool_is_called_and_machine_zero_sought_with_m128_off():
                          kinematics=Kinematics("table-table-AC"))
 
 
+def test_programs_of_one_job_have_numbers_of_their_own():
+    work = replace(tiny(), number=1203, number_words="access A3 part 4, which is said in many more words than fit")
+    for dialect in ("fanuc", "haas"):
+        lines = write(work, dialect).splitlines()
+        assert lines[:2] == ["%", "O1203 (ACCESS A3 PART 4, WHICH IS SAID IN MANY)"]
+        assert not read(work, "\n".join(lines) + "\n", dialect).remarks
+
+
+def test_fast_contouring_is_off_before_a_step_is_begun():
+    text = write(JOBS["restart"], "fanuc", SHOPS["fast"])
+    assert len(re.findall(r"^N\d+\nG05\.1 Q0\nG21\n", text, flags=re.MULTILINE)) == len(JOBS["restart"].steps)
+
+
 def test_arcs_in_plain_language():
     """Half a circle round CC, back by the longer and by the shorter arc of a radius, and all the way round."""
     head = "BEGIN PGM A MM\nTOOL CALL 1 Z S900\nM3\nL X+0 Y+0 FMAX\nL Z+5 FMAX\nL Z-1 F90\n"

@@ -250,6 +250,22 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
         assert "Z25" not in standing.split("Tools in order of use")[0]
 
 
+def test_each_control_has_its_own_label():
+    setup, part = parse_setup(json.dumps(SETUP)), block()
+    view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
+    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
+                            view=lambda _name: view)
+    for others, told in (({"haas": "", "siemens": ""}, "N200, STEP_S02"), ({"siemens": "", "heidenhain": ""},
+                         'N200, STEP_S02, LBL "S02"'), ({"haas": ""}, "N200")):
+        written = [Program("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
+        files: Files = {name: ("program", d, "A1", b"G21\n") for d, name, _ in written[0].files()}
+        got = sheet_files(ready, written, report_of("proved", []), files)  # type: ignore[arg-type]
+        words = " ".join(" ".join(Page(got["sheet.html"][3].decode()).words).split())
+        assert told in words and ("STEP_S02" in words) == ("STEP" in told)
+        assert "when all steps before it have been cut" in words
+        assert "N200" in pdf_text(got["sheet.pdf"][3])
+
+
 def test_the_pdf_is_whole(proved):
     data = proved["sheet.pdf"]
     assert data.startswith(b"%PDF-1.") and data.rstrip().endswith(b"%%EOF")
