@@ -1,11 +1,14 @@
-"""What the command line is given: folders, programs, windows. Heavy imports stand inside, as in ``service.cli``."""
+"""What the command line is given, and its errors. Heavy imports stand inside, as in ``service.cli``."""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from schemas.setup import Setup
     from service.shown import MeshWish
 
@@ -113,3 +116,28 @@ def read_program(path: Path) -> str:
         raise ProgramError(f"the program {path.name} is empty", code="empty_program", measured=0, limit=1,
                            remedy="name the NC program that is to be proved")
     return text
+
+
+@contextmanager
+def reported(as_json: bool) -> Iterator[None]:
+    """Turn errors into a block or a problem document and the exit code of their class."""
+    import typer
+
+    from geometry.errors import CamError, CancelledError, InternalError
+    from service.console import report_error
+
+    try:
+        yield
+    except CamError as error:
+        raise typer.Exit(report_error(error, as_json=as_json)) from None
+    except KeyboardInterrupt:
+        raise typer.Exit(report_error(CancelledError("stopped by Ctrl-C"), as_json=as_json)) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        import traceback
+
+        traceback.print_exc()
+        bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
+                            remedy="please report it with part and setup")
+        raise typer.Exit(report_error(bug, as_json=as_json)) from None

@@ -85,6 +85,12 @@ def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def make_private(folder: Path) -> None:
+    """Make a folder that only this user can look into; one that is there keeps its mode."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+
+
 def sync_folder(folder: Path) -> None:
     """Flush a folder's entries to the disk."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -111,7 +117,8 @@ class Artifacts:
     def __init__(self, root: Path) -> None:
         self.root = root.resolve()
         self.tmp = self.root / "tmp"
-        self.tmp.mkdir(parents=True, exist_ok=True)
+        make_private(self.root)
+        self.tmp.mkdir(exist_ok=True)
 
     def blob(self, sha256: str) -> Path:
         """Where the blob of that hash lies."""

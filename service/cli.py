@@ -1,4 +1,4 @@
-"""``zonemill``: plan, zones, verify, serve, demo, family, warm, openapi.
+"""``zonemill``: plan, zones, verify, serve, keys, demo, family, warm, openapi.
 
 Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
 stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
@@ -9,22 +9,21 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program
+from service import keycommands
+from service.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from schemas.setup import Setup
     from service.console import Progress
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="From a STEP part of walls and internal connections to a proved milling job.")
+app.add_typer(keycommands.app, name="keys")
 
 Part = Annotated[Path, typer.Argument(metavar="PART.step", help="The part, a STEP file.", show_default=False)]
 SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
@@ -48,7 +47,7 @@ def plan(part: Part, setup: SetupPath,
         report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box), blank_path=blank)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
-    with _errors(as_json):
+    with reported(as_json):
         make_folder(out)
     _exit(part, setup, run, as_json)
 
@@ -96,7 +95,7 @@ def verify(part: Part, setup: SetupPath,
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     if out is not None:
-        with _errors(as_json):
+        with reported(as_json):
             make_folder(out, verification=True)
     _exit(part, setup, run, as_json)
 
@@ -105,13 +104,12 @@ def verify(part: Part, setup: SetupPath,
 def serve(host: Annotated[str | None, typer.Option(help="Address; default 127.0.0.1.")] = None,
           port: Annotated[int | None, typer.Option(help="Port; default 8000, 0 takes a free one.")] = None,
           data: Annotated[Path | None, typer.Option(help="Data folder; default ./data.")] = None,
-          insecure: Annotated[bool, typer.Option(help="Listen beyond loopback without tokens.")] = False,
           as_json: AsJson = False) -> None:
     """Serve the HTTP interface, engine included; every other setting comes from ZONEMILL_* variables."""
     from service.server import settings_with
 
-    given = {"host": host, "port": port, "data_dir": data, "insecure": insecure or None}
-    with _errors(as_json):
+    given = {"host": host, "port": port, "data_dir": data}
+    with reported(as_json):
         from service.server import run_server
 
         run_server(settings_with(given))
@@ -122,7 +120,7 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
          keep: Annotated[bool, typer.Option("--keep", help="Keep serving until Ctrl-C.")] = False,
          as_json: AsJson = False) -> None:
     """Make a sample part, post it to an embedded service, and fetch its files."""
-    with _errors(as_json):
+    with reported(as_json):
         from service.demo import run_demo
 
         code = run_demo(out, keep=keep)
@@ -140,7 +138,7 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
            reach: Annotated[bool, typer.Option("--reach", help="Compute what the setup can reach as well.")] = False,
            as_json: AsJson = False) -> None:
     """Write random test parts with truth: NAME.step, NAME.truth.json, NAME.setup.json; prints the list of files."""
-    with _errors(as_json):
+    with reported(as_json):
         from service.console import print_json, say
 
         make_folder(out)
@@ -155,7 +153,7 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 @app.command()
 def warm(as_json: AsJson = False) -> None:
     """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
-    with _errors(as_json):
+    with reported(as_json):
         from service.console import say
         from service.demo import run_warm
 
@@ -207,7 +205,7 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None], tuple[Any, int]],
           as_json: bool) -> None:
     """Run a command on part and setup, print its result and leave with its exit code."""
-    with _errors(as_json):
+    with reported(as_json):
         from geometry.step_text import check_text
         from service.console import Progress, print_json
         from service.convert import read_setup
@@ -222,29 +220,6 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None],
             progress.close()
         print_json(result)
         raise typer.Exit(code)
-
-
-@contextmanager
-def _errors(as_json: bool) -> Iterator[None]:
-    """Turn errors into a block or a problem document and the exit code of their class."""
-    from geometry.errors import CamError, CancelledError, InternalError
-    from service.console import report_error
-
-    try:
-        yield
-    except CamError as error:
-        raise typer.Exit(report_error(error, as_json=as_json)) from None
-    except KeyboardInterrupt:
-        raise typer.Exit(report_error(CancelledError("stopped by Ctrl-C"), as_json=as_json)) from None
-    except (typer.Exit, typer.Abort):
-        raise
-    except Exception as error:
-        import traceback
-
-        traceback.print_exc()
-        bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
-                            remedy="please report it with part and setup")
-        raise typer.Exit(report_error(bug, as_json=as_json)) from None
 
 
 def main() -> None:

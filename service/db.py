@@ -10,6 +10,8 @@ import sqlalchemy as sa
 from sqlalchemy import Column, Float, Integer, String, Text
 from sqlalchemy.engine import Engine
 
+from service.artifacts import make_private
+
 metadata = sa.MetaData()
 
 jobs = sa.Table(
@@ -49,6 +51,19 @@ library = sa.Table(
     Column("entry_json", Text, nullable=False),
 )
 
+api_keys = sa.Table(
+    "api_keys", metadata,
+    Column("id", String(16), primary_key=True),
+    Column("principal", String(64), nullable=False),
+    Column("scopes", String(64), nullable=False),
+    Column("secret_sha256", String(64), nullable=False),
+    Column("note", String(200), nullable=False),
+    Column("created", Float, nullable=False),
+    Column("expires", Float, nullable=True),
+    Column("revoked", Float, nullable=True),
+    Column("last_used", Float, nullable=True),
+)
+
 
 def connect(url: str) -> Engine:
     """An engine for a database URL; SQLite runs in WAL mode with full synchronisation.
@@ -80,7 +95,7 @@ def migrate(url: str) -> None:
     from alembic.config import Config
 
     if url.startswith("sqlite:///"):
-        Path(url.removeprefix("sqlite:///")).parent.mkdir(parents=True, exist_ok=True)
+        make_private(Path(url.removeprefix("sqlite:///")).parent)
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
     with connect(url).connect() as connection:

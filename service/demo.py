@@ -31,7 +31,7 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.chain") -> int:
     clear_results(out)
     with tempfile.TemporaryDirectory(prefix="zonemill-demo-") as folder:
         step, setup = (Path(p) for p in write_demo(Path(folder, "sample")))
-        settings = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": Path(folder, "data"), "tokens": {}})
+        settings = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": Path(folder, "data"), "auth": "auto"})
         configure("warning", settings.log_format)
         with background(settings, chain) as url:
             say(f"serving on {url}")

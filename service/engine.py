@@ -18,7 +18,8 @@ import structlog
 from geometry.errors import ResourceError, SetupError
 from service.artifacts import Artifacts
 from service.db import connect, migrate
-from service.settings import Settings
+from service.keys import KeyStore
+from service.settings import Settings, is_loopback
 from service.store import JobStore, LibraryStore
 from service.supervisor import Limits
 from service.work import WorkConfig, run_job
@@ -54,7 +55,8 @@ class Engine:
         Raises
         ------
         SetupError
-            Another service uses this data folder (code 'data_dir_in_use').
+            Another service uses this data folder (code 'data_dir_in_use'), or the address can be reached from other
+            machines and there is no key that would have to be shown (code 'exposed_without_key').
         """
         self.artifacts = Artifacts(self.settings.data_dir)
         embedded = self.settings.scheduler is None
@@ -63,6 +65,8 @@ class Engine:
         migrate(self.settings.url)
         self.jobs = JobStore(connect(self.settings.url))
         self.library = LibraryStore(connect(self.settings.url))
+        self.keys = KeyStore(connect(self.settings.url))
+        self._check_exposure()
         if embedded:
             self.artifacts.sweep()
             if left := self.jobs.release():
@@ -110,6 +114,19 @@ class Engine:
             raise RuntimeError("the dispatcher has stopped")
         if self.capacity() == 0:
             raise RuntimeError("no worker is connected")
+
+    def _check_exposure(self) -> None:
+        """Refuse to be reached from elsewhere while no key was ever made, unless told that keys will come."""
+        if is_loopback(self.settings.host) or self.keys.usable():
+            return
+        if self.settings.auth == "keys":
+            log.warning("there is no usable key: nobody gets in; zonemill keys create makes one")
+            return
+        if self._lock is not None:
+            self._lock.close()
+        raise SetupError(f"{self.settings.host} can be reached from other machines, and no usable key was made",
+                         code="exposed_without_key", subjects=(self.settings.host,),
+                         remedy="make a key with zonemill keys create, or listen on 127.0.0.1")
 
     def _lock_data_dir(self) -> None:
         self._lock = (self.settings.data_dir / "lock").open("w")

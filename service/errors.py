@@ -4,7 +4,8 @@
     └── ServiceError          something about the request, not about part or plan
         ├── NotFoundError         no such job, file, entry or path
         ├── MethodError           the path exists, the method does not
-        ├── UnauthorizedError     no token, or a wrong one
+        ├── UnauthorizedError     no key, or one that is wrong, revoked or expired
+        ├── ForbiddenError        the key is right, and may not do this
         ├── TooLargeError         the request body is larger than the limit
         ├── RequestError          the request is malformed: missing part, bad cursor
         ├── KeyConflictError      an Idempotency-Key used before with other content
@@ -25,9 +26,13 @@ from geometry.errors import CamError
 
 
 class ServiceError(CamError):
-    """Something about the request."""
+    """Something about the request. retry_after_s : when it is worth trying again; becomes the Retry-After header."""
 
     default_code = "bad_request"
+
+    def __init__(self, message: str, *, retry_after_s: int | None = None, **told: Any) -> None:
+        super().__init__(message, **told)
+        self.retry_after_s = retry_after_s
 
 
 class NotFoundError(ServiceError):
@@ -43,9 +48,15 @@ class MethodError(ServiceError):
 
 
 class UnauthorizedError(ServiceError):
-    """No bearer token, or a wrong one."""
+    """No key, or one that is wrong, revoked or expired."""
 
     default_code = "unauthorized"
+
+
+class ForbiddenError(ServiceError):
+    """The key is right, and may not do this."""
+
+    default_code = "forbidden"
 
 
 class TooLargeError(ServiceError):
@@ -118,7 +129,8 @@ ERROR_TABLE: dict[type[CamError], Mapping] = {
     ServiceError: Mapping(_S.BAD_REQUEST, "bad-request", "The request is wrong", 2),
     NotFoundError: Mapping(_S.NOT_FOUND, "not-found", "No such thing", 2),
     MethodError: Mapping(_S.METHOD_NOT_ALLOWED, "method-not-allowed", "This method is not offered here", 2),
-    UnauthorizedError: Mapping(_S.UNAUTHORIZED, "unauthorized", "A valid bearer token is needed", 2),
+    UnauthorizedError: Mapping(_S.UNAUTHORIZED, "unauthorized", "A valid key is needed", 2),
+    ForbiddenError: Mapping(_S.FORBIDDEN, "forbidden", "The key may not do this", 2),
     TooLargeError: Mapping(_S.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large", 2),
     RequestError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-request", "The request is wrong", 2),
     KeyConflictError: Mapping(_S.UNPROCESSABLE_ENTITY, "key-conflict", "The key was used for other content", 2),

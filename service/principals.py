@@ -1,9 +1,15 @@
-"""Who is asking: the owner of the bearer token, or 'local' when no tokens are set."""
+"""Who is asking: the principal of the key, or 'local' on loopback before the first key is made.
+
+What belongs to a principal is found by its name alone, so a route that takes ``Principal`` sees nothing of others.
+"""
 
 from __future__ import annotations
 
-import hmac
+import math
+import time
+from collections.abc import Callable
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
@@ -11,40 +17,82 @@ from limits import parse
 from limits.storage import MemoryStorage
 from limits.strategies import MovingWindowRateLimiter
 
-from service.errors import RateError, UnauthorizedError
-from service.settings import Settings
+from service.errors import ForbiddenError, RateError, UnauthorizedError
+from service.keys import ADMIN, METRICS, READ, SCOPES, SUBMIT, Identity
+from service.settings import Settings, is_loopback
 
-LOCAL = "local"
-bearer = HTTPBearer(auto_error=False, description="Needed when the service has tokens set.")
+LOCAL = Identity("local", frozenset(SCOPES))
+bearer = HTTPBearer(auto_error=False, description="A key from zonemill keys create. Needed beyond loopback, and as "
+                                                  "soon as there is one.")
 
 
-def principal(request: Request, given: Annotated[HTTPAuthorizationCredentials | None, Depends(bearer)]) -> str:
-    """Name of the token's owner.
+def keys_wanted(request: Request) -> bool:
+    """Whether this service asks for a key."""
+    settings: Settings = request.app.state.settings
+    return settings.auth == "keys" or not is_loopback(settings.host) or request.app.state.engine.keys.any()
+
+
+def identity(request: Request, given: Annotated[HTTPAuthorizationCredentials | None, Depends(bearer)]) -> Identity:
+    """Who is asking.
 
     Raises
     ------
     UnauthorizedError
-        Tokens are set and none of them was given.
+        A key is asked for and none was given, or one that is wrong, revoked or expired.
+    ForbiddenError
+        No key is asked for, and the request comes from a page of another site (code 'foreign_page').
     """
-    settings: Settings = request.app.state.settings
-    if not settings.tokens:
+    if not keys_wanted(request):
+        _refuse_foreign_pages(request)
         return LOCAL
     if given is None:
-        raise UnauthorizedError("a bearer token is needed", remedy="send Authorization: Bearer TOKEN")
-    sent = given.credentials.encode()
-    # Every token is compared, so that the time taken says nothing about which one came close.
-    matches = [name for name, token in settings.tokens.items()
-               if hmac.compare_digest(token.get_secret_value().encode(), sent)]
-    if not matches:
-        raise UnauthorizedError("the bearer token is not known", remedy="send a token of this service")
-    return matches[0]
+        raise UnauthorizedError("a key is needed", remedy="send Authorization: Bearer KEY")
+    found: Identity = request.app.state.engine.keys.identify(given.credentials)
+    return found
 
 
-Principal = Annotated[str, Depends(principal)]
+def _refuse_foreign_pages(request: Request) -> None:
+    """Without keys, whoever reaches the port is trusted, and a browser on this machine lends its reach to every page.
+
+    A name that was made to point to this machine shows in Host, a page of another site in Origin.
+    """
+    for header in ("host", "origin"):
+        text = request.headers.get(header)
+        if text is None and header == "origin":
+            continue
+        try:
+            name = urlsplit(str(text) if header == "origin" else f"//{text}").hostname or ""
+        except ValueError:
+            name = ""
+        if not is_loopback(name):
+            raise ForbiddenError(f"the {header.capitalize()} of the request is not this machine", code="foreign_page",
+                                 subjects=(header,), measured=ascii(text)[:200], limit="127.0.0.1, ::1 or localhost",
+                                 remedy="call the service by 127.0.0.1, or make a key: zonemill keys create")
+
+
+def _needs(*scopes: str) -> Callable[[Identity], str]:
+    """Dependency that wants one of these scopes and gives the name of the principal."""
+
+    def check(who: Annotated[Identity, Depends(identity)]) -> str:
+        if scopes and not who.scopes & set(scopes):
+            raise ForbiddenError(f"the key {who.key_id} has not the scope {' or '.join(scopes)}", code="scope_missing",
+                                 subjects=(str(who.key_id),), measured=sorted(who.scopes), limit=list(scopes),
+                                 remedy=f"ask for a key with the scope {scopes[0]}")
+        return who.principal
+
+    return check
+
+
+Who = Annotated[Identity, Depends(identity)]
+Principal = Annotated[str, Depends(_needs(READ))]
+Submitter = Annotated[str, Depends(_needs(SUBMIT))]
+Admin = Annotated[str, Depends(_needs(ADMIN))]
+Watcher = Annotated[str, Depends(_needs(METRICS, ADMIN))]
+Anybody = Annotated[str, Depends(_needs())]
 
 
 class PostRate:
-    """Counts the submissions of each principal."""
+    """Counts the submissions of each principal, in this process."""
 
     def __init__(self, rate: str) -> None:
         self.rate, self.limiter = parse(rate), MovingWindowRateLimiter(MemoryStorage())
@@ -55,12 +103,14 @@ class PostRate:
         Raises
         ------
         RateError
-            There were too many.
+            There were too many; it says when the next will be taken.
         """
         if not self.limiter.hit(self.rate, name):
-            raise RateError(f"more than {self.rate} submissions", limit=str(self.rate), remedy="wait a little")
+            wait = self.limiter.get_window_stats(self.rate, name).reset_time - time.time()
+            raise RateError(f"more than {self.rate} submissions", limit=str(self.rate), remedy="wait a little",
+                            retry_after_s=max(1, math.ceil(wait)))
 
 
-def submission_rate(request: Request, name: Principal) -> None:
+def submission_rate(request: Request, name: Submitter) -> None:
     """Dependency of every route that queues a job."""
     request.app.state.post_rate.check(name)

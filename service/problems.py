@@ -17,6 +17,7 @@ from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
 from service.convert import sentence
 from service.errors import (
     ERROR_TABLE,
+    ForbiddenError,
     MethodError,
     NotFoundError,
     RateError,
@@ -24,6 +25,7 @@ from service.errors import (
     ServiceError,
     TooLargeError,
     UnauthorizedError,
+    UnavailableError,
     problem_document,
 )
 from service.head import is_stream
@@ -43,8 +45,8 @@ def problem_response(request: Request, error: CamError, headers: dict[str, str] 
     extra = dict(headers or {})
     if isinstance(error, UnauthorizedError):
         extra["WWW-Authenticate"] = "Bearer"
-    if isinstance(error, RateError):
-        extra["Retry-After"] = "5"
+    if isinstance(error, RateError | UnavailableError):
+        extra["Retry-After"] = str(error.retry_after_s or 5)
     return JSONResponse(body, body["status"], extra, PROBLEM_MEDIA_TYPE)
 
 
@@ -66,7 +68,7 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
     limit = request.app.state.settings.max_body_bytes
     text = str(error.detail)
     named: dict[int, CamError] = {
-        401: UnauthorizedError(text, remedy="send Authorization: Bearer TOKEN"),
+        401: UnauthorizedError(text, remedy="send Authorization: Bearer KEY"),
         404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path",
                            remedy="GET /openapi.json lists the paths"),
         405: MethodError(f"{request.method} is not offered at {request.url.path}",
@@ -107,9 +109,12 @@ async def _unexpected(request: Request, error: Exception) -> JSONResponse:
 
 
 def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:
-    """The ``responses=`` of a route that may raise these errors, for the OpenAPI document."""
+    """The ``responses=`` of a route that may raise these errors, for the OpenAPI document.
+
+    Where a key is asked for, one without the scope is refused too.
+    """
     found: dict[int | str, dict[str, Any]] = {}
-    for kind in kinds:
+    for kind in (*kinds, *([ForbiddenError] if UnauthorizedError in kinds else [])):
         row = ERROR_TABLE[kind]
         entry = found.setdefault(int(row.status), {
             "description": row.title,

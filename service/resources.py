@@ -14,6 +14,7 @@ from sqlalchemy.engine import RowMapping
 
 from geometry.errors import error_from_dict
 from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks
+from schemas.keys import Key
 from schemas.problem import Problem
 from service.artifacts import Artifacts
 from service.errors import NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
@@ -48,6 +49,13 @@ def job_resource(row: RowMapping) -> Job:
                setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
                finished_at=_time(row["finished"]), error=error, links=links)
+
+
+def key_resource(row: RowMapping) -> Key:
+    """A key as the interface shows it, without its secret and the hash of that."""
+    return Key(id=row["id"], principal=row["principal"], scopes=row["scopes"].split(","), note=row["note"],
+               created_at=_time(row["created"]) or "", expires_at=_time(row["expires"]),
+               revoked_at=_time(row["revoked"]), last_used_at=_time(row["last_used"]))
 
 
 def event_data(row: RowMapping) -> str:

@@ -85,10 +85,9 @@ def run_server(settings: Settings) -> None:
     Raises
     ------
     SetupError
-        Port in use, data folder in use, or exposed without tokens.
+        Port in use, data folder in use, or exposed without keys.
     """
     configure(settings.log_level, settings.log_format)
-    settings.check_exposure()
     listener = _listen(settings.host, settings.port)
     host, port = listener.getsockname()[:2]
     log.info("serving", url=f"http://{host}:{port}", data=str(settings.data_dir), pid=os.getpid())
@@ -117,7 +116,6 @@ def background(settings: Settings, chain: str = "service.chain") -> Iterator[str
     UnavailableError
         The service did not start.
     """
-    settings.check_exposure()
     listener = _listen(settings.host, settings.port)
     server = _server(settings, chain)
     thread = threading.Thread(target=_run_quietly, args=(server, listener), name="server", daemon=True)

@@ -10,10 +10,8 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
-
-from geometry.errors import SetupError
 
 
 def _cores() -> int:
@@ -44,9 +42,8 @@ class Settings(BaseSettings):
     lease_s: Annotated[float, Field(gt=0, description="How long a silent worker keeps a job, s.")] = 20.0
     poll_s: Annotated[float, Field(gt=0, le=5, description="How often cancel and progress are looked at, s.")] = 0.2
     max_body_mb: Annotated[float, Field(gt=0, description="Largest request body, MB.")] = 256.0
-    tokens: Annotated[dict[str, SecretStr], Field(
-        description="Bearer tokens by principal, as JSON: {\"alice\": \"...\"}; empty: no token is asked for.")] = {}
-    insecure: Annotated[bool, Field(description="Listen beyond loopback without tokens.")] = False
+    auth: Annotated[Literal["auto", "keys"], Field(
+        description="keys: a key is always asked for; auto: not on loopback until the first key is made.")] = "auto"
     post_rate: Annotated[str, Field(description="Most job submissions of a principal, for example 120/minute.")
                          ] = "120/minute"
     log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Least level logged.")
@@ -89,20 +86,6 @@ class Settings(BaseSettings):
     def max_body_bytes(self) -> int:
         """Largest request body, bytes."""
         return int(self.max_body_mb * 1_000_000)
-
-    def check_exposure(self) -> None:
-        """Refuse to listen beyond loopback without tokens unless ``insecure`` says so.
-
-        Raises
-        ------
-        SetupError
-            Code 'exposed_without_token'.
-        """
-        if self.tokens or self.insecure or is_loopback(self.host):
-            return
-        raise SetupError(f"{self.host} can be reached from other machines, and no bearer token is set",
-                         code="exposed_without_token", subjects=(self.host,),
-                         remedy="set ZONEMILL_TOKENS, listen on 127.0.0.1, or say --insecure")
 
 
 def is_loopback(host: str) -> bool:

@@ -21,13 +21,14 @@ from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
 from service.errors import NotFoundError, RequestError, UnauthorizedError
-from service.principals import Principal
+from service.principals import Principal, Who
 from service.problems import responses
 from service.resources import event_data
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 KEEP_ALIVE_S = 10.0
+KEY_LOOK_S = 5.0
 STREAM: dict[int | str, dict[str, Any]] = {
     200: {"description": "Events 'progress' and, once, 'end'; data is a JobEvent.",
           "content": {"text/event-stream": {"schema": {"type": "string"}}}},
@@ -36,7 +37,7 @@ STREAM: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,
             responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError))
-async def follow(request: Request, principal: Principal, job_id: str,
+async def follow(request: Request, principal: Principal, who: Who, job_id: str,
                  last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=20)] = None) -> Response:
     """Progress of a job until it ends."""
     row = await run_in_threadpool(request.app.state.engine.jobs.get, job_id, principal)
@@ -44,11 +45,12 @@ async def follow(request: Request, principal: Principal, job_id: str,
     seen = int(last) if last is not None and last.isascii() and last.isdecimal() else -1
     if row["state"] in FINAL_STATES and row["event_seq"] == seen:
         return Response(status_code=204)
-    return StreamingResponse(_stream(request, row, seen), media_type="text/event-stream",
+    return StreamingResponse(_stream(request, row, seen, who.key_id), media_type="text/event-stream",
                              headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
 
 
-async def _stream(request: Request, row: RowMapping, seen: int) -> AsyncIterator[bytes]:
+async def _stream(request: Request, row: RowMapping, seen: int, key_id: str | None) -> AsyncIterator[bytes]:
+    keys, looked = request.app.state.engine.keys, time.monotonic()
     jobs, interval = request.app.state.engine.jobs, max(0.2, request.app.state.settings.poll_s)
     stopping: threading.Event = request.app.state.stopping
     spoken = time.monotonic()
@@ -63,4 +65,8 @@ async def _stream(request: Request, row: RowMapping, seen: int) -> AsyncIterator
         if final or stopping.is_set():
             return
         await asyncio.sleep(interval)
+        if key_id is not None and time.monotonic() - looked > KEY_LOOK_S:
+            looked = time.monotonic()
+            if not await run_in_threadpool(keys.is_live, key_id):
+                return  # revoked or expired: who comes back is asked again
         row = await run_in_threadpool(jobs.get, row["id"])

@@ -8,7 +8,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from schemas.jobs import Health
 from service.errors import UnauthorizedError
-from service.principals import Principal
+from service.principals import Watcher
 from service.problems import responses
 
 router = APIRouter(tags=["operation"])
@@ -32,7 +32,7 @@ def readyz(request: Request, response: Response) -> Health:
 
 @router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse,
             responses=responses(UnauthorizedError))
-def metrics(request: Request, _: Principal) -> Response:
+def metrics(request: Request, _: Watcher) -> Response:
     """Counters in the Prometheus text format."""
     text = request.app.state.metrics.render(request.app.state.engine)
     return Response(text, media_type=CONTENT_TYPE_LATEST)

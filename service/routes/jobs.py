@@ -11,7 +11,7 @@ from schemas.jobs import Job, JobFiles, JobKind, JobPage, JobState
 from schemas.report import Report, Verification
 from schemas.zones import Zones
 from service.errors import NotFoundError, NotReadyError, RequestError, UnauthorizedError, WithheldError
-from service.principals import Principal
+from service.principals import Principal, Submitter
 from service.problems import responses
 from service.resources import (
     decode_cursor,
@@ -51,7 +51,7 @@ def get_job(request: Request, principal: Principal, job_id: str) -> Job:
 
 
 @router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job", responses=ONE)
-def cancel_job(request: Request, principal: Principal, job_id: str) -> Job:
+def cancel_job(request: Request, principal: Submitter, job_id: str) -> Job:
     """Cancel a job that has not ended; one that has ended is answered as it is."""
     jobs = request.app.state.engine.jobs
     jobs.get(job_id, principal)

@@ -16,7 +16,7 @@ from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material
 from schemas.tools import Tool
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
-from service.principals import Principal
+from service.principals import Principal, Submitter
 from service.problems import responses
 
 router = APIRouter(prefix="/v1", tags=["libraries"])
@@ -48,14 +48,14 @@ def get_tool(request: Request, _: Principal, name: Name) -> ToolEntry:
 
 
 @router.put("/tools/{name}", operation_id="putTool", responses=WRITE)
-def put_tool(request: Request, response: Response, _: Principal, name: Name, tool: Tool) -> ToolEntry:
+def put_tool(request: Request, response: Response, _: Submitter, name: Name, tool: Tool) -> ToolEntry:
     """Write a tool, new or over the old one."""
     _put(request, response, "tools", name, tool)
     return ToolEntry(name=name, entry=tool)
 
 
 @router.delete("/tools/{name}", operation_id="deleteTool", status_code=204, responses=ONE)
-def delete_tool(request: Request, _: Principal, name: Name) -> None:
+def delete_tool(request: Request, _: Submitter, name: Name) -> None:
     """Remove a tool."""
     request.app.state.engine.library.delete("tools", name)
 
@@ -75,14 +75,14 @@ def get_machine(request: Request, _: Principal, name: Name) -> MachineEntry:
 
 
 @router.put("/machines/{name}", operation_id="putMachine", responses=WRITE)
-def put_machine(request: Request, response: Response, _: Principal, name: Name, machine: Machine) -> MachineEntry:
+def put_machine(request: Request, response: Response, _: Submitter, name: Name, machine: Machine) -> MachineEntry:
     """Write a machine, new or over the old one."""
     _put(request, response, "machines", name, machine)
     return MachineEntry(name=name, entry=machine)
 
 
 @router.delete("/machines/{name}", operation_id="deleteMachine", status_code=204, responses=ONE)
-def delete_machine(request: Request, _: Principal, name: Name) -> None:
+def delete_machine(request: Request, _: Submitter, name: Name) -> None:
     """Remove a machine."""
     request.app.state.engine.library.delete("machines", name)
 
@@ -106,13 +106,13 @@ def get_material(request: Request, _: Principal, name: MaterialName) -> Material
 
 
 @router.put("/materials/{name}", operation_id="putMaterial", responses=WRITE)
-def put_material(request: Request, response: Response, _: Principal, name: Name, material: Material) -> MaterialEntry:
+def put_material(request: Request, response: Response, _: Submitter, name: Name, material: Material) -> MaterialEntry:
     """Write a material, new or over the old one."""
     _put(request, response, "materials", name, material)
     return MaterialEntry(name=name, entry=material)
 
 
 @router.delete("/materials/{name}", operation_id="deleteMaterial", status_code=204, responses=ONE)
-def delete_material(request: Request, _: Principal, name: Name) -> None:
+def delete_material(request: Request, _: Submitter, name: Name) -> None:
     """Remove a material from the library."""
     request.app.state.engine.library.delete("materials", name)

@@ -19,7 +19,7 @@ from service.errors import (
     UnauthorizedError,
     UnavailableError,
 )
-from service.principals import Principal, submission_rate
+from service.principals import Submitter, submission_rate
 from service.problems import responses
 from service.resources import job_resource, path_of
 from service.uploads import new_job, read_form
@@ -80,14 +80,14 @@ async def _submit(request: Request, response: Response, kind: str, principal: st
 
 @router.post("/jobs", status_code=status.HTTP_202_ACCEPTED, operation_id="createJob", summary="Plan and prove a part",
              responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
-async def create_job(request: Request, response: Response, principal: Principal, key: IdempotencyKey = None) -> Job:
+async def create_job(request: Request, response: Response, principal: Submitter, key: IdempotencyKey = None) -> Job:
     """Queue the whole chain: zones, tool paths, program, proof."""
     return await _submit(request, response, "plan", principal, key)
 
 
 @router.post("/zones", status_code=status.HTTP_202_ACCEPTED, operation_id="createZones", summary="Dry check of a part",
              responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
-async def create_zones(request: Request, response: Response, principal: Principal,
+async def create_zones(request: Request, response: Response, principal: Submitter,
                        key: IdempotencyKey = None) -> Job:
     """Queue the decomposition alone: reach, remainder, the tool to buy."""
     return await _submit(request, response, "zones", principal, key)
@@ -95,7 +95,7 @@ async def create_zones(request: Request, response: Response, principal: Principa
 
 @router.post("/verifications", status_code=status.HTTP_202_ACCEPTED, operation_id="createVerification",
              summary="Prove a program", responses=ACCEPTED | ERRORS, openapi_extra=multipart(True))
-async def create_verification(request: Request, response: Response, principal: Principal,
+async def create_verification(request: Request, response: Response, principal: Submitter,
                               key: IdempotencyKey = None) -> Job:
     """Queue the proof of a program, also a foreign one, against part and setup."""
     return await _submit(request, response, "verify", principal, key)

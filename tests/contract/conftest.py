@@ -13,6 +13,7 @@ from service.logs import configure
 from service.settings import Settings
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
+HERE = "http://127.0.0.1:8000"  # without keys the service answers to the names of this machine only
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,8 @@ def make_client(fake_path, tmp_path):
     def start(**settings):
         values = {"data_dir": tmp_path / "data", "workers": 1, "child_threads": 1, "poll_s": 0.05,
                   "job_time_limit_s": 20, "post_rate": "10000/minute", **settings}
-        client = TestClient(create_app(Settings(**values), chain="fake_chain"), raise_server_exceptions=False)
+        client = TestClient(create_app(Settings(**values), chain="fake_chain"), base_url=HERE,
+                            raise_server_exceptions=False)
         client.__enter__()
         opened.append(client)
         return client
@@ -47,8 +49,19 @@ def client(fake_path, tmp_path_factory):
     settings = Settings(data_dir=tmp_path_factory.mktemp("data"), workers=1, child_threads=1, poll_s=0.05,
                         job_time_limit_s=20, job_memory_limit_mb=400, max_body_mb=2, post_rate="10000/minute")
     app = create_app(settings, chain="fake_chain")
-    with TestClient(app, raise_server_exceptions=False) as found:
+    with TestClient(app, base_url=HERE, raise_server_exceptions=False) as found:
         yield found
+
+
+@pytest.fixture
+def bearer():
+    """Headers of a new key: (client, principal, *scopes, days) -> headers."""
+
+    def make(client, principal, *scopes, days=None):
+        text, _ = client.app.state.engine.keys.make(principal, scopes or ("submit", "read"), days)
+        return {"Authorization": f"Bearer {text}"}
+
+    return make
 
 
 @pytest.fixture

@@ -1,36 +1,13 @@
-"""Tokens, rates, libraries, health and metrics."""
+"""Rates, libraries, health and metrics; keys are tested in test_service_keys.py."""
 
 TOOL = {"id": "T7", "kind": "flat", "diameter_mm": 4}
-
-
-def _bearer(token):
-    return {"Authorization": f"Bearer {token}"}
-
-
-def test_with_tokens_set_nobody_gets_in_without_one_or_sees_others_jobs(make_client, post):
-    client = make_client(tokens={"ada": "aaa", "bob": "bbb"})
-    for headers in ({}, _bearer("ccc"), {"Authorization": "Basic x"}):
-        for path in ("/v1/jobs", "/v1/tools", "/metrics"):
-            answer = client.get(path, headers=headers)
-            assert answer.status_code == 401 and answer.headers["www-authenticate"] == "Bearer"
-            assert answer.json()["code"] == "unauthorized"
-    assert post(client, "").status_code == 401
-    assert client.get("/healthz").status_code == client.get("/readyz").status_code == 200
-    job = post(client, "sleep", key="k", headers=_bearer("aaa")).json()
-    assert client.get(job["links"]["self"], headers=_bearer("aaa")).status_code == 200
-    for method, path in (("GET", ""), ("DELETE", ""), ("GET", "/events"), ("GET", "/files")):
-        answer = client.request(method, job["links"]["self"] + path, headers=_bearer("bbb"))
-        assert answer.status_code == 404
-    assert client.get("/v1/jobs", headers=_bearer("bbb")).json()["items"] == []
-    other = post(client, "", key="k", headers=_bearer("bbb"))  # keys are per principal
-    assert other.status_code == 202 and other.json()["id"] != job["id"]
 
 
 def test_too_many_submissions(make_client, post):
     client = make_client(post_rate="2/minute")
     assert [post(client, "sleep").status_code for _ in range(3)] == [202, 202, 429]
     answer = post(client, "sleep")
-    assert answer.json()["code"] == "too_many_requests" and answer.headers["retry-after"]
+    assert answer.json()["code"] == "too_many_requests" and 50 < int(answer.headers["retry-after"]) <= 61
     assert client.get("/v1/jobs").status_code == 200
 
 

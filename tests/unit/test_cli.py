@@ -124,12 +124,41 @@ def test_missing_files_are_bad_input(files):
     assert got.exit_code == 2 and "out_not_writable" in got.stderr
 
 
-def test_serve_refuses_to_be_reached_from_outside_without_a_token(files, monkeypatch):
-    monkeypatch.delenv("ZONEMILL_TOKENS", raising=False)
+def test_serve_refuses_to_be_reached_from_outside_without_a_key(files, monkeypatch):
+    monkeypatch.delenv("ZONEMILL_AUTH", raising=False)
     got = call("serve", "--host", "0.0.0.0", "--port", "0", "--data", files / "data")
-    assert got.exit_code == 2 and "exposed_without_token" in got.stderr
+    assert got.exit_code == 2 and "exposed_without_key" in got.stderr
     got = call("serve", "--port", "70000")
     assert got.exit_code == 2 and "bad_setting" in got.stderr
+
+
+def test_keys_are_made_listed_and_revoked(files, monkeypatch):
+    monkeypatch.delenv("ZONEMILL_DATABASE_URL", raising=False)
+    data = ("--data", files / "data")
+    made = call("keys", "create", "--principal", "mes", "--scopes", "submit, read", "--note", "night shift", *data)
+    key = json.loads(made.stdout)
+    assert made.exit_code == 0 and key["key"].startswith(f"zm_{key['id']}_") and key["scopes"] == ["submit", "read"]
+    assert key["expires_at"] and (files / "data").stat().st_mode & 0o077 == 0
+    secret = key["key"].rsplit("_", 1)[-1]
+    assert all(secret.encode() not in p.read_bytes() for p in (files / "data").rglob("*") if p.is_file())
+    call("keys", "create", "--principal", "ops", "--scopes", "admin", "--days", 0, *data)
+    listed = call("keys", "list", *data)
+    assert secret not in listed.stdout
+    assert [(k["principal"], k["expires_at"] is None, k["revoked_at"]) for k in json.loads(listed.stdout)] == [
+        ("mes", False, None), ("ops", True, None)]
+    assert call("keys", "revoke", key["id"], *data).exit_code == 0
+    assert json.loads(call("keys", "list", *data).stdout)[0]["revoked_at"]
+    got = call("keys", "revoke", "nonesuch", *data)
+    assert got.exit_code == 2 and "no_such_key" in got.stderr
+
+
+@pytest.mark.parametrize(("args", "code"), [
+    (("--principal", "a b"), "bad_principal"), (("--principal", "x" * 65), "bad_principal"),
+    (("--principal", "a\nb"), "bad_principal"), (("--principal", "a", "--scopes", "root"), "bad_scope"),
+    (("--principal", "a", "--scopes", ""), "bad_scope"), (("--principal", "a", "--days", "1e9"), "bad_expiry")])
+def test_a_key_that_makes_no_sense_is_not_made(files, args, code):
+    got = call("keys", "create", *args, "--data", files / "data")
+    assert got.exit_code == 2 and code in got.stderr and got.stdout == ""
 
 
 def test_help_imports_nothing_heavy():

@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 
 from geometry.errors import SetupError
+from service.db import connect, migrate
+from service.engine import Engine
+from service.keys import KeyStore
 from service.server import settings_with
 from service.settings import Settings, is_loopback
 
@@ -23,27 +26,35 @@ def test_every_setting_stands_in_the_page_with_its_meaning():
 
 def test_the_environment_is_read(monkeypatch, tmp_path):
     monkeypatch.setenv("ZONEMILL_PORT", "9001")
-    monkeypatch.setenv("ZONEMILL_TOKENS", '{"ada": "secret"}')
     found = Settings(data_dir=tmp_path)
-    assert found.port == 9001 and found.tokens["ada"].get_secret_value() == "secret" and "secret" not in repr(found)
+    assert found.port == 9001
     assert found.url == f"sqlite:///{tmp_path}/zonemill.db"
 
 
 @pytest.mark.parametrize(("host", "refused"), [("127.0.0.1", False), ("::1", False), ("localhost", False),
                                                ("0.0.0.0", True), ("10.0.0.7", True), ("example.org", True)])
-def test_beyond_loopback_a_token_is_needed(host, refused, monkeypatch):
-    monkeypatch.delenv("ZONEMILL_TOKENS", raising=False)
+def test_beyond_loopback_a_key_is_needed(host, refused, tmp_path):
     assert is_loopback(host) is not refused
-    if refused:
-        with pytest.raises(SetupError, match="bearer token"):
-            Settings(host=host).check_exposure()
-        Settings(host=host, insecure=True).check_exposure()
-        Settings(host=host, tokens={"a": "b"}).check_exposure()
-    else:
-        Settings(host=host).check_exposure()
+    engine = Engine(Settings(host=host, data_dir=tmp_path), "none")
+    migrate(engine.settings.url)
+    engine.keys = KeyStore(connect(engine.settings.url))
+    if not refused:
+        engine._check_exposure()
+        return
+    with pytest.raises(SetupError, match="no usable key") as caught:
+        engine._check_exposure()
+    assert caught.value.code == "exposed_without_key"
+    told = Engine(Settings(host=host, data_dir=tmp_path, auth="keys"), "none")
+    told.keys = engine.keys
+    told._check_exposure()  # it starts, and lets nobody in
+    _, row = engine.keys.make("ada", ["read"], days=1)
+    engine._check_exposure()
+    engine.keys.revoke(row["id"])
+    with pytest.raises(SetupError):
+        engine._check_exposure()
 
 
-@pytest.mark.parametrize(("name", "value"), [("ZONEMILL_TOKENS", "alice"), ("ZONEMILL_POST_RATE", "often"),
+@pytest.mark.parametrize(("name", "value"), [("ZONEMILL_AUTH", "off"), ("ZONEMILL_POST_RATE", "often"),
                                              ("ZONEMILL_POST_RATE", "0/minute"), ("ZONEMILL_PORT", "http"),
                                              ("ZONEMILL_DATABASE_URL", "nowhere"),
                                              ("ZONEMILL_DATABASE_URL", "nosuch://u:hidden@host/db")])

@@ -1,0 +1,64 @@
+"""``zonemill keys``: make, list and revoke API keys, in the database the service uses. Heavy imports stand inside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.arguments import reported
+
+if TYPE_CHECKING:
+    from service.keys import KeyStore
+
+app = typer.Typer(no_args_is_help=True, help="API keys of the service: make, list, revoke.")
+
+Data = Annotated[Path | None, typer.Option("--data", help="Data folder; default ./data. ZONEMILL_DATABASE_URL counts "
+                                                          "as it does for serve.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
+
+
+@app.command()
+def create(principal: Annotated[str, typer.Option(help="Whose key it is; jobs belong to this name.")],
+           scopes: Annotated[str, typer.Option(help="Of submit, read, admin, metrics, with commas.")] = "submit,read",
+           days: Annotated[float, typer.Option(min=0, help="Days until it expires; 0 for never.")] = 365.0,
+           note: Annotated[str, typer.Option(help="What it is for.")] = "", data: Data = None,
+           as_json: AsJson = False) -> None:
+    """Make a key and print it; it is told this once and cannot be shown again."""
+    with reported(as_json):
+        from service.console import print_json
+        from service.resources import key_resource
+
+        text, row = _store(data).make(principal, [s.strip() for s in scopes.split(",")], days or None, note)
+        print_json({"key": text, **key_resource(row).model_dump()})
+
+
+@app.command("list")
+def list_keys(data: Data = None, as_json: AsJson = False) -> None:
+    """Print every key without its secret."""
+    with reported(as_json):
+        from service.console import print_json
+        from service.resources import key_resource
+
+        print_json([key_resource(row).model_dump() for row in _store(data).all()])
+
+
+@app.command()
+def revoke(key_id: Annotated[str, typer.Argument(metavar="ID", help="As zonemill keys list shows it.")],
+           data: Data = None, as_json: AsJson = False) -> None:
+    """End a key now; open event streams of its holder end within seconds."""
+    with reported(as_json):
+        _store(data).revoke(key_id)
+
+
+def _store(data: Path | None) -> KeyStore:
+    """The keys in the database of the settings; it is made where there is none."""
+    from service.db import connect, migrate
+    from service.keys import KeyStore
+    from service.server import settings_with
+
+    given: dict[str, Any] = {"data_dir": data}
+    url = settings_with(given).url
+    migrate(url)
+    return KeyStore(connect(url))

@@ -1,0 +1,42 @@
+"""/v1/keys: API keys, for holders of the scope admin."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import structlog
+from fastapi import APIRouter, Path, Request, status
+
+from schemas.keys import KeyList, MadeKey, NewKey
+from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
+from service.principals import Admin
+from service.problems import responses
+from service.resources import key_resource
+
+log = structlog.get_logger(__name__)
+router = APIRouter(prefix="/v1/keys", tags=["keys"])
+
+KeyId = Annotated[str, Path(pattern="^[0-9a-f]{12}$", description="Id of the key.")]
+
+
+@router.get("", operation_id="listKeys", summary="All keys", responses=responses(UnauthorizedError))
+def list_keys(request: Request, _: Admin) -> KeyList:
+    """Every key without its secret, also those that were revoked."""
+    return KeyList(items=[key_resource(row) for row in request.app.state.engine.keys.all()])
+
+
+@router.post("", operation_id="createKey", summary="Make a key", status_code=status.HTTP_201_CREATED,
+             responses=responses(UnauthorizedError, RequestError, TooLargeError))
+def create_key(request: Request, admin: Admin, new: NewKey) -> MadeKey:
+    """Make a key. Its text stands in this answer and nowhere else. The first one ends the time without keys."""
+    text, row = request.app.state.engine.keys.make(new.principal, new.scopes, new.days, new.note)
+    log.info("key made", key=row["id"], principal=new.principal, scopes=row["scopes"], by=admin)
+    return MadeKey(key=text, about=key_resource(row))
+
+
+@router.delete("/{key_id}", operation_id="revokeKey", summary="Revoke a key", status_code=204,
+               responses=responses(UnauthorizedError, NotFoundError, RequestError))
+def revoke_key(request: Request, admin: Admin, key_id: KeyId) -> None:
+    """End a key now. Its row stays; a second time changes nothing."""
+    request.app.state.engine.keys.revoke(key_id)
+    log.info("key revoked", key=key_id, by=admin)
