@@ -85,15 +85,16 @@ class To(Kind):
     entities: tuple[str, ...] = ()
 
     def problem(self, value: Value, file: Part21) -> str | None:
+        if isinstance(value, Ref) and file.has(value):
+            names = file.names(value)
+            if not self.entities or any(name in self.entities for name in names):
+                return None
         wanted = " or ".join(self.entities) or "an instance"
         if not isinstance(value, Ref):
             return f"a reference to {wanted} expected, not {shown(value)}"
         if not file.has(value):
             return f"{value!r}, to be {wanted}, is not in the file"
-        names = file.names(value)
-        if self.entities and not set(names) & set(self.entities):
-            return f"a reference to {wanted} expected, but {value!r} is {' '.join(names)}"
-        return None
+        return f"a reference to {wanted} expected, but {value!r} is {' '.join(names)}"
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,9 @@ class Checked:
 
     def __init__(self, file: Part21, table: Table, records: Table | None = None) -> None:
         self.file, self._table, self._records = file, table, records or {}
+        self._columns = {many: {entity: {name: k for k, (name, _) in enumerate(kinds)}
+                                  for entity, kinds in these.items()}
+                           for many, these in ((False, self._table), (True, self._records))}
         for entity, numbers in sorted(file.entities().items()):
             if entity in self._table or entity in self._records:
                 for number in numbers:
@@ -208,8 +212,7 @@ class Checked:
     def one(self, number: int, entity: str, attribute: str) -> Value:
         """One attribute of an instance."""
         values = self.get(number, entity)[1]
-        kinds = self._records[entity] if len(self.file.records(number)) > 1 else self._table[entity]
-        return values[[name for name, _ in kinds].index(attribute)]
+        return values[self._columns[len(self.file.records(number)) > 1][entity][attribute]]
 
     def ref(self, number: int, entity: str, attribute: str) -> int:
         """The number of the instance that an attribute refers to; ProgramError where it refers to none."""

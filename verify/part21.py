@@ -42,6 +42,8 @@ _TOKEN = re.compile(
     rf"{_BLANKS}(?:(?P<ref>\#[0-9]{{1,18}}+(?![0-9]))|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+(?![0-9]))"
     rf"|'(?P<text>(?:[^']++|'')*+)'|\.(?P<word>{_WORD})\.|(?P<name>!?{_WORD})|(?P<sign>[(),$*])"
     r"|\"(?P<bits>[0-9A-F]++)\")", _FLAGS)
+_FLAT = rf"(?:'[^'\\,()\n\r]*+'|\#[0-9]{{1,18}}+|{_NUMBER}|[$*])"
+_SIMPLE = re.compile(rf"({_WORD})\(({_FLAT}(?:,{_FLAT})*+)\);", _FLAGS)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*+")
 _BRACKETS = re.compile(rf"'[^']*+'|/\*.*?\*/|(?<![A-Z0-9_])({_NAME.pattern})|([()])", _FLAGS)
 _OPENING = re.compile(rf"{_BLANKS}\(?+{_BLANKS}({_WORD})", _FLAGS)
@@ -101,6 +103,7 @@ class Part21:
     def __init__(self, text: str, name: str) -> None:
         self.name, self._text = name, text
         self._records: dict[int, list[Record]] = {}
+        self._names: dict[int, tuple[str, ...]] = {}
         self._spans: dict[int, tuple[int, int]] = {}
         self._named: dict[str, list[int]] = {}
         self._point_ids = self._point_at = np.zeros(0, np.int64)
@@ -123,17 +126,19 @@ class Part21:
 
     def names(self, number: int) -> tuple[str, ...]:
         """The entity names of an instance: one, or those of the records of a complex one."""
-        if self._point(number) >= 0:
-            return ("CARTESIAN_POINT",)
-        return tuple(name for name, _ in self.records(number))
+        if number not in self._names:
+            if number not in self._spans and self._point(number) >= 0:
+                return ("CARTESIAN_POINT",)
+            self._names[number] = tuple(name for name, _ in self.records(number))
+        return self._names[number]
 
     def records(self, number: int) -> list[Record]:
         """Names and values of an instance; ProgramError where its text breaks the grammar, or there is none."""
         if number not in self._records:
-            row = self._point(number)
-            if row >= 0:
-                return [("CARTESIAN_POINT", ["", self._points[row].tolist()])]
             if number not in self._spans:
+                row = self._point(number)
+                if row >= 0:
+                    return [("CARTESIAN_POINT", ["", self._points[row].tolist()])]
                 raise self.error(number, "is not in the file")
             self._records[number] = self._parse(number)
         return self._records[number]
@@ -274,6 +279,9 @@ class Part21:
 
     def _parse(self, number: int) -> list[Record]:
         span = self._spans[number]
+        simple = _SIMPLE.match(self._text, span[1])
+        if simple is not None:  # most are: nothing in brackets, no blanks, strings that mean what they say
+            return [(simple.group(1), [_plain(word) for word in simple.group(2).split(",")])]
         found = _STATEMENT.match(self._text, span[1])
         if found is None:
             raise self.error(number, "breaks off")
@@ -309,6 +317,18 @@ def _entity_names(body: str) -> list[str]:
         elif m.group(2):
             depth += 1 if m.group(2) == "(" else -1
     return out
+
+
+def _plain(word: str) -> Value:
+    """The value of a word of a simple statement."""
+    first = word[0]
+    if first == "#":
+        return Ref(word[1:])
+    if first == "'":
+        return word[1:-1]
+    if first == "$":
+        return None
+    return DERIVED if first == "*" else float(word)
 
 
 def _too_long(name: str) -> str:

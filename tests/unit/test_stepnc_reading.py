@@ -162,6 +162,26 @@ def test_values_of_all_kinds_and_complex_instances():
     assert file.records(5)[0][1] == ["", [1.0, 2.0, 3.0]] and file.records(4)[0][1][0] == "é"
 
 
+def test_statements_read_at_once_say_what_they_say_word_by_word():
+    """Lists, blanks and strings that need thought are read word by word, all else in one go; both are the same."""
+    words = ["'a b'", "''", "'it''s'", "'a,b'", "'(1)'", "'\\X\\E9'", "'a\nb'", "#12", "$", "*", "1.", "-2.5E-3", "7",
+             ".T.", "(#1,#2)", "()", "L(2.)", " #3", "'/* x */'", "\"0AF\""]
+    rng = np.random.default_rng(5)
+    rows = [[words[k] for k in rng.integers(0, len(words), n)] for n in rng.integers(1, 7, 400)]
+    bodies = [f"N{k}({','.join(row)})" for k, row in enumerate(rows)]
+    head = ("ISO-10303-21;HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');"
+            "FILE_SCHEMA(('X'));ENDSEC;DATA;")
+
+    def file(bodies):
+        text = "".join(f"#{k + 1}={body};" for k, body in enumerate(bodies))
+        return Part21(head + text + "ENDSEC;END-ISO-10303-21;", "file")
+
+    at_once, by_word = file(bodies), file([body + " " for body in bodies])  # a blank before the semicolon
+    for k in range(1, len(bodies) + 1):
+        assert at_once.records(k) == by_word.records(k), bodies[k - 1]
+        assert [type(v) for v in at_once.records(k)[0][1]] == [type(v) for v in by_word.records(k)[0][1]]
+
+
 @pytest.mark.parametrize("text", ["it's \\ ok", "é漢x", "😀 100 %", "a\tb", "''", "\\X2\\"])
 def test_strings_come_back(text):
     assert decoded(quoted(text)[1:-1]) == text
