@@ -45,6 +45,10 @@ class Job(ReportModel):
                                                           "none.")] = None
     labels: dict[str, str] = {}
     created_at: Annotated[str, Field(description="UTC, ISO 8601.", examples=["2026-01-31T12:00:00Z"])]
+    started_at: Annotated[str | None, Field(description="Start of its newest attempt, UTC, ISO 8601; null before "
+                                                        "the first.")] = None
+    deadline_at: Annotated[str | None, Field(description="When it has to have ended, UTC, ISO 8601; null where no "
+                                                         "deadline_s was given.")] = None
     finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while not final.")] = None
     error: Annotated[Problem | None, Field(description="Why it failed.")] = None
     links: JobLinks

@@ -83,6 +83,7 @@ def main(argv):
     pipe = int(argv[2])
     guard(request["parent"], request["address_bytes"])
     from geometry.errors import CamError, InternalError, ResourceError
+    from service.storage import is_full, storage_full
 
     def send(message):
         os.write(pipe, (json.dumps(message, default=str) + "\n").encode())
@@ -97,6 +98,9 @@ def main(argv):
         send({"error": ResourceError(f"the job needed more address space than {limit / 1e9:.1f} GB",
                                      code="job_memory", limit=limit).as_dict()})
     except Exception as error:
+        if is_full(error):
+            send({"error": storage_full().as_dict()})
+            return 3
         traceback.print_exc()
         send({"error": InternalError(f"{type(error).__name__}: {error}", code="bug",
                                      remedy="please report it with part and setup").as_dict()})

@@ -39,6 +39,8 @@ jobs = sa.Table(
     Column("error_json", Text, nullable=True),
     Column("created", Float, nullable=False),
     Column("finished", Float, nullable=True),
+    Column("started", Float, nullable=True),
+    Column("deadline", Float, nullable=True),
     sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
     sa.Index("ix_jobs_state", "state", "lease_until"),
     sa.Index("ix_jobs_principal", "principal", "id"),

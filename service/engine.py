@@ -7,24 +7,33 @@ scheduler address it is a real cluster, and several services may share database 
 from __future__ import annotations
 
 import fcntl
+import math
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import IO, Any
 
 import structlog
+from sqlalchemy.engine import RowMapping
+from sqlalchemy.exc import DBAPIError
 
 from geometry.errors import ResourceError, SetupError
 from service.artifacts import Artifacts
 from service.db import connect, migrate
+from service.errors import RateError, UnavailableError
 from service.keys import KeyStore
 from service.settings import Settings, is_loopback
-from service.store import JobStore, LibraryStore
+from service.storage import check_free, check_writable
+from service.store import JobStore, LibraryStore, NewJob, Room
 from service.supervisor import Limits
 from service.work import WorkConfig, run_job
 
 log = structlog.get_logger(__name__)
+
+SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
+READY_EVERY_S = 1.0
 
 
 class Engine:
@@ -41,13 +50,16 @@ class Engine:
             settings.url, str(settings.data_dir.resolve()),
             Limits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
                    settings.poll_s),
-            settings.lease_s, chain)
+            settings.lease_s, chain, settings.max_attempts)
+        self.room = Room(settings.max_queued, settings.max_queued_each)
         self._wake, self._stop = threading.Event(), threading.Event()
         self._lock: IO[str] | None = None
         self._client: Any = None
         self._cluster: Any = None
         self._thread: threading.Thread | None = None
         self._futures: dict[str, Any] = {}
+        self._ready: dict[str, str] = {}
+        self._ready_at, self._ready_lock = -math.inf, threading.Lock()
 
     def start(self) -> None:
         """Open data folder and database, start the cluster and the dispatcher.
@@ -101,16 +113,63 @@ class Engine:
         """Look for queued jobs now rather than at the next round."""
         self._wake.set()
 
+    def check_room(self, principal: str, key: str | None) -> None:
+        """Refuse a submission before its body is read.
+
+        Raises
+        ------
+        RateError
+            Too many jobs wait; it says when to come again.
+        UnavailableError
+            The disk is nearly full (code 'storage_full').
+        """
+        check_free(self.settings.data_dir, self.settings.min_free_mb)
+        with self.told_when():
+            self.jobs.check_room(principal, key, self.room)
+
+    def create(self, new: NewJob) -> tuple[RowMapping, bool]:
+        """Queue a job; see ``JobStore.create``."""
+        with self.told_when():
+            row, fresh = self.jobs.create(new, self.room)
+        if fresh:
+            self.wake()
+        return row, fresh
+
+    @contextmanager
+    def told_when(self) -> Iterator[None]:
+        """Say in an error about a full queue when the next place is likely to be free: a job's time over the slots."""
+        try:
+            yield
+        except RateError as error:
+            pace = (self.jobs.mean_run_s() or SHORTEST_WAIT_S) / max(1, self.capacity())
+            error.retry_after_s = math.ceil(min(max(pace, SHORTEST_WAIT_S), LONGEST_WAIT_S))
+            raise
+
     def ready(self) -> dict[str, str]:
-        """What the engine needs, each 'ok' or the reason why not."""
-        return {"database": _outcome(self.jobs.running), "engine": _outcome(self._check_engine)}
+        """What the engine needs, each 'ok' or why not; looked at once a second at most, for anybody may ask.
+
+        What a failing part said goes into the log: it may name hosts, users and paths.
+        """
+        with self._ready_lock:
+            if time.monotonic() - self._ready_at > READY_EVERY_S:
+                settings = self.settings
+                self._ready = {
+                    "database": _outcome("database", self.jobs.running, "does not answer"),
+                    "data_folder": _outcome("data folder", lambda: check_writable(self.artifacts.tmp),
+                                            "cannot be written to"),
+                    "disk_space": _outcome("disk", lambda: check_free(settings.data_dir, settings.min_free_mb),
+                                           "nearly full"),
+                    "engine": _outcome("engine", self._check_engine, "starts no jobs"),
+                }
+                self._ready_at = time.monotonic()
+            return dict(self._ready)
 
     def capacity(self) -> int:
         """Jobs that can run at a time."""
         return sum(self._client.nthreads().values()) if self._client is not None else 0
 
     def _check_engine(self) -> None:
-        if self._thread is None or not self._thread.is_alive():
+        if self._stop.is_set() or self._thread is None or not self._thread.is_alive():
             raise RuntimeError("the dispatcher has stopped")
         if self.capacity() == 0:
             raise RuntimeError("no worker is connected")
@@ -158,8 +217,13 @@ class Engine:
             try:
                 self._reap()
                 self.jobs.give_up(self.settings.max_attempts)
+                self.jobs.miss_deadlines()
+                check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
                 while self.jobs.running() < self.capacity() and self._submit():
                     pass
+            except UnavailableError as error:
+                log.warning("nothing is started", reason=error.message)
+                self._stop.wait(timeout=1.0)
             except Exception:
                 log.exception("dispatcher stumbled")  # database or scheduler away: the next round tries again
             self._wake.wait(timeout=self.settings.poll_s)
@@ -182,6 +246,9 @@ class Engine:
             if future.status != "error":
                 continue
             job_id, _, attempt = key.rpartition("-")
+            if isinstance(future.exception(), DBAPIError):
+                log.warning("the database was away; the job is taken up again", job=job_id, attempt=attempt)
+                continue  # its lease runs out
             error = ResourceError(f"the workers that ran the job were lost ({future.exception()!r})",
                                   code="worker_lost", remedy="look into the log of the workers")
             log.error("task lost", job=job_id, attempt=attempt, error=str(future.exception()))
@@ -189,9 +256,10 @@ class Engine:
                 self.jobs.finish(job_id, self.owner, "failed", error=error)
 
 
-def _outcome(check: Callable[[], Any]) -> str:
+def _outcome(name: str, check: Callable[[], Any], otherwise: str) -> str:
     try:
         check()
     except Exception as error:
-        return f"{type(error).__name__}: {error}"
+        log.warning("not ready", check=name, error=f"{type(error).__name__}: {error}")
+        return otherwise
     return "ok"

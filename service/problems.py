@@ -9,6 +9,7 @@ from asgi_correlation_id import correlation_id
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from sqlalchemy.exc import DBAPIError, InterfaceError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 
@@ -29,6 +30,7 @@ from service.errors import (
     problem_document,
 )
 from service.head import is_stream
+from service.storage import STORAGE_FULL, is_full
 
 log = structlog.get_logger(__name__)
 
@@ -55,6 +57,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(CamError, _ours)
     app.add_exception_handler(HTTPException, _framework)
     app.add_exception_handler(RequestValidationError, _validation)
+    app.add_exception_handler(DBAPIError, _database)
+    app.add_exception_handler(OSError, _disk)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -102,6 +106,24 @@ async def _validation(request: Request, error: Exception) -> JSONResponse:
                                                   remedy="see the schema in /openapi.json"))
 
 
+async def _database(request: Request, error: Exception) -> JSONResponse:
+    """The database is away, or full: nobody's bug, and worth trying again. What it said may name hosts and users."""
+    if not isinstance(error, OperationalError | InterfaceError):
+        return await _unexpected(request, error)
+    log.error("the database does not answer", path=request.url.path, exc_info=error)
+    return problem_response(request, UnavailableError("the database does not answer", code="database_unavailable",
+                                                      retry_after_s=10, remedy="try again; /readyz tells when"))
+
+
+async def _disk(request: Request, error: Exception) -> JSONResponse:
+    if not is_full(error):
+        return await _unexpected(request, error)
+    log.error("the disk is full", path=request.url.path)
+    return problem_response(request, UnavailableError("there is no room left on a disk of the service",
+                                                      code=STORAGE_FULL, retry_after_s=60,
+                                                      remedy="try again when there is room"))
+
+
 async def _unexpected(request: Request, error: Exception) -> JSONResponse:
     log.exception("bug in a route", path=request.url.path, exc_info=error)
     return problem_response(request, InternalError("a bug in the service; the log has the details under this request "
@@ -111,10 +133,11 @@ async def _unexpected(request: Request, error: Exception) -> JSONResponse:
 def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:
     """The ``responses=`` of a route that may raise these errors, for the OpenAPI document.
 
-    Where a key is asked for, one without the scope is refused too.
+    Where a key is asked for, one without the scope is refused too, and the database that knows it may be away.
     """
     found: dict[int | str, dict[str, Any]] = {}
-    for kind in (*kinds, *([ForbiddenError] if UnauthorizedError in kinds else [])):
+    behind_a_key = (ForbiddenError, UnavailableError) if UnauthorizedError in kinds else ()
+    for kind in dict.fromkeys((*kinds, *behind_a_key)):
         row = ERROR_TABLE[kind]
         entry = found.setdefault(int(row.status), {
             "description": row.title,

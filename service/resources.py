@@ -20,7 +20,7 @@ from service.artifacts import Artifacts
 from service.errors import NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
 
 MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml",
-               ".html": "text/html; charset=utf-8", ".pdf": "application/pdf"}
+               ".html": "text/html; charset=utf-8", ".pdf": "application/pdf", ".bin": "application/octet-stream"}
 INTERNAL_FILES = frozenset({"state"})
 
 
@@ -48,6 +48,7 @@ def job_resource(row: RowMapping) -> Job:
                attempt=row["attempt"], content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
                setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
+               started_at=_time(row["started"]), deadline_at=_time(row["deadline"]),
                finished_at=_time(row["finished"]), error=error, links=links)
 
 

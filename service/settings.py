@@ -46,6 +46,10 @@ class Settings(BaseSettings):
         description="keys: a key is always asked for; auto: not on loopback until the first key is made.")] = "auto"
     post_rate: Annotated[str, Field(description="Most job submissions of a principal, for example 120/minute.")
                          ] = "120/minute"
+    max_queued: Annotated[int, Field(ge=1, description="Most jobs that wait; more are refused with 429.")] = 1000
+    max_queued_each: Annotated[int, Field(ge=1, description="Most jobs of one principal that wait.")] = 200
+    min_free_mb: Annotated[int, Field(ge=0, description="Free disk of the data folder below which nothing is accepted "
+                                                        "or started, MB.")] = 500
     log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Least level logged.")
                          ] = "info"
     log_format: Annotated[Literal["console", "json"], Field(description="Form of the log on stderr.")] = "console"

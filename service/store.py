@@ -15,10 +15,11 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Engine, RowMapping
 from sqlalchemy.exc import IntegrityError
+from sqlalchemy.sql.dml import ReturningInsert
 
 from geometry.errors import CamError, ResourceError
 from service.db import jobs, library
-from service.errors import KeyConflictError, NotFoundError
+from service.errors import KeyConflictError, NotFoundError, RateError
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,15 @@ class NewJob:
     spindle_tool: int = 0
     idempotency_key: str | None = None
     stock_sha256: str | None = None
+    deadline_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Room:
+    """How many jobs may wait: in all, and of one principal."""
+
+    total: int
+    each: int
 
 
 def new_id() -> str:
@@ -49,7 +59,7 @@ class JobStore:
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
 
-    def create(self, new: NewJob) -> tuple[RowMapping, bool]:
+    def create(self, new: NewJob, room: Room | None = None) -> tuple[RowMapping, bool]:
         """Queue a job, or find the one this Idempotency-Key already made.
 
         Returns the row and whether it is new.
@@ -58,18 +68,32 @@ class JobStore:
         ------
         KeyConflictError
             The principal used the key before for other content or another kind of job.
+        RateError
+            There is no room in the queue (codes 'queue_full', 'your_queue_full').
+
+        Notes
+        -----
+        Room is looked for by the statement that inserts. SQLite runs one such statement at a time, so the bound holds
+        to the job; PostgreSQL may let in one more for every other that posts in the same instant.
         """
+        now = time.time()
         values = {
             "id": new_id(), "kind": new.kind, "principal": new.principal, "idempotency_key": new.idempotency_key,
             "content_sha256": new.content_sha256, "part_sha256": new.part_sha256, "setup_sha256": new.setup_sha256,
             "program_sha256": new.program_sha256, "stock_sha256": new.stock_sha256,
             "spindle_tool": new.spindle_tool, "setup_json": new.setup_json, "labels_json": json.dumps(new.labels),
             "state": "queued", "stage": "queued", "progress": 0.0,
-            "event_seq": 1, "attempt": 0, "created": time.time(),
+            "event_seq": 1, "attempt": 0, "created": now,
+            "deadline": None if new.deadline_s is None else now + new.deadline_s,
         }
         try:
             with self.engine.begin() as c:
-                return c.execute(jobs.insert().values(values).returning(jobs)).mappings().one(), True
+                made = c.execute(_insert_where(values, _has_room(new.principal, room))).mappings().one_or_none()
+            if made is not None:
+                return made, True
+            found = self._by_key(new.principal, new.idempotency_key)
+            if found is None:
+                raise self.no_room(new.principal, room)
         except IntegrityError:
             found = self._by_key(new.principal, new.idempotency_key)
             if found is None:
@@ -86,7 +110,44 @@ class JobStore:
                 remedy="take a new key for new content")
         return found, False
 
+    def check_room(self, principal: str, key: str | None, room: Room) -> None:
+        """Refuse early what ``create`` would refuse, so that no file is read in vain.
+
+        A key that made a job before passes: its repeat is answered whether there is room or not.
+
+        Raises
+        ------
+        RateError
+            As ``create``.
+        """
+        with self.engine.connect() as c:
+            free = c.execute(sa.select(_has_room(principal, room))).scalar_one()
+        if not free and (key is None or self._by_key(principal, key) is None):
+            raise self.no_room(principal, room)
+
+    def no_room(self, principal: str, room: Room | None) -> RateError:
+        """The error for a full queue; it names the one that is full."""
+        assert room is not None
+        with self.engine.connect() as c:
+            own = c.execute(sa.select(_waiting(principal))).scalar_one()
+        if own >= room.each:
+            return RateError(f"{own} of your jobs are waiting already", code="your_queue_full", measured=own,
+                             limit=room.each, remedy="wait until some have ended, or cancel some")
+        return RateError(f"{room.total} jobs are waiting already", code="queue_full", limit=room.total,
+                         remedy="wait until some have ended")
+
+    def mean_run_s(self, of: int = 20) -> float | None:
+        """How long the jobs that ended last ran, s; None before any has."""
+        took = (sa.select((jobs.c.finished - jobs.c.started).label("s"))
+                .where(jobs.c.finished.is_not(None), jobs.c.started.is_not(None), jobs.c.artifact.is_not(None))
+                .order_by(jobs.c.id.desc()).limit(of).subquery())
+        with self.engine.connect() as c:
+            found = c.execute(sa.select(sa.func.avg(took.c.s))).scalar_one()
+        return None if found is None else max(0.0, float(found))
+
     def _by_key(self, principal: str, key: str | None) -> RowMapping | None:
+        if key is None:
+            return None
         query = sa.select(jobs).where(jobs.c.principal == principal, jobs.c.idempotency_key == key)
         with self.engine.connect() as c:
             return c.execute(query).mappings().one_or_none()
@@ -129,7 +190,7 @@ class JobStore:
                   .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
         change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired))
                   .values(state="running", stage="starting", progress=0.0, attempt=jobs.c.attempt + 1,
-                          event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s)
+                          event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s, started=now)
                   .returning(jobs))
         with self.engine.begin() as c:
             return c.execute(change).mappings().one_or_none()
@@ -183,6 +244,22 @@ class JobStore:
                 state="queued", stage="queued", progress=0.0, attempt=jobs.c.attempt - 1, lease_owner=None,
                 lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
+    def put_back(self, job_id: str, owner: str) -> bool:
+        """Let a job that ``owner`` holds wait again; the attempt counts."""
+        return self._change(self._held(job_id, owner), state="queued", stage="queued", progress=0.0, lease_owner=None,
+                            lease_until=None, event_seq=jobs.c.event_seq + 1)
+
+    def miss_deadlines(self) -> int:
+        """Fail the jobs that should have ended by now; holders see that they lost them and stop their children."""
+        now = time.time()
+        error = ResourceError("the job did not end before its deadline and was stopped", code="deadline_exceeded",
+                              remedy="give it a longer deadline_s, or post it when less is waiting")
+        late = sa.and_(jobs.c.state.in_(("queued", "running")), jobs.c.deadline < now)
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(late).values(
+                state="failed", stage="failed", finished=now, error_json=json.dumps(error.as_dict()),
+                lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
+
     def give_up(self, max_attempts: int) -> int:
         """Fail the jobs whose holder went silent in their last attempt."""
         error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
@@ -213,6 +290,23 @@ class JobStore:
     def _change(self, where: sa.ColumnElement[bool], **values: Any) -> bool:
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(where).values(**values)).rowcount == 1
+
+
+def _waiting(principal: str | None = None) -> sa.ScalarSelect[int]:
+    """How many jobs wait, of a principal or in all."""
+    query = sa.select(sa.func.count()).select_from(jobs).where(jobs.c.state == "queued")
+    return (query if principal is None else query.where(jobs.c.principal == principal)).scalar_subquery()
+
+
+def _has_room(principal: str, room: Room | None) -> sa.ColumnElement[bool]:
+    return sa.true() if room is None else sa.and_(_waiting() < room.total, _waiting(principal) < room.each)
+
+
+def _insert_where(values: dict[str, Any], condition: sa.ColumnElement[bool]) -> ReturningInsert[Any]:
+    """Insert a job if a condition holds; returns the row or nothing. The casts tell PostgreSQL what a parameter is."""
+    columns = [jobs.c[name] for name in values]
+    row = sa.select(*(sa.cast(sa.literal(values[c.name], c.type), c.type) for c in columns)).where(condition)
+    return jobs.insert().from_select(columns, row).returning(jobs)
 
 
 class LibraryStore:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -24,7 +25,8 @@ CHUNK = 1 << 20
 MAX_SETUP_BYTES = 4_000_000
 KEY_LIMIT = 255
 TOOL_DIGITS = 6
-SPINDLE_TOOL, STOCK = "spindle_tool", "stock"
+SPINDLE_TOOL, STOCK, DEADLINE = "spindle_tool", "stock", "deadline_s"
+DEADLINE_S = (1, 604800)  # a week
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Form:
     program: UploadFile | None
     spindle_tool: int = 0
     stock: UploadFile | None = None
+    deadline_s: float | None = None
 
 
 async def read_form(request: Request, *, with_program: bool) -> Form:
@@ -44,14 +47,14 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     Raises
     ------
     RequestError
-        A part is missing or stands there twice, one is not known, or ``spindle_tool`` is no T number.
+        A part is missing or stands there twice, one is not known, or a field is not what it should be.
     """
     wanted = {"part", "setup"} | ({"program"} if with_program else set())
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise RequestError("the body must be multipart/form-data", code="not_multipart",
                            remedy="curl -F part=@PART.step -F 'setup=@SETUP.json;type=application/json'")
     try:
-        form = await request.form(max_files=5, max_fields=4, max_part_size=MAX_SETUP_BYTES)
+        form = await request.form(max_files=6, max_fields=6, max_part_size=MAX_SETUP_BYTES)
     except HTTPException as error:
         if error.status_code == 413:
             raise
@@ -59,10 +62,11 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                            remedy="let the client write the multipart body: curl -F part=@PART.step -F "
                                   "'setup=@SETUP.json;type=application/json'") from None
     names = [name for name, _ in form.multi_items()]
-    optional = {STOCK, SPINDLE_TOOL} if with_program else {STOCK}
+    optional = {STOCK, DEADLINE} | ({SPINDLE_TOOL} if with_program else set())
     for name in sorted(set(names) - wanted - optional):
         raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
-                           remedy=f"send {' and '.join(sorted(wanted))}, each once; {STOCK} where the blank is a file")
+                           remedy=f"send {' and '.join(sorted(wanted))}, each once; {STOCK} where the blank is a file; "
+                                  f"{DEADLINE} where it must end in time")
     for name in sorted(wanted | (optional & set(names))):
         if (count := names.count(name)) != 1:
             raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
@@ -76,7 +80,8 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     assert isinstance(part, UploadFile)
     return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
                 _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
-                stock if isinstance(stock, UploadFile) else None)
+                stock if isinstance(stock, UploadFile) else None,
+                _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None)
 
 
 def _tool_number(data: bytes) -> int:
@@ -85,6 +90,18 @@ def _tool_number(data: bytes) -> int:
                            subjects=(SPINDLE_TOOL,), measured=ascii(data[:20]),
                            remedy="send the number of the tool in the spindle, or leave the field out")
     return int(data)
+
+
+def _deadline(data: bytes) -> float:
+    try:
+        value = float(data) if len(data) <= 20 else math.nan
+    except ValueError:
+        value = math.nan
+    if not DEADLINE_S[0] <= value <= DEADLINE_S[1]:
+        raise RequestError(f"{DEADLINE} is to be a number of seconds", code="bad_deadline", subjects=(DEADLINE,),
+                           measured=ascii(data[:20]), limit=list(DEADLINE_S),
+                           remedy="send seconds from now, up to a week, or leave the field out")
+    return value
 
 
 async def _bytes_of(field: Any) -> bytes:
@@ -122,7 +139,7 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     setup_sha = setup_sha256(setup)
     content = content_of(part_sha, setup_sha, program_sha, form.spindle_tool, stock_sha)
     return NewJob(kind, principal, content, part_sha, setup_sha, canonical_json(setup).decode(), _labels(setup),
-                  program_sha, form.spindle_tool, key, stock_sha)
+                  program_sha, form.spindle_tool, key, stock_sha, form.deadline_s)
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:

@@ -8,17 +8,19 @@ from __future__ import annotations
 import shutil
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import structlog
 from sqlalchemy.engine import RowMapping
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DBAPIError
 
 from geometry.errors import CamError, CancelledError, InternalError, ResourceError
 from service.artifacts import Artifacts, artifact_key
 from service.db import connect
+from service.storage import STORAGE_FULL, is_full, storage_full
 from service.store import JobStore
 from service.supervisor import Limits, supervise
 
@@ -31,6 +33,7 @@ class WorkConfig:
 
     url, data_dir : database and data folder, as the worker sees them
     chain         : module with ``plan``, ``zones_only`` and ``verify_program``
+    max_attempts  : after so many a job that found the disk full fails
     """
 
     url: str
@@ -38,10 +41,18 @@ class WorkConfig:
     limits: Limits
     lease_s: float
     chain: str = "service.chain"
+    max_attempts: int = 3
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
+        """Plain data; Dask writes the arguments of a task that failed into its log, and the URL holds a password."""
+        return {**asdict(self), "url": Unshown(self.url)}
+
+
+class Unshown(str):
+    """Text that does not show itself in logs."""
+
+    def __repr__(self) -> str:
+        return "'(not shown)'"
 
 
 def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
@@ -50,22 +61,43 @@ def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
     store, owner = JobStore(connect(config.url)), f"worker-{uuid.uuid4().hex}"
     if not store.take_over(job_id, attempt, owner, config.lease_s):
         return "superseded"
-    row = store.get(job_id)
+    row, key = store.get(job_id), None
+    failure: CamError | None = None
     try:
         state, key = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
-        ended = store.finish(job_id, owner, state, artifact=key)
     except CancelledError:
         return "stopped"
     except CamError as error:
-        state, ended = "failed", store.finish(job_id, owner, "failed", error=error)
-        log.warning("job failed", job=job_id, attempt=attempt, error=error.as_dict())
+        failure = error
     except Exception as error:
-        log.exception("bug in the worker", job=job_id, attempt=attempt)
-        bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
-                            remedy="please report it with part and setup; the worker's log has the trace")
-        state, ended = "failed", store.finish(job_id, owner, "failed", error=bug)
+        failure = storage_full() if is_full(error) else _bug(error, job_id, attempt)
+    if failure is not None:
+        log.warning("job failed", job=job_id, attempt=attempt, error=failure.as_dict())
+        if failure.code == STORAGE_FULL and row["attempt"] < config.max_attempts:
+            return "put back" if _record(lambda: store.put_back(job_id, owner), config.lease_s) else "superseded"
+        state = "failed"
+    ended = _record(lambda: store.finish(job_id, owner, state, artifact=key, error=failure), config.lease_s)
     log.info("job ended", job=job_id, attempt=attempt, state=state, recorded=ended)
     return state if ended else "superseded"
+
+
+def _bug(error: Exception, job_id: str, attempt: int) -> InternalError:
+    log.error("bug in the worker", job=job_id, attempt=attempt, exc_info=error)
+    return InternalError(f"{type(error).__name__}: {error}", code="bug",
+                         remedy="please report it with part and setup; the worker's log has the trace")
+
+
+def _record(write: Callable[[], bool], patience_s: float) -> bool:
+    """Write the end of a job, again and again while the database is away; whoever claims it later finds the result."""
+    until = time.monotonic() + patience_s
+    while True:
+        try:
+            return write()
+        except DBAPIError as error:
+            if time.monotonic() > until:
+                raise
+            log.warning("the end of a job is not recorded yet", error=type(error).__name__)
+            time.sleep(0.5)
 
 
 class _Attempt:
@@ -114,8 +146,8 @@ class _Attempt:
     def _progress(self, stage: str, fraction: float) -> None:
         try:
             self.store.progress(self.row["id"], self.owner, stage, fraction)
-        except OperationalError as error:
-            log.warning("progress not recorded", job=self.row["id"], error=str(error))
+        except DBAPIError as error:
+            log.warning("progress not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _keep(self) -> bool:
         """Whether to go on; renews the lease in good time. A database that does not answer is no reason to stop."""
@@ -124,6 +156,6 @@ class _Attempt:
                 return self.store.is_held(self.row["id"], self.owner)
             self.renewed = time.monotonic()
             return self.store.renew(self.row["id"], self.owner, self.config.lease_s)
-        except OperationalError as error:
-            log.warning("database does not answer", job=self.row["id"], error=str(error))
+        except DBAPIError as error:
+            log.warning("database does not answer", job=self.row["id"], error=type(error).__name__)
             return True

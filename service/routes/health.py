@@ -22,7 +22,7 @@ def healthz() -> Health:
 
 @router.get("/readyz", operation_id="readyz", responses={503: {"model": Health, "description": "Not ready."}})
 def readyz(request: Request, response: Response) -> Health:
-    """Database and engine answer too; 503 with the reason when they do not."""
+    """Database and engine answer, the data folder can be written to and has room; 503 names what does not."""
     checks = request.app.state.engine.ready()
     if all(text == "ok" for text in checks.values()):
         return Health(status="ok", checks=checks)

@@ -22,7 +22,7 @@ from service.errors import (
 from service.principals import Submitter, submission_rate
 from service.problems import responses
 from service.resources import job_resource, path_of
-from service.uploads import new_job, read_form
+from service.uploads import DEADLINE_S, new_job, read_form
 
 router = APIRouter(prefix="/v1", tags=["submissions"], dependencies=[Depends(submission_rate)])
 
@@ -60,6 +60,10 @@ def multipart(with_program: bool) -> dict[str, Any]:
             "type": "integer", "minimum": 0, "maximum": 999999, "default": 0,
             "description": "T number of the tool that stands in the spindle, its length offset on, before the first "
                            "line of the program; 0 for none."}
+    properties["deadline_s"] = {
+        "type": "number", "minimum": DEADLINE_S[0], "maximum": DEADLINE_S[1],
+        "description": "Seconds from now by which the job has to have ended; one that has not is stopped and fails "
+                       "with deadline_exceeded. No part of the content."}
     schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
               "properties": properties, "required": required, "additionalProperties": False}
     return {"requestBody": {"required": True, "content": {"multipart/form-data": {
@@ -68,11 +72,11 @@ def multipart(with_program: bool) -> dict[str, Any]:
 
 async def _submit(request: Request, response: Response, kind: str, principal: str, key: str | None) -> Job:
     engine = request.app.state.engine
+    await run_in_threadpool(engine.check_room, principal, key)
     form = await read_form(request, with_program=kind == "verify")
     new = await run_in_threadpool(new_job, engine, kind, principal, key, form)
-    row, fresh = await run_in_threadpool(engine.jobs.create, new)
+    row, fresh = await run_in_threadpool(engine.create, new)
     if fresh:
-        engine.wake()
         request.app.state.metrics.submitted(kind)
     response.headers["Location"] = path_of(row)
     return job_resource(row)

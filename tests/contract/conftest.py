@@ -80,7 +80,7 @@ def post(setup_json):
     """Post a job: (client, do, path, part, key, setup, program, spindle_tool, stock) -> response."""
 
     def send(client, do="", *, path="/v1/jobs", part=STEP, key=None, setup=None, program=None, headers=None,
-             spindle_tool=None, stock=None):
+             spindle_tool=None, stock=None, **fields):
         text = json.dumps(setup_json(do)) if setup is None else setup if isinstance(setup, str) else json.dumps(setup)
         files = {"part": ("part.step", part, "model/step"), "setup": ("setup.json", text, "application/json")}
         if program is not None:
@@ -88,7 +88,7 @@ def post(setup_json):
         if stock is not None:
             files["stock"] = ("blank.step", stock, "model/step")
         extra = {"Idempotency-Key": key} if key is not None else {}
-        fields = {} if spindle_tool is None else {"spindle_tool": spindle_tool}
+        fields |= {} if spindle_tool is None else {"spindle_tool": spindle_tool}
         return client.post(path, files=files, data=fields, headers={**extra, **(headers or {})})
 
     return send

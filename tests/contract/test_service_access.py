@@ -45,7 +45,8 @@ def test_library_entries_are_checked(client):
 def test_health_and_metrics(client, post, finish):
     finish(client, post(client, "").json())
     assert client.get("/healthz").json()["status"] == "ok"
-    assert client.get("/readyz").json() == {"status": "ok", "checks": {"database": "ok", "engine": "ok"}}
+    assert client.get("/readyz").json() == {"status": "ok", "checks": dict.fromkeys(
+        ("database", "data_folder", "disk_space", "engine"), "ok")}
     text = client.get("/metrics").text
     assert 'zonemill_submissions_total{kind="plan"}' in text and 'zonemill_jobs{state="proved"}' in text
     assert 'route="/v1/jobs/{job_id}"' in text and "/v1/jobs/j" not in text

@@ -1,6 +1,8 @@
 """The job table: guarded changes only."""
 
 import threading
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +13,8 @@ from alembic.config import Config
 import service.db
 from service.artifacts import Artifacts, artifact_key
 from service.db import connect, jobs, metadata, migrate
-from service.errors import KeyConflictError, NotFoundError
-from service.store import JobStore, LibraryStore, NewJob
+from service.errors import KeyConflictError, NotFoundError, RateError
+from service.store import JobStore, LibraryStore, NewJob, Room
 
 
 @pytest.fixture
@@ -65,6 +67,74 @@ def test_a_key_names_one_job_per_principal(store):
         store.create(new("other", key="k"))
     assert store.create(new("other", key="k", principal="q"))[1]
     assert store.create(new())[0]["id"] != store.create(new())[0]["id"]
+
+
+def test_there_is_room_for_so_many_and_no_more(store):
+    room, made, refused = Room(total=12, each=8), [], []
+
+    def work(principal):
+        for k in range(6):
+            try:
+                made.append(store.create(new(f"{principal}{k}", principal=principal), room)[0]["principal"])
+            except RateError as error:
+                refused.append((error.code, error.limit))
+
+    threads = [threading.Thread(target=work, args=(p,)) for p in ("a", "a", "b", "b")]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert len(made) == 12 and max(made.count("a"), made.count("b")) <= 8
+    assert set(refused) <= {("queue_full", 12), ("your_queue_full", 8)} and len(refused) == 12
+    assert store.counts() == {"queued": 12}
+    store.claim("o", 30, 3)
+    assert store.create(new(principal="c"), room)[1]  # what runs waits no more
+
+
+def test_a_repeat_is_answered_when_the_queue_is_full(store):
+    room = Room(total=1, each=1)
+    first, fresh = store.create(new(key="k"), room)
+    store.check_room("p", "k", room)
+    assert fresh and store.create(new(key="k"), room) == (first, False)
+    with pytest.raises(KeyConflictError):
+        store.create(new("other", key="k"), room)
+    for key in (None, "l"):
+        with pytest.raises(RateError, match="1 of your jobs"):
+            store.check_room("p", key, room)
+        with pytest.raises(RateError, match="1 of your jobs"):
+            store.create(new(key=key), room)
+    with pytest.raises(RateError, match="1 jobs are waiting"):
+        store.check_room("q", "k", room)
+
+
+def test_a_job_that_missed_its_deadline_fails_whether_it_waits_or_runs(store):
+    late, running, free = (store.create(replace(new(c), deadline_s=s))[0]["id"]
+                           for c, s in (("a", -1.0), ("b", 0.05), ("c", None)))
+    assert store.miss_deadlines() == 1
+    assert store.claim("o", 30, 3)["id"] == running
+    time.sleep(0.06)
+    assert store.miss_deadlines() == 1 and not store.is_held(running, "o") and not store.finish(running, "o", "proved")
+    for job in (late, running):
+        assert store.get(job)["state"] == "failed" and "deadline_exceeded" in store.get(job)["error_json"]
+    assert store.miss_deadlines() == 0 and store.get(free)["state"] == "queued"
+
+
+def test_what_is_put_back_waits_again_and_keeps_its_attempts(store):
+    job = store.create(new())[0]["id"]
+    store.claim("o", 30, 3)
+    assert not store.put_back(job, "x") and store.put_back(job, "o") and store.get(job)["state"] == "queued"
+    assert store.claim("o", 30, 3)["attempt"] == 2
+
+
+def test_how_long_jobs_run_is_told_by_those_that_ran(store):
+    assert store.mean_run_s() is None
+    for _ in range(3):
+        job = store.create(new())[0]["id"]
+        store.claim("o", 30, 3)
+        time.sleep(0.02)
+        store.finish(job, "o", "proved", artifact="a")
+    store.cancel(store.create(new())[0]["id"])
+    assert 0.015 < store.mean_run_s() < 1.0
 
 
 def test_only_one_of_many_claims_a_job(store):

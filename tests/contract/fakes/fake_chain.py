@@ -1,6 +1,7 @@
 """A chain for tests of the service alone: what it does is said by the setup's label "do"."""
 
 import ctypes
+import errno
 import hashlib
 import os
 import time
@@ -34,6 +35,8 @@ def _misbehave(what, progress):
             time.sleep(0.005)
     elif what == "killed":
         os.kill(os.getpid(), 9)
+    elif what == "full":
+        raise OSError(errno.ENOSPC, "No space left on device")
     elif what == "bug":
         raise KeyError("a bug")
     elif what == "open":
