@@ -20,9 +20,9 @@ from schemas.machine import DIALECT_ENDINGS
 
 PROGRAMS = tuple(f"{d}.{e}" for d, e in DIALECT_ENDINGS.items())
 RESULT_FILES = (*(f"program.{p}" for p in PROGRAMS), "job.stpnc", "job.arm.stpnc", "report.json", "zones.json",
-                "preview.png", "deviation.png", "sheet.html", "sheet.pdf", "machined.stl")
+                "preview.png", "deviation.png", "sheet.html", "sheet.pdf", "view.bin", "machined.stl")
 ACCESS_FILES = (*(f"program.*.{p}" for p in PROGRAMS), "job.*.stpnc", "machined.*.stl")  # of further accesses
-VERIFICATION_FILES = ("report.json", "deviation.png", "machined.stl")
+VERIFICATION_FILES = ("report.json", "deviation.png", "view.bin", "machined.stl")
 PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.stpnc", "job.*.stpnc", "zones.json")
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
 

@@ -20,7 +20,8 @@ SHARED = Path(__file__).parents[2].parent / "shared"
 CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
 FILES = {"program.linuxcnc.ngc": "program", "job.stpnc": "stepnc", "job.arm.stpnc": "stepnc-arm", "zones.json": "zones",
-         "preview.png": "preview", "deviation.png": "deviation", "sheet.html": "sheet", "sheet.pdf": "sheet"}
+         "preview.png": "preview", "deviation.png": "deviation", "sheet.html": "sheet", "sheet.pdf": "sheet",
+         "view.bin": "view"}
 LOWERED = 0.05
 
 # The first test waits for the whole chain, kernels compiled on the way.

@@ -46,8 +46,8 @@ def test_figures_by_face_and_files(part, tmp_path):
     report = json.loads(got.stdout)
     Verification.model_validate(report)
     assert got.exit_code == 0 and json.loads((tmp_path / "out" / "report.json").read_text()) == report
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.json", "deviation.png", "machined.stl"}
-    assert [f["name"] for f in report["files"]] == ["deviation.png", "machined.stl"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.json", "deviation.png", "machined.stl", "view.bin"}
+    assert [f["name"] for f in report["files"]] == ["deviation.png", "machined.stl", "view.bin"]
     floor = floor_of(report)
     assert floor["area_mm2"] == pytest.approx(8 * 12, rel=0.01) and floor["coverage"] == pytest.approx(0.5, abs=0.01)
     assert floor["uncut_mm2"] == pytest.approx(8 * 12 / 2, rel=0.02) and floor["gouge_mm"] == 0
@@ -83,7 +83,7 @@ def test_a_gouge_is_in_the_figures_and_the_words(part, tmp_path):
     assert max(d["gouge_mm"] for d in report["deviation"]) == pytest.approx(0.1, abs=1e-3)
     assert "unproved" in got.stderr and "line 8: T1 cuts 0.1000 mm into the part" in got.stderr
     assert "deviation.png" in got.stderr and "took" in got.stderr
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.json", "deviation.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.json", "deviation.png", "view.bin"}
 
 
 def test_nothing_is_written_without_a_folder(part, tmp_path):

@@ -63,7 +63,7 @@ def test_an_older_proved_program_is_gone_when_the_job_is_no_longer_proved(part, 
     assert report["state"] == "unproved" and the_gouge(report["findings"])["program"] == PROGRAMS[0]
     left = {p.name for p in out.iterdir()}
     assert left == {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf",
-                    "program.mine.txt"}
+                    "view.bin", "program.mine.txt"}
     assert b"UNPROVED" in (out / "sheet.html").read_bytes()
     assert {f["name"] for f in report["files"]} == left - {"report.json", "program.mine.txt"}
     assert not [p for p in out.iterdir() if b"T1 M6" in p.read_bytes() or b"ISO-10303-21" in p.read_bytes()]

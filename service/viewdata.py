@@ -1,0 +1,159 @@
+"""What a page shows of a job, made once when the job ends: part, remainder, deviation, way of the tool, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.keyed import KeyedPoints
+from geometry.sampling import SurfaceSamples
+from geometry.toolbody import ToolBody
+from service.convert import tool_bodies
+from service.delivery import Files
+from service.prepare import Prepared, clearances
+from service.reporting import REMAINDER_FLOOR_MM2
+from service.scoring import Score
+from service.sides import Look
+from service.version import VERSION
+from service.viewfile import Chunk, write_view
+from service.viewmesh import GRID as MESH_GRID
+from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
+from service.viewpaths import AXIS_UNIT, Way, path_chunks, way_of
+from verify.model import NcProgram, Proof, ProofSetup
+from zones.remainder import explain
+from zones.view import turned_samples
+
+VIEW_NAME = "view.bin"
+VIEW_VERSION = 1
+ARC = 10  # chords of a quarter circle in the profile of a tool
+EDGE_SPACING = 0.4  # mm
+NO_HOLDER = 30.0  # mm of shank that are drawn where no holder is known
+I64 = NDArray[np.int64]
+
+
+def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
+              rest: NDArray[np.bool_], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+              report: Mapping[str, Any]) -> Files:
+    """The view file of a planned job, as ``service.delivery`` takes it.
+
+    scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
+    zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
+    given_up, rest : (n,) bool, samples the plan gave up, and those that stay uncut
+    report   : whose places are in the setup frame; of a job that is not proved no program is given away
+    """
+    zones, entries = report["zones"], report["remainder"]
+    label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
+    label[rest] = len(zones) + _entries(ready, scored, given_up, rest, len(entries))
+    names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
+    way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, report["steps"])
+    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, report,
+                 open_=report["state"] == "proved")
+
+
+def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proof: Proof,
+                      programs: Sequence[NcProgram], setup: ProofSetup, report: Mapping[str, Any],
+                      spindle_tool: int = 0) -> Files:
+    """The view file of a verification; its program is that of whoever posted it, so its way is shown as it is.
+
+    samples : of the proof, in the frame of ``look``; report : whose places are in the setup frame
+    """
+    way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, spindle_tool=spindle_tool)
+    label = np.zeros(len(samples), np.int64)
+    return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, report, open_=True)
+
+
+def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: NDArray[np.bool_],
+             count: int) -> I64:
+    """(r,) which entry of the remainder, of ``count``, each sample that stays is of: that of the nearest one asked."""
+    s = scored.samples.subset(rest)
+    items = explain(s, scored.labels.subset(rest), ready.views, ready.decomposition, ready.lift, given_up[rest],
+                    clear=clearances(ready.setup))
+    kept = [i.samples for i in items if i.area >= REMAINDER_FLOOR_MM2]
+    asked = [(k, i) for k, i in enumerate(kept[:count]) if i is not None and len(i)]
+    if not asked:
+        return np.full(len(s), count, np.int64)
+    of = np.repeat([k for k, _ in asked], [len(i) for _, i in asked])
+    near = KeyedPoints(np.concatenate([i.face for _, i in asked]).astype(np.int64),
+                       np.concatenate([i.points for _, i in asked]))
+    row = near.nearest(s.face.astype(np.int64), s.points)[:, 0]
+    return np.where(row >= 0, of[row], count)
+
+
+def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, names: Sequence[Mapping[str, Any]],
+          proof: Proof, setup: ProofSetup, way: Way, report: Mapping[str, Any], *, open_: bool) -> Files:
+    part, d = ready.part, ready.decomposition
+    here = turned_samples(samples, look.rotation.T)
+    judged = Judged(here, label, proof.residual - setup.stock_allowance, np.asarray(proof.program >= 0),
+                    setup.scallop_height, setup.gouge_tolerance)
+    facets = facets_of(part, judged)
+    low = np.floor(np.min([part.bounds[0], *([np.minimum(way.start, way.end).min(axis=0)] if len(way.end) else [])],
+                          axis=0))
+    mesh, finer = mesh_chunks(facets, low)
+    path, longer, steps, grid = path_chunks(way, low, open_=open_)
+    chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path, *finer, *longer]
+    head = {
+        "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
+        "state": report["state"], "withheld": not open_, "labels": report.get("labels", {}),
+        "low_mm": low.tolist(), "mesh_grid_mm": MESH_GRID, "path_grid_mm": grid, "left_unit_mm": LEFT_UNIT,
+        "axis_unit": AXIS_UNIT, "bounds_mm": part.bounds.tolist(),
+        "budget_mm": {"scallop": setup.scallop_height, "gouge": setup.gouge_tolerance},
+        "labelled": list(names), "zones": [_zone(z) for z in report.get("zones", ())],
+        "walls": [_named(ready, w.id, w.faces) for w in d.walls],
+        "connections": [_named(ready, c.id, c.faces) | {"walls": list(c.walls)} for c in d.connections],
+        "remainder": [{k: e[k] for k in ("reason", "area_mm2", "faces", "would_need", "tool_at_hand", "why_left",
+                                         "at_mm")} for e in report.get("remainder", ())],
+        "tools": [tool_shape(t) for t in tool_bodies(ready.setup)], "steps": steps,
+        "programs": list(way.names), "seconds": round(float(way.ended[-1]), 3 if open_ else 0) if len(way.ended) else 0,
+        "findings": [_finding(f, way, open_) for f in report["findings"]],
+        "facts": {k: report.get(k) for k in ("coverage", "reach_coverage", "machining_time_s", "gouge_max_mm",
+                                             "complete")},
+        "counts": {"facets": len(facets.corners), "moves": len(way.end)},
+    }
+    return {VIEW_NAME: ("view", "", None, write_view(head, chunks))}
+
+
+def _zone(z: Mapping[str, Any]) -> dict[str, Any]:
+    return {"id": z["id"], "tool": z["tool"], "strategy": z["strategy"], "form": z["form"], "profile": z["profile"],
+            "area_mm2": z["area_mm2"], "faces": z["faces"], "coverage": z.get("coverage"),
+            "scallop_mm": z.get("scallop_mm"), "machining_time_s": z.get("machining_time_s")}
+
+
+def _named(ready: Prepared, name: str, faces: Sequence[int]) -> dict[str, Any]:
+    return {"id": name, "faces": [int(f) for f in faces], "at_mm": top_of(ready.part, faces)}
+
+
+def _finding(f: Mapping[str, Any], way: Way, open_: bool) -> dict[str, Any]:
+    """A finding of the report with the time at which it happens."""
+    place = f.get("tip") or f.get("point")
+    when = way.when(f["program"], f["line"], place)
+    keep = {k: f[k] for k in ("kind", "message", "program", "line", "zone", "face", "point", "depth", "limit", "count")}
+    return keep | {"time_s": None if when is None else round(when, 3 if open_ else 0)}
+
+
+def tool_shape(tool: ToolBody) -> dict[str, Any]:
+    """A tool assembly as profiles of its bodies: points (radius, height above the tip), mm, from below."""
+    r, c = tool.radius, tool.corner_radius
+    turn = np.linspace(0.0, 0.5 * np.pi, ARC + 1) if c > 0.0 else np.zeros(0)
+    corner = [[round(float(v), 5) for v in p] for p in np.column_stack([r - c + c * np.sin(turn),
+                                                                       c - c * np.cos(turn)])]
+    cutter = [[0.0, 0.0], *(corner or [[r, 0.0]]), [r, tool.flute_length]]
+    neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
+    bodies = [{"kind": "cutting part", "profile": cutter}]
+    if tool.neck_length > tool.flute_length:
+        bodies.append({"kind": "neck", "profile": [[neck, tool.flute_length], [neck, tool.neck_length]]})
+    end = max(tool.neck_length, tool.flute_length)
+    top = tool.stickout if tool.holder else tool.stickout + NO_HOLDER
+    bodies.append({"kind": "shank", "profile": [[shank, end], [shank, top]]})
+    z, holder = tool.stickout, []
+    for h in tool.holder:
+        holder += [[0.5 * h.diameter, z], [0.5 * h.diameter_top, z + h.length]]
+        z += h.length
+    if holder:
+        bodies.append({"kind": "holder", "profile": holder})
+    return {"id": tool.id, "number": tool.number, "kind": tool.kind, "diameter_mm": tool.diameter, "bodies": bodies}
+
+
+__all__ = ["VIEW_NAME", "VIEW_VERSION", "plan_view", "tool_shape", "verification_view"]

@@ -1,0 +1,241 @@
+"""The way of the tool for a page: moves of the programs that were simulated, with time stamps, in two levels of detail.
+
+The texts are read once more by the verifier's reader, so what is shown is what was proved, links and tool changes with
+it. A job that is not proved gives no program away: its way is drawn on a grid and thinned by ``COARSE``, as fine as the
+pictures of such a job, its times are whole seconds, and it has neither feeds, speeds nor lines.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.toolbody import ToolBody
+from service.viewfile import Chunk, Column
+from verify.duration import minutes_of
+from verify.model import NcProgram, ProofSetup
+from verify.reader import FEED
+from verify.sequence import Reading, read_all
+
+GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: places, and how far a drawn way may be off in the two levels
+COARSE = 0.25  # mm, grid and thinning of what is not proved
+START, RAPID, CUT = 0, 1, 2  # kinds of a row: a way begins here, or what the move that ends here is
+AXIS_UNIT = 32_000
+STEP_WORD = re.compile(r"^\s*[;(]\s*(?:-\s*)?(S\d+)\b")
+I64 = NDArray[np.int64]
+BOOL = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """All moves of a job one after the other, setup frame.
+
+    start, end : (m, 3) float64, mm, of the tip; axis : (m, 3) float64, unit, tip to spindle, at the end
+    feed       : (m,) bool; begun, ended : (m,) float64, s, from the start of the job
+    line, tool : (m,) int64, of the program; program : (m,) int64, which
+    step       : (m,) int64, row of ``steps``
+    steps      : what the moves belong to, in order
+    names      : of the programs
+    """
+
+    start: F64
+    end: F64
+    axis: F64
+    feed: BOOL
+    begun: F64
+    ended: F64
+    line: I64
+    tool: I64
+    program: I64
+    step: I64
+    steps: tuple[dict[str, Any], ...]
+    names: tuple[str, ...]
+
+    def when(self, program: str, line: int, place: Sequence[float] | None) -> float | None:
+        """Seconds at which a line is run, where it is nearest to a place, (3,) mm; None where there is no such line."""
+        if program not in self.names or line < 1:
+            return None
+        rows = np.flatnonzero((self.line == line) & (self.program == self.names.index(program)))
+        if not len(rows):
+            return None
+        if place is None:
+            return float(self.begun[rows[0]])
+        way = self.end[rows] - self.start[rows]
+        size = np.maximum((way * way).sum(axis=1), 1e-12)
+        share = np.clip(((np.asarray(place) - self.start[rows]) * way).sum(axis=1) / size, 0.0, 1.0)
+        near = int(np.argmin(np.linalg.norm(self.start[rows] + share[:, None] * way - place, axis=1)))
+        return float(self.begun[rows[near]] + share[near] * (self.ended[rows[near]] - self.begun[rows[near]]))
+
+
+def way_of(programs: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, rotation: F64,
+           planned: Sequence[dict[str, Any]] = (), spindle_tool: int = 0) -> Way:
+    """The way of the tool through programs.
+
+    programs, part, tools, setup, spindle_tool : as the proof took them, and errors as it raises them
+    rotation : (3, 3) float64, from the setup frame to that of the proof, no unit
+    planned  : the steps of the report, whose ids stand in comments of the programs; without, a step is a tool
+    """
+    readings = read_all(programs, part, tools, setup, spindle_tool, lambda _share: None)
+    known = {s["id"]: s for s in planned}
+    steps: list[dict[str, Any]] = []
+    parts, clock = [], 0.0
+    for k, (reading, given) in enumerate(zip(readings, programs, strict=True)):
+        p = reading.program
+        took = 60.0 * minutes_of(p, reading.setup)
+        ended = clock + np.cumsum(took)
+        clock = float(ended[-1]) if len(ended) else clock
+        step = _steps(p.line.astype(np.int64), p.tool.astype(np.int64), given, known, steps)
+        parts.append((reading.here(p.start) @ rotation, reading.here(p.end) @ rotation, _axes(reading) @ rotation,
+                      p.kind == FEED, ended - took, ended, p.line.astype(np.int64), p.tool.astype(np.int64),
+                      np.full(len(p), k, np.int64), step))
+    if not parts:
+        none, no = np.zeros((0, 3)), np.zeros(0, np.int64)
+        return Way(none, none, none, np.zeros(0, np.bool_), np.zeros(0), np.zeros(0), no, no, no, no, (), ())
+    start, end, axis, feed, begun, ended, line, tool, program, step = map(np.concatenate, zip(*parts, strict=True))
+    there = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+    return Way(start[there], end[there], axis[there], feed[there], begun[there], ended[there], line[there], tool[there],
+               program[there], step[there], tuple(steps), tuple(p.name for p in programs))
+
+
+def _axes(r: Reading) -> F64:
+    p = r.program
+    return r.here(np.tile([0.0, 0.0, 1.0], (len(p), 1)) if p.poses is None else p.poses.end_axis)
+
+
+def _steps(line: I64, tool: I64, given: NcProgram, known: dict[str, dict[str, Any]],
+           steps: list[dict[str, Any]]) -> I64:
+    """(m,) row of ``steps``, to which those of this program are added, for every move of it."""
+    first = len(steps)
+    marks: list[tuple[int, str]] = []
+    for number, text in enumerate(given.text.split("\n"), 1) if known else ():
+        found = STEP_WORD.match(text)
+        if found and found[1] in known and (not marks or marks[-1][1] != found[1]):
+            marks.append((number, found[1]))
+    if marks:
+        for _, name in marks:
+            s = known[name]
+            steps.append({"id": name, "zone": s["zone"], "operation": s["operation"], "strategy": s["strategy"],
+                          "program": given.name})
+        return np.maximum(np.searchsorted([m[0] for m in marks], line, side="right") - 1, 0) + first
+    change = np.concatenate([[0], np.cumsum(tool[1:] != tool[:-1])]) if len(tool) else np.zeros(0, np.int64)
+    for number in tool[np.concatenate([[0], np.flatnonzero(np.diff(tool)) + 1])].tolist() if len(tool) else ():
+        steps.append({"id": f"T{number}", "zone": None, "operation": "", "strategy": "", "program": given.name})
+    return np.asarray(change + first, np.int64)
+
+
+def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[Chunk], list[dict[str, Any]], float]:
+    """The way as chunks, step by step: rough, fine; and the steps with tool, times and axis, and mm of the grid.
+
+    low   : (3,) float64, mm, place of the grid's zero
+    open_ : whether the program may be known; else there is the rough level only
+    """
+    grid, rough = (GRID, ROUGH) if open_ else (COARSE, COARSE)
+    first, then, steps = [], [], []
+    for k, words in enumerate(way.steps):
+        rows = np.flatnonzero(way.step == k)
+        if not len(rows):
+            steps.append({**words, "tool": 0, "start_s": 0.0, "end_s": 0.0, "axis": [0.0, 0.0, 1.0]})
+            continue
+        turned = bool(np.ptp(way.axis[rows], axis=0).max() > 1e-6)
+        axis = None if turned else [round(v, 6) + 0.0 for v in way.axis[rows[0]].tolist()]
+        digits = 3 if open_ else 0
+        steps.append({**words, "tool": int(way.tool[rows[0]]), "start_s": round(float(way.begun[rows[0]]), digits),
+                      "end_s": round(float(way.ended[rows[-1]]), digits), "axis": axis})
+        line = _Line(way, rows)
+        first.append(_chunk(line.thinned(rough), k, 0, low, grid, open_, turned))
+        if open_:
+            then.append(_chunk(line.thinned(FINE), k, 1, low, grid, open_, turned))
+    return first, then, steps, grid
+
+
+class _Line:
+    """The moves of a step as rows: places, kinds, times, axes and lines."""
+
+    def __init__(self, way: Way, rows: I64) -> None:
+        start, end = way.start[rows], way.end[rows]
+        broken = np.ones(len(rows), np.bool_)
+        broken[1:] = np.abs(start[1:] - end[:-1]).max(axis=1) > 1e-6
+        at = np.arange(len(rows)) + np.cumsum(broken)  # where the end of each move goes
+        size = len(rows) + int(broken.sum())
+        self.kind = np.zeros(size, np.int64)
+        self.kind[at] = np.where(way.feed[rows], CUT, RAPID)
+        self.place, self.axis = np.zeros((size, 3)), np.zeros((size, 3))
+        self.time, self.line = np.zeros(size), np.zeros(size, np.int64)
+        for to, move, places, times in ((at, np.arange(len(rows)), end, way.ended[rows]),
+                                        (at[broken] - 1, np.flatnonzero(broken), start[broken],
+                                         way.begun[rows][broken])):
+            self.place[to], self.time[to] = places, times
+            self.axis[to], self.line[to] = way.axis[rows[move]], way.line[rows[move]]
+
+    def thinned(self, tolerance: float) -> tuple[F64, I64, F64, F64, I64]:
+        """Rows that are kept where the way may be off by a tolerance, mm."""
+        keep = thinned(self.place, self.kind, tolerance, np.linalg.norm(np.diff(self.axis, axis=0), axis=1))
+        return self.place[keep], self.kind[keep], self.time[keep], self.axis[keep], self.line[keep]
+
+
+def thinned(place: F64, kind: I64, tolerance: float, turned: F64 | None = None) -> I64:
+    """Rows of a polyline that are kept: every row left out is within the tolerance of the line that is left.
+
+    place  : (n, 3) float64, mm; kind : (n,) int64, what leads to each row; rows at which it changes stay
+    tolerance : mm
+    turned : (n - 1,) float64, rad, by which the tool turns on the way to the next row; such rows stay
+
+    Returns (k,) int64 row numbers.
+
+    Notes
+    -----
+    Every second row is left out where it is within what its neighbours' own omissions leave of the tolerance, until
+    none is. The bound is the sum of what each round was off by: a row left out in one round is within e of a
+    segment both of whose ends are within d of the next one, so within d + e of that.
+    """
+    rows = np.arange(len(place))
+    off = np.zeros(max(len(place) - 1, 0))  # of the segment behind each row
+    fixed = np.ones(len(place), np.bool_)
+    fixed[1:-1] = (kind[1:-1] != kind[2:]) | (kind[1:-1] == START)
+    if turned is not None and len(place) > 2:
+        fixed[1:-1] |= (turned[:-1] > 1e-6) | (turned[1:] > 1e-6)
+    while len(rows) > 2:
+        before = len(rows)
+        for parity in (0, 1):
+            middle = np.arange(1 + parity, len(rows) - 1, 2)
+            if not len(middle):
+                continue
+            a, b, c = place[rows[middle - 1]], place[rows[middle]], place[rows[middle + 1]]
+            way = c - a
+            size = np.maximum((way * way).sum(axis=1), 1e-18)
+            share = np.clip(((b - a) * way).sum(axis=1) / size, 0.0, 1.0)
+            far = np.linalg.norm(b - a - share[:, None] * way, axis=1)
+            far += np.maximum(off[middle - 1], off[middle])
+            gone = middle[(far <= tolerance) & ~fixed[rows[middle]]]
+            off[gone - 1] = far[np.searchsorted(middle, gone)]
+            stay = np.ones(len(rows), np.bool_)
+            stay[gone] = False
+            off = off[stay[:-1]] if len(off) else off
+            rows = rows[stay]
+        if before - len(rows) < 0.02 * before:
+            break
+    return rows
+
+
+def _chunk(rows: tuple[F64, I64, F64, F64, I64], step: int, lod: int, low: F64, grid: float, open_: bool,
+           turned: bool) -> Chunk:
+    place, kind, time, axis, line = rows
+    columns = {"place": Column(np.rint((place - low) / grid), 4, "steps"), "kind": Column(kind, 1)}
+    if open_:
+        columns["time"] = Column(np.rint(1000.0 * time), 4, "steps")
+        columns["line"] = Column(line, 4, "steps")
+    else:
+        columns["time"] = Column(1000.0 * np.rint(time), 4, "steps")
+    if turned:
+        columns["axis"] = Column(np.rint(AXIS_UNIT * axis), 4, "steps")
+    return Chunk("path", {"step": step, "lod": lod}, columns)
+
+
+__all__ = ["Way", "path_chunks", "thinned", "way_of"]
