@@ -50,6 +50,7 @@ from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_pa
 from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
 from service.stepnc import stepnc_files
 from service.trimmed import trimmed_faces
+from service.viewdata import plan_view, verification_view
 from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.life import with_fresh_cutters, worn
@@ -157,6 +158,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     if report["state"] == "proved":
         files.update(stepnc_files(written, look.part, tool_bodies(setup), proof_setup(ready, look), out))
     files.update(sheet_files(ready, written, report, files))
+    files.update(plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look),
+                           report))
     deliver(out, report, files)
     progress("done", 1.0)
     return report
@@ -284,6 +287,8 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                                           lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
             files[MESH_NAME] = ("machined", "", view.id, data)
+        files.update(verification_view(ready, look, dense, proof, given, proof_setup(ready, look, foreign=True), report,
+                                       spindle_tool))
         deliver(out, report, files)
     progress("done", 1.0)
     return report
