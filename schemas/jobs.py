@@ -27,6 +27,27 @@ class JobLinks(ReportModel):
     files: str | None = None
 
 
+class JobSummary(ReportModel):
+    """What the report says in figures; a release gate needs no more."""
+
+    complete: Annotated[bool | None, Field(description="Nothing is in the remainder; null for a verification.")] = None
+    coverage: Annotated[float | None, Field(description="Share of the machinable area that is proved.")] = None
+    reach_coverage: Annotated[float | None, Field(description="The same of what some tool and axis can reach.")] = None
+    findings: Annotated[int, Field(ge=0, description="How many findings the proof has.")] = 0
+    machining_time_s: float | None = None
+
+
+class JobWebhook(ReportModel):
+    """How the webhook of a job fares."""
+
+    url: str
+    state: Annotated[Literal["pending", "delivered", "given_up"], Field(
+        description="pending until the job has ended and the receiver has answered 2xx.")]
+    attempts: Annotated[int, Field(ge=0)] = 0
+    next_attempt_at: Annotated[str | None, Field(description="UTC, ISO 8601; null where none is planned.")] = None
+    problem: Annotated[str | None, Field(description="What went wrong at the last attempt.")] = None
+
+
 class Job(ReportModel):
     """One job."""
 
@@ -50,6 +71,8 @@ class Job(ReportModel):
     deadline_at: Annotated[str | None, Field(description="When it has to have ended, UTC, ISO 8601; null where no "
                                                          "deadline_s was given.")] = None
     finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while not final.")] = None
+    summary: Annotated[JobSummary | None, Field(description="Of a plan or verification that was proved or not.")] = None
+    webhook: Annotated[JobWebhook | None, Field(description="Null where no webhook_url was given.")] = None
     error: Annotated[Problem | None, Field(description="Why it failed.")] = None
     links: JobLinks
 

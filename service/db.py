@@ -41,9 +41,16 @@ jobs = sa.Table(
     Column("finished", Float, nullable=True),
     Column("started", Float, nullable=True),
     Column("deadline", Float, nullable=True),
+    Column("webhook_url", String(2000), nullable=True),
+    Column("webhook_state", String(16), nullable=True),
+    Column("webhook_attempts", Integer, nullable=False, server_default="0"),
+    Column("webhook_due", Float, nullable=True),
+    Column("webhook_problem", String(200), nullable=True),
+    Column("summary_json", Text, nullable=True),
     sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
     sa.Index("ix_jobs_state", "state", "lease_until"),
     sa.Index("ix_jobs_principal", "principal", "id"),
+    sa.Index("ix_jobs_webhook", "webhook_state", "webhook_due"),
 )
 
 library = sa.Table(

@@ -28,6 +28,7 @@ from service.settings import Settings, is_loopback
 from service.storage import check_free, check_writable
 from service.store import JobStore, LibraryStore, NewJob, Room
 from service.supervisor import Limits
+from service.webhooks import Courier
 from service.work import WorkConfig, run_job
 
 log = structlog.get_logger(__name__)
@@ -54,6 +55,7 @@ class Engine:
         self.room = Room(settings.max_queued, settings.max_queued_each)
         self._wake, self._stop = threading.Event(), threading.Event()
         self._lock: IO[str] | None = None
+        self._courier: Courier | None = None
         self._client: Any = None
         self._cluster: Any = None
         self._thread: threading.Thread | None = None
@@ -86,11 +88,16 @@ class Engine:
         self._open_client()
         self._thread = threading.Thread(target=self._dispatch, name="dispatcher", daemon=True)
         self._thread.start()
+        if self.settings.webhooks_on:
+            self._courier = Courier(self.settings, self.jobs)
+            self._courier.start()
 
     def close(self) -> None:
         """Stop dispatching and end the embedded cluster; its running jobs are left to the next start."""
         self._stop.set()
         self._wake.set()
+        if self._courier is not None:
+            self._courier.close()
         if self._thread is not None:
             self._thread.join(timeout=10)
         if self._cluster is not None:

@@ -52,6 +52,22 @@ def revoke(key_id: Annotated[str, typer.Argument(metavar="ID", help="As zonemill
         _store(data).revoke(key_id)
 
 
+@app.command("webhook-secret")
+def webhook_secret(principal: Annotated[str, typer.Option(help="Whose webhooks are to be checked.")],
+                   as_json: AsJson = False) -> None:
+    """Print the secret that signs the webhooks of a principal, for its receiver; needs ZONEMILL_WEBHOOK_SECRET."""
+    with reported(as_json):
+        from geometry.errors import SetupError
+        from service.server import settings_with
+        from service.webhooks import secret_of
+
+        master = settings_with({}).webhook_secret
+        if master is None:
+            raise SetupError("ZONEMILL_WEBHOOK_SECRET is not set", code="bad_setting",
+                             remedy="set it to what the service has, 32 characters at least")
+        typer.echo(secret_of(master.get_secret_value(), principal))
+
+
 def _store(data: Path | None) -> KeyStore:
     """The keys in the database of the settings; it is made where there is none."""
     from service.db import connect, migrate

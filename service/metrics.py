@@ -22,6 +22,8 @@ class Metrics:
         self.submissions = Counter("zonemill_submissions_total", "Jobs queued by this process.", ["kind"],
                                    registry=self.registry)
         self.jobs = Gauge("zonemill_jobs", "Jobs in the database by state.", ["state"], registry=self.registry)
+        self.webhooks = Gauge("zonemill_webhooks", "Webhooks in the database by state.", ["state"],
+                              registry=self.registry)
         self.capacity = Gauge("zonemill_capacity", "Jobs that can run at a time.", registry=self.registry)
         self.requests = Histogram("zonemill_request_seconds", "Time to the last byte of a response.",
                                   ["method", "route", "status"], registry=self.registry)
@@ -35,6 +37,8 @@ class Metrics:
         counts = engine.jobs.counts()
         for state in STATES:
             self.jobs.labels(state).set(counts.get(state, 0))
+        for state, count in engine.jobs.webhook_counts().items():
+            self.webhooks.labels(state).set(count)
         self.capacity.set(engine.capacity())
         return generate_latest(self.registry)
 

@@ -13,7 +13,7 @@ from typing import Any
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import error_from_dict
-from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks
+from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks, JobSummary, JobWebhook
 from schemas.keys import Key
 from schemas.problem import Problem
 from service.artifacts import Artifacts
@@ -49,7 +49,8 @@ def job_resource(row: RowMapping) -> Job:
                setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
                started_at=_time(row["started"]), deadline_at=_time(row["deadline"]),
-               finished_at=_time(row["finished"]), error=error, links=links)
+               finished_at=_time(row["finished"]), error=error, links=links, webhook=_webhook(row),
+               summary=JobSummary(**json.loads(row["summary_json"])) if row["summary_json"] else None)
 
 
 def key_resource(row: RowMapping) -> Key:
@@ -57,6 +58,14 @@ def key_resource(row: RowMapping) -> Key:
     return Key(id=row["id"], principal=row["principal"], scopes=row["scopes"].split(","), note=row["note"],
                created_at=_time(row["created"]) or "", expires_at=_time(row["expires"]),
                revoked_at=_time(row["revoked"]), last_used_at=_time(row["last_used"]))
+
+
+def _webhook(row: RowMapping) -> JobWebhook | None:
+    if row["webhook_url"] is None:
+        return None
+    waits = row["webhook_state"] == "pending" and row["webhook_attempts"]
+    return JobWebhook(url=row["webhook_url"], state=row["webhook_state"], attempts=row["webhook_attempts"],
+                      next_attempt_at=_time(row["webhook_due"]) if waits else None, problem=row["webhook_problem"])
 
 
 def event_data(row: RowMapping) -> str:

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -50,6 +50,19 @@ class Settings(BaseSettings):
     max_queued_each: Annotated[int, Field(ge=1, description="Most jobs of one principal that wait.")] = 200
     min_free_mb: Annotated[int, Field(ge=0, description="Free disk of the data folder below which nothing is accepted "
                                                         "or started, MB.")] = 500
+    webhook_origins: Annotated[list[str], Field(
+        description="Where webhooks may go, as JSON: [\"https://mes.example.com\"]; empty: nowhere.")] = []
+    webhook_networks: Annotated[list[str], Field(
+        description="Networks that are not public and may be called all the same, as JSON: [\"10.1.0.0/16\"].")] = []
+    webhook_secret: Annotated[SecretStr | None, Field(
+        min_length=32, description="Secret that those of the principals are derived from; unset: no webhooks.")] = None
+    webhook_secret_before: Annotated[SecretStr | None, Field(
+        min_length=32, description="The secret before, while receivers change over; both sign.")] = None
+    webhook_attempts: Annotated[int, Field(ge=1, le=50, description="How often a webhook is tried.")] = 10
+    webhook_retry_s: Annotated[float, Field(gt=0, description="Pause after the first attempt, s; then four times the "
+                                                              "one before, six hours at most.")] = 5.0
+    webhook_timeout_s: Annotated[float, Field(gt=0, le=60, description="For connecting, and for the rest of an "
+                                                                       "attempt, s.")] = 10.0
     log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Least level logged.")
                          ] = "info"
     log_format: Annotated[Literal["console", "json"], Field(description="Form of the log on stderr.")] = "console"
@@ -62,6 +75,18 @@ class Settings(BaseSettings):
         if parse(value).amount < 1:
             raise ValueError("lets nothing through")
         return value
+
+    @field_validator("webhook_origins")
+    @classmethod
+    def _origins(cls, value: list[str]) -> list[str]:
+        from service.targets import parse_origin
+
+        return [parse_origin(text) for text in value]
+
+    @field_validator("webhook_networks")
+    @classmethod
+    def _networks(cls, value: list[str]) -> list[str]:
+        return [str(ipaddress.ip_network(text)) for text in value]
 
     @field_validator("database_url")
     @classmethod
@@ -80,6 +105,11 @@ class Settings(BaseSettings):
     def url(self) -> str:
         """Database URL in use."""
         return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'zonemill.db'}"
+
+    @property
+    def webhooks_on(self) -> bool:
+        """Whether webhooks are sent at all."""
+        return bool(self.webhook_origins) and self.webhook_secret is not None
 
     @property
     def threads(self) -> int:

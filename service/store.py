@@ -18,6 +18,7 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.sql.dml import ReturningInsert
 
 from geometry.errors import CamError, ResourceError
+from schemas.jobs import FINAL_STATES
 from service.db import jobs, library
 from service.errors import KeyConflictError, NotFoundError, RateError
 
@@ -38,6 +39,7 @@ class NewJob:
     idempotency_key: str | None = None
     stock_sha256: str | None = None
     deadline_s: float | None = None
+    webhook_url: str | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,8 @@ class JobStore:
             "state": "queued", "stage": "queued", "progress": 0.0,
             "event_seq": 1, "attempt": 0, "created": now,
             "deadline": None if new.deadline_s is None else now + new.deadline_s,
+            "webhook_url": new.webhook_url, "webhook_state": "pending" if new.webhook_url else None,
+            "webhook_due": 0.0 if new.webhook_url else None, "webhook_attempts": 0,
         }
         try:
             with self.engine.begin() as c:
@@ -216,9 +220,10 @@ class JobStore:
                             event_seq=jobs.c.event_seq + 1)
 
     def finish(self, job_id: str, owner: str, state: str, *, artifact: str | None = None,
-               error: CamError | None = None) -> bool:
+               error: CamError | None = None, summary: dict[str, Any] | None = None) -> bool:
         """End a job that ``owner`` holds; False when it was cancelled or taken over meanwhile."""
         values: dict[str, Any] = {"progress": 1.0} if state != "failed" else {}
+        values["summary_json"] = json.dumps(summary) if summary else None
         return self._change(self._held(job_id, owner), state=state, stage=state, artifact=artifact,
                             error_json=json.dumps(error.as_dict()) if error else None, finished=time.time(),
                             event_seq=jobs.c.event_seq + 1, lease_owner=None, lease_until=None, **values)
@@ -270,6 +275,29 @@ class JobStore:
             return c.execute(jobs.update().where(gone).values(
                 state="failed", stage="failed", finished=time.time(), error_json=json.dumps(error.as_dict()),
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
+
+    def claim_webhook(self, lease_s: float) -> RowMapping | None:
+        """Take the webhook of an ended job that is due, for one attempt; unsettled, it is due again after the lease."""
+        now = time.time()
+        due = sa.and_(jobs.c.webhook_state == "pending", jobs.c.webhook_due <= now, jobs.c.state.in_(FINAL_STATES))
+        first = (sa.select(jobs.c.id).where(due).order_by(jobs.c.webhook_due, jobs.c.id).limit(1)
+                 .with_for_update(skip_locked=True).scalar_subquery())
+        change = (jobs.update().where(jobs.c.id == first, due)
+                  .values(webhook_due=now + lease_s, webhook_attempts=jobs.c.webhook_attempts + 1).returning(jobs))
+        with self.engine.begin() as c:
+            return c.execute(change).mappings().one_or_none()
+
+    def settle_webhook(self, job_id: str, attempt: int, state: str, problem: str | None = None,
+                       due: float | None = None) -> bool:
+        """Record what came of an attempt; False when a later one has begun."""
+        return self._change(sa.and_(jobs.c.id == job_id, jobs.c.webhook_attempts == attempt), webhook_state=state,
+                            webhook_due=due, webhook_problem=problem and problem[:200])
+
+    def webhook_counts(self) -> dict[str, int]:
+        """Number of webhooks by state."""
+        query = sa.select(jobs.c.webhook_state, sa.func.count()).where(jobs.c.webhook_state.is_not(None))
+        with self.engine.connect() as c:
+            return {state: count for state, count in c.execute(query.group_by(jobs.c.webhook_state))}
 
     def running(self) -> int:
         """How many jobs run under a lease that has not run out."""

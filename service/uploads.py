@@ -20,12 +20,13 @@ from service.convert import check_plannable, check_spindle_tool, no_stock_file, 
 from service.engine import Engine
 from service.errors import RequestError
 from service.store import NewJob
+from service.webhooks import registered
 
 CHUNK = 1 << 20
 MAX_SETUP_BYTES = 4_000_000
 KEY_LIMIT = 255
 TOOL_DIGITS = 6
-SPINDLE_TOOL, STOCK, DEADLINE = "spindle_tool", "stock", "deadline_s"
+SPINDLE_TOOL, STOCK, DEADLINE, WEBHOOK = "spindle_tool", "stock", "deadline_s", "webhook_url"
 DEADLINE_S = (1, 604800)  # a week
 
 
@@ -39,6 +40,7 @@ class Form:
     spindle_tool: int = 0
     stock: UploadFile | None = None
     deadline_s: float | None = None
+    webhook_url: str | None = None
 
 
 async def read_form(request: Request, *, with_program: bool) -> Form:
@@ -54,7 +56,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
         raise RequestError("the body must be multipart/form-data", code="not_multipart",
                            remedy="curl -F part=@PART.step -F 'setup=@SETUP.json;type=application/json'")
     try:
-        form = await request.form(max_files=6, max_fields=6, max_part_size=MAX_SETUP_BYTES)
+        form = await request.form(max_files=7, max_fields=7, max_part_size=MAX_SETUP_BYTES)
     except HTTPException as error:
         if error.status_code == 413:
             raise
@@ -62,11 +64,11 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                            remedy="let the client write the multipart body: curl -F part=@PART.step -F "
                                   "'setup=@SETUP.json;type=application/json'") from None
     names = [name for name, _ in form.multi_items()]
-    optional = {STOCK, DEADLINE} | ({SPINDLE_TOOL} if with_program else set())
+    optional = {STOCK, DEADLINE, WEBHOOK} | ({SPINDLE_TOOL} if with_program else set())
     for name in sorted(set(names) - wanted - optional):
         raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
-                           remedy=f"send {' and '.join(sorted(wanted))}, each once; {STOCK} where the blank is a file; "
-                                  f"{DEADLINE} where it must end in time")
+                           remedy=f"send {' and '.join(sorted(wanted))}, each once, and of "
+                                  f"{', '.join(sorted(optional))} what is wanted")
     for name in sorted(wanted | (optional & set(names))):
         if (count := names.count(name)) != 1:
             raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
@@ -81,7 +83,8 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
                 _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
                 stock if isinstance(stock, UploadFile) else None,
-                _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None)
+                _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None,
+                (await _bytes_of(form[WEBHOOK])).decode("latin-1") if WEBHOOK in names else None)
 
 
 def _tool_number(data: bytes) -> int:
@@ -122,11 +125,12 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     StepError, SetupError, ProgramError
         What was sent is wrong by itself; nothing is queued.
     RequestError
-        The Idempotency-Key is empty or too long.
+        The Idempotency-Key is empty or too long, or no webhook may go there.
     """
     if key is not None and not 1 <= len(key) <= KEY_LIMIT:
         raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
                            measured=len(key), limit=KEY_LIMIT, remedy="a UUID will do")
+    webhook = registered(form.webhook_url, engine.settings) if form.webhook_url is not None else None
     setup = parse_setup(form.setup, engine.library.all())
     if kind != "verify":
         check_plannable(setup)
@@ -139,7 +143,7 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     setup_sha = setup_sha256(setup)
     content = content_of(part_sha, setup_sha, program_sha, form.spindle_tool, stock_sha)
     return NewJob(kind, principal, content, part_sha, setup_sha, canonical_json(setup).decode(), _labels(setup),
-                  program_sha, form.spindle_tool, key, stock_sha, form.deadline_s)
+                  program_sha, form.spindle_tool, key, stock_sha, form.deadline_s, webhook)
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import time
 import uuid
@@ -61,10 +62,10 @@ def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
     store, owner = JobStore(connect(config.url)), f"worker-{uuid.uuid4().hex}"
     if not store.take_over(job_id, attempt, owner, config.lease_s):
         return "superseded"
-    row, key = store.get(job_id), None
+    row, key, summary = store.get(job_id), None, None
     failure: CamError | None = None
     try:
-        state, key = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
+        state, key, summary = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
     except CancelledError:
         return "stopped"
     except CamError as error:
@@ -76,9 +77,20 @@ def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
         if failure.code == STORAGE_FULL and row["attempt"] < config.max_attempts:
             return "put back" if _record(lambda: store.put_back(job_id, owner), config.lease_s) else "superseded"
         state = "failed"
-    ended = _record(lambda: store.finish(job_id, owner, state, artifact=key, error=failure), config.lease_s)
+    ended = _record(lambda: store.finish(job_id, owner, state, artifact=key, error=failure, summary=summary),
+                    config.lease_s)
     log.info("job ended", job=job_id, attempt=attempt, state=state, recorded=ended)
     return state if ended else "superseded"
+
+
+def summary_of(folder: Path) -> dict[str, Any] | None:
+    """The figures of a report that a release gate looks at; None where there is no report."""
+    path = folder / "report.json"
+    if not path.exists():
+        return None
+    report = json.loads(path.read_bytes())
+    kept = {k: report.get(k) for k in ("complete", "coverage", "reach_coverage", "machining_time_s")}
+    return {**kept, "findings": len(report.get("findings") or [])}
 
 
 def _bug(error: Exception, job_id: str, attempt: int) -> InternalError:
@@ -108,14 +120,15 @@ class _Attempt:
         self.store, self.artifacts, self.config, self.row, self.owner = store, artifacts, config, row, owner
         self.renewed = time.monotonic()
 
-    def run(self) -> tuple[str, str]:
-        """Final state and key of the result."""
+    def run(self) -> tuple[str, str, dict[str, Any] | None]:
+        """Final state, key of the result and its figures."""
         row = self.row
         key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
                            row["spindle_tool"], row["stock_sha256"])
         if not self.artifacts.has_result(key):
             self._make(key)
-        return (self.artifacts.result(key) / "state").read_text().strip(), key
+        folder = self.artifacts.result(key)
+        return (folder / "state").read_text().strip(), key, summary_of(folder)
 
     def _make(self, key: str) -> None:
         try:

@@ -64,6 +64,10 @@ def multipart(with_program: bool) -> dict[str, Any]:
         "type": "number", "minimum": DEADLINE_S[0], "maximum": DEADLINE_S[1],
         "description": "Seconds from now by which the job has to have ended; one that has not is stopped and fails "
                        "with deadline_exceeded. No part of the content."}
+    properties["webhook_url"] = {
+        "type": "string", "format": "uri", "maxLength": 2000,
+        "description": "Called once with a POST when the job has ended: signed, tried again until it is answered with "
+                       "2xx (docs/service.md). Only to origins that the service allows. No part of the content."}
     schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
               "properties": properties, "required": required, "additionalProperties": False}
     return {"requestBody": {"required": True, "content": {"multipart/form-data": {

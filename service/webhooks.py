@@ -1,0 +1,155 @@
+"""Webhooks: one POST when a job ends, signed, tried again until it is taken, and kept in the job's row meanwhile.
+
+The form is that of Standard Webhooks 1.0: ``webhook-id`` is the same for every attempt and made from the job's id, so a
+receiver drops what it has had; ``webhook-timestamp`` is that of the attempt, so it drops what is old; the signature is
+HMAC-SHA256 over id, timestamp and body. Every principal has a secret of its own, derived from that of the service: who
+checks the webhooks of one cannot forge those of another, and no secret stands in the database.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import http.client
+import ipaddress
+import json
+import random
+import threading
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import structlog
+from sqlalchemy.engine import RowMapping
+
+from service.errors import RequestError
+from service.resources import job_resource
+from service.settings import Settings
+from service.store import JobStore
+from service.targets import BlockedError, check_allowed, parse_target, resolve, send
+from service.version import VERSION
+
+log = structlog.get_logger(__name__)
+
+SLOTS = 4
+LOOK_EVERY_S = 0.5
+LONGEST_PAUSE_S = 6 * 3600.0
+LARGEST_BODY = 256_000
+GONE = 410
+
+
+def secret_of(master: str, principal: str) -> str:
+    """The secret of a principal, as receivers' libraries take it: ``whsec_`` and base64."""
+    key = hmac.new(master.encode(), f"zonemill webhook {principal}".encode(), hashlib.sha256).digest()
+    return f"whsec_{base64.b64encode(key).decode()}"
+
+
+def signature(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
+    """``v1,`` and the signature, base64, of Standard Webhooks."""
+    key = base64.b64decode(secret.removeprefix("whsec_"))
+    text = f"{message_id}.{timestamp}.".encode() + body
+    return f"v1,{base64.b64encode(hmac.new(key, text, hashlib.sha256).digest()).decode()}"
+
+
+def pause_s(attempt: int, first_s: float) -> float:
+    """Pause after a failed attempt, s: four times the one before, six hours at most, a fifth of it by chance."""
+    pause = min(first_s * 4.0 ** min(attempt - 1, 20), LONGEST_PAUSE_S)
+    return pause * random.uniform(0.8, 1.2)
+
+
+def payload(row: RowMapping) -> bytes:
+    """The body: the job as the interface shows it, without how its webhook fares; the same at every attempt."""
+    job = job_resource(row).model_dump(mode="json", exclude={"webhook"})
+    message = {"type": "job.ended", "timestamp": job["finished_at"], "data": job}
+    body = json.dumps(message, separators=(",", ":")).encode()
+    if len(body) > LARGEST_BODY and job["error"]:
+        job["error"].update(measured=None, subjects=[], detail=job["error"]["detail"][:1000])
+        body = json.dumps(message, separators=(",", ":")).encode()
+    return body
+
+
+def registered(url: str, settings: Settings) -> str:
+    """A webhook's URL as it is kept.
+
+    Raises
+    ------
+    RequestError
+        Codes 'webhooks_off', 'bad_webhook_url', 'webhook_not_allowed'.
+    """
+    if not settings.webhooks_on:
+        raise RequestError("this service sends no webhooks", code="webhooks_off", subjects=("webhook_url",),
+                           remedy="leave webhook_url out and follow the job's events, or ask whoever runs the service")
+    check_allowed(parse_target(url), settings.webhook_origins)
+    return url
+
+
+class Courier:
+    """Delivers in the background; several services may do so side by side."""
+
+    def __init__(self, settings: Settings, jobs: JobStore) -> None:
+        self.settings, self.jobs = settings, jobs
+        self._networks = [ipaddress.ip_network(n) for n in settings.webhook_networks]
+        self._stop = threading.Event()
+        self._pool = ThreadPoolExecutor(SLOTS, thread_name_prefix="webhook")
+        self._thread = threading.Thread(target=self._run, name="courier", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop claiming; what is on its way ends by itself, and is sent again later if it did not."""
+        self._stop.set()
+        self._thread.join(timeout=5)
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _run(self) -> None:
+        busy: set[Future[None]] = set()
+        while not self._stop.is_set():
+            busy = {f for f in busy if not f.done()}
+            try:
+                # The lease outlasts every limit of an attempt: resolving, four connections, the rest.
+                while len(busy) < SLOTS and (row := self.jobs.claim_webhook(60 + 6 * self.settings.webhook_timeout_s)):
+                    busy.add(self._pool.submit(self._deliver, row))
+            except Exception:
+                log.exception("courier stumbled")  # database away: the next round tries again
+            self._stop.wait(timeout=LOOK_EVERY_S)
+
+    def _deliver(self, row: RowMapping) -> None:
+        attempt, settings = row["webhook_attempts"], self.settings
+        try:
+            problem, final = self._attempt(row)
+            if problem is None:
+                self.jobs.settle_webhook(row["id"], attempt, "delivered")
+            elif final or attempt >= settings.webhook_attempts:
+                self.jobs.settle_webhook(row["id"], attempt, "given_up", problem)
+            else:
+                due = time.time() + pause_s(attempt, settings.webhook_retry_s)
+                self.jobs.settle_webhook(row["id"], attempt, "pending", problem, due)
+            log.info("webhook", job=row["id"], attempt=attempt, problem=problem)
+        except Exception:
+            log.exception("webhook not settled", job=row["id"])  # it is due again when its lease has run out
+
+    def _attempt(self, row: RowMapping) -> tuple[str | None, bool]:
+        """What went wrong, None when it was taken, and whether to give up."""
+        try:
+            target = parse_target(row["webhook_url"])
+            check_allowed(target, self.settings.webhook_origins)
+            addresses = resolve(target, self._networks)
+            body = payload(row)
+            status = send(target, addresses, body, self._headers(row, body), self.settings.webhook_timeout_s)
+        except (RequestError, BlockedError) as error:
+            return str(error), False
+        except (OSError, http.client.HTTPException) as error:
+            return f"no answer ({type(error).__name__})", False
+        if 200 <= status < 300:
+            return None, False
+        return f"answered {status}", status == GONE
+
+    def _headers(self, row: RowMapping, body: bytes) -> dict[str, str]:
+        message_id, now = f"msg_{row['id']}", int(time.time())
+        secrets = [s.get_secret_value() for s in (self.settings.webhook_secret, self.settings.webhook_secret_before)
+                   if s is not None]
+        signed = " ".join(signature(secret_of(s, row["principal"]), message_id, now, body) for s in secrets)
+        return {"Content-Type": "application/json", "User-Agent": f"zonemill/{VERSION}", "Connection": "close",
+                "webhook-id": message_id, "webhook-timestamp": str(now), "webhook-signature": signed}
