@@ -71,6 +71,8 @@ class Job(ReportModel):
     deadline_at: Annotated[str | None, Field(description="When it has to have ended, UTC, ISO 8601; null where no "
                                                          "deadline_s was given.")] = None
     finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while not final.")] = None
+    expired_at: Annotated[str | None, Field(description="When its files were let go of, UTC, ISO 8601; null while "
+                                                        "they are kept.")] = None
     summary: Annotated[JobSummary | None, Field(description="Of a plan or verification that was proved or not.")] = None
     webhook: Annotated[JobWebhook | None, Field(description="Null where no webhook_url was given.")] = None
     error: Annotated[Problem | None, Field(description="Why it failed.")] = None

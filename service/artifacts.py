@@ -8,10 +8,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import shutil
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -111,6 +112,13 @@ def sync_tree(folder: Path) -> None:
     sync_folder(folder)
 
 
+def _drop(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
 class Artifacts:
     """Blobs and results below one data folder."""
 
@@ -171,10 +179,46 @@ class Artifacts:
             shutil.rmtree(workspace, ignore_errors=True)  # another job with the same content was faster
         sync_folder(target.parent)
 
-    def sweep(self) -> None:
-        """Drop what a crash left half written; only for the sole owner of the data folder."""
+    def take(self, key: str) -> bool:
+        """Whether the result is there; if so it counts as used now, and is not removed for a while."""
+        try:
+            os.utime(self.result(key))
+        except FileNotFoundError:
+            return False
+        return True
+
+    def stored(self) -> Iterator[Path]:
+        """Every upload and every result; the stem of the name is its hash."""
+        yield from self.root.glob("blobs/*/*.bin")
+        yield from self.root.glob("artifacts/*/*")
+
+    def remove(self, path: Path, before: float) -> bool:
+        """Remove an upload or a result that was last used before a time (s); False when it was used after all.
+
+        It is moved away first and looked at again there, so that nobody who takes it up meanwhile finds half of it.
+        """
+        trash = self.tmp / f"trash-{uuid.uuid4().hex}"
+        try:
+            if path.stat().st_mtime >= before:
+                return False
+            os.rename(path, trash)
+        except FileNotFoundError:
+            return False  # another service was faster
+        if trash.stat().st_mtime >= before and not path.exists():
+            os.rename(trash, path)
+            return False
+        _drop(trash)
+        return True
+
+    def sweep(self, before: float = math.inf) -> int:
+        """Drop what a crash left half written before a time (s); without one only for the sole owner of the folder."""
+        count = 0
         for path in self.tmp.iterdir():
-            if path.is_dir():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
+            try:
+                old = path.stat().st_mtime < before
+            except FileNotFoundError:
+                continue
+            if old:
+                _drop(path)
+                count += 1
+        return count

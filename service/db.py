@@ -47,10 +47,12 @@ jobs = sa.Table(
     Column("webhook_due", Float, nullable=True),
     Column("webhook_problem", String(200), nullable=True),
     Column("summary_json", Text, nullable=True),
+    Column("expired", Float, nullable=True),
     sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
     sa.Index("ix_jobs_state", "state", "lease_until"),
     sa.Index("ix_jobs_principal", "principal", "id"),
     sa.Index("ix_jobs_webhook", "webhook_state", "webhook_due"),
+    sa.Index("ix_jobs_expiry", "expired", "finished"),
 )
 
 library = sa.Table(

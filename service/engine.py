@@ -23,6 +23,7 @@ from geometry.errors import ResourceError, SetupError
 from service.artifacts import Artifacts
 from service.db import connect, migrate
 from service.errors import RateError, UnavailableError
+from service.janitor import Janitor
 from service.keys import KeyStore
 from service.settings import Settings, is_loopback
 from service.storage import check_free, check_writable
@@ -91,6 +92,8 @@ class Engine:
         if self.settings.webhooks_on:
             self._courier = Courier(self.settings, self.jobs)
             self._courier.start()
+        self.janitor = Janitor(self.settings, self.jobs, self.artifacts)
+        self.janitor.start()
 
     def close(self) -> None:
         """Stop dispatching and end the embedded cluster; its running jobs are left to the next start."""
@@ -98,6 +101,7 @@ class Engine:
         self._wake.set()
         if self._courier is not None:
             self._courier.close()
+        self.janitor.close()
         if self._thread is not None:
             self._thread.join(timeout=10)
         if self._cluster is not None:

@@ -10,6 +10,7 @@
         ├── RequestError          the request is malformed: missing part, bad cursor
         ├── KeyConflictError      an Idempotency-Key used before with other content
         ├── NotReadyError         the job has no such result yet
+        ├── GoneError             the files of the job were let go of
         ├── WithheldError         programs of a job that is not proved
         ├── RateError             too many requests
         └── UnavailableError      database or engine cannot be reached
@@ -83,6 +84,12 @@ class NotReadyError(ServiceError):
     default_code = "not_ready"
 
 
+class GoneError(ServiceError):
+    """The files of the job were let go of."""
+
+    default_code = "result_expired"
+
+
 class WithheldError(ServiceError):
     """The programs of a job that is not proved are not handed out."""
 
@@ -135,6 +142,7 @@ ERROR_TABLE: dict[type[CamError], Mapping] = {
     RequestError: Mapping(_S.UNPROCESSABLE_ENTITY, "bad-request", "The request is wrong", 2),
     KeyConflictError: Mapping(_S.UNPROCESSABLE_ENTITY, "key-conflict", "The key was used for other content", 2),
     NotReadyError: Mapping(_S.CONFLICT, "not-ready", "The job has no such result", 2),
+    GoneError: Mapping(_S.GONE, "gone", "The files are gone", 2),
     WithheldError: Mapping(_S.CONFLICT, "withheld", "Programs of an unproved job are withheld", 3),
     RateError: Mapping(_S.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests", 2),
     UnavailableError: Mapping(_S.SERVICE_UNAVAILABLE, "unavailable", "The service is not ready", 1),

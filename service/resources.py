@@ -17,7 +17,7 @@ from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks, JobSumm
 from schemas.keys import Key
 from schemas.problem import Problem
 from service.artifacts import Artifacts
-from service.errors import NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
+from service.errors import GoneError, NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
 
 MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml",
                ".html": "text/html; charset=utf-8", ".pdf": "application/pdf", ".bin": "application/octet-stream"}
@@ -49,7 +49,8 @@ def job_resource(row: RowMapping) -> Job:
                setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
                started_at=_time(row["started"]), deadline_at=_time(row["deadline"]),
-               finished_at=_time(row["finished"]), error=error, links=links, webhook=_webhook(row),
+               finished_at=_time(row["finished"]), expired_at=_time(row["expired"]), error=error,
+               links=links, webhook=_webhook(row),
                summary=JobSummary(**json.loads(row["summary_json"])) if row["summary_json"] else None)
 
 
@@ -103,12 +104,17 @@ def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
     ------
     NotReadyError
         The job has not ended, or ended without a result.
+    GoneError
+        Its files were let go of.
     NotFoundError
         The data folder has lost it.
     """
     if row["state"] not in FINAL_STATES:
         raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
                             remedy=f"wait until it ends; GET {path_of(row)}/events follows it")
+    if row["expired"] is not None:
+        raise GoneError(f"the files of job {row['id']} were let go of at {_time(row['expired'])}",
+                        subjects=(row["id"],), remedy="post the same content again")
     if not row["artifact"]:
         cancelled = row["state"] == "cancelled"
         remedy = ("it was cancelled: post it again, under another Idempotency-Key if it had one" if cancelled else

@@ -50,6 +50,10 @@ class Settings(BaseSettings):
     max_queued_each: Annotated[int, Field(ge=1, description="Most jobs of one principal that wait.")] = 200
     min_free_mb: Annotated[int, Field(ge=0, description="Free disk of the data folder below which nothing is accepted "
                                                         "or started, MB.")] = 500
+    retention_days: Annotated[float, Field(ge=0, description="Files of a job are removed so many days after its end; "
+                                                             "0 keeps them.")] = 0.0
+    sweep_every_s: Annotated[float, Field(gt=0, description="How often old and unused files are looked for, s.")
+                             ] = 3600.0
     webhook_origins: Annotated[list[str], Field(
         description="Where webhooks may go, as JSON: [\"https://mes.example.com\"]; empty: nowhere.")] = []
     webhook_networks: Annotated[list[str], Field(

@@ -293,6 +293,24 @@ class JobStore:
         return self._change(sa.and_(jobs.c.id == job_id, jobs.c.webhook_attempts == attempt), webhook_state=state,
                             webhook_due=due, webhook_problem=problem and problem[:200])
 
+    def expire(self, job_id: str) -> bool:
+        """Let go of the files of a job that has ended; its Idempotency-Key is free again."""
+        return self._change(sa.and_(jobs.c.id == job_id, _ended()), **_let_go())
+
+    def expire_before(self, ended: float) -> int:
+        """The same for every job that ended before a time, s; returns how many."""
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(_ended(), jobs.c.finished < ended).values(**_let_go())).rowcount
+
+    def files_named(self) -> set[str]:
+        """Hashes of every upload and result that a job has a use for."""
+        columns = (jobs.c.part_sha256, jobs.c.stock_sha256, jobs.c.program_sha256, jobs.c.artifact)
+        named: set[str] = set()
+        with self.engine.connect() as c:
+            for row in c.execute(sa.select(*columns).where(jobs.c.expired.is_(None))):
+                named.update(filter(None, row))
+        return named
+
     def webhook_counts(self) -> dict[str, int]:
         """Number of webhooks by state."""
         query = sa.select(jobs.c.webhook_state, sa.func.count()).where(jobs.c.webhook_state.is_not(None))
@@ -318,6 +336,15 @@ class JobStore:
     def _change(self, where: sa.ColumnElement[bool], **values: Any) -> bool:
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(where).values(**values)).rowcount == 1
+
+
+def _ended() -> sa.ColumnElement[bool]:
+    return sa.and_(jobs.c.state.in_(FINAL_STATES), jobs.c.expired.is_(None))
+
+
+def _let_go() -> dict[str, Any]:
+    """What expiry leaves of a job: who, when, labels, state, hashes and figures; the setup goes with the files."""
+    return {"expired": time.time(), "artifact": None, "idempotency_key": None, "setup_json": "{}"}
 
 
 def _waiting(principal: str | None = None) -> sa.ScalarSelect[int]:

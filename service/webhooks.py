@@ -59,7 +59,7 @@ def pause_s(attempt: int, first_s: float) -> float:
 
 def payload(row: RowMapping) -> bytes:
     """The body: the job as the interface shows it, without how its webhook fares; the same at every attempt."""
-    job = job_resource(row).model_dump(mode="json", exclude={"webhook"})
+    job = job_resource(row).model_dump(mode="json", exclude={"webhook", "expired_at"})
     message = {"type": "job.ended", "timestamp": job["finished_at"], "data": job}
     body = json.dumps(message, separators=(",", ":")).encode()
     if len(body) > LARGEST_BODY and job["error"]:

@@ -125,9 +125,9 @@ class _Attempt:
         row = self.row
         key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
                            row["spindle_tool"], row["stock_sha256"])
-        if not self.artifacts.has_result(key):
-            self._make(key)
         folder = self.artifacts.result(key)
+        if not self.artifacts.take(key):
+            self._make(key)
         return (folder / "state").read_text().strip(), key, summary_of(folder)
 
     def _make(self, key: str) -> None:

@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse, Response
 from schemas.jobs import Job, JobFiles, JobKind, JobPage, JobState
 from schemas.report import Report, Verification
 from schemas.zones import Zones
-from service.errors import NotFoundError, NotReadyError, RequestError, UnauthorizedError, WithheldError
+from service.errors import GoneError, NotFoundError, NotReadyError, RequestError, UnauthorizedError, WithheldError
 from service.principals import Principal, Submitter
 from service.problems import responses
 from service.resources import (
@@ -29,7 +29,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "If-None-Match names what the client has."}}
-RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError)
+RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError, GoneError)
 
 
 @router.get("", operation_id="listJobs", summary="Your jobs, newest first", responses=responses(UnauthorizedError,
@@ -51,11 +51,15 @@ def get_job(request: Request, principal: Principal, job_id: str) -> Job:
 
 
 @router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job", responses=ONE)
-def cancel_job(request: Request, principal: Submitter, job_id: str) -> Job:
+def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annotated[bool, Query(
+        description="Let go of its files too, also where it has ended before: they are answered with 410 from now on "
+                    "and removed within hours, unless another job has the same.")] = False) -> Job:
     """Cancel a job that has not ended; one that has ended is answered as it is."""
     jobs = request.app.state.engine.jobs
     jobs.get(job_id, principal)
     jobs.cancel(job_id)
+    if purge:
+        jobs.expire(job_id)
     return job_resource(jobs.get(job_id, principal))
 
 
@@ -87,7 +91,7 @@ FILE_OK: dict[int | str, dict[str, Any]] = {200: {
 
 @router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
             responses=FILE_OK | UNCHANGED | responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError,
-                                          WithheldError))
+                                          GoneError, WithheldError))
 def get_file(request: Request, principal: Principal, job_id: str, name: str) -> Response:
     """A file. Programs and STEP-NC of a job that is not proved are withheld (409)."""
     row = request.app.state.engine.jobs.get(job_id, principal)
