@@ -1,7 +1,7 @@
 """What all wire models share: unknown fields refused, finite numbers only, references into the libraries.
 
-A *library reference* is the string ``"lib:NAME"`` written where an object would stand (a tool, the machine,
-the material). It is replaced by the library's entry before validation; the entries come in by the
+A *library reference* is the string ``"lib:NAME"`` or ``"lib:NAME@VERSION"`` written where an object would stand (a
+tool, the machine, the material). It is replaced by the library's entry before validation; the entries come in by the
 validation context ``{"library": {"tools": {...}, "machines": {...}, "materials": {...}}}``.
 """
 
@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema
 
 LIBRARY_PREFIX = "lib:"
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-REFERENCE_PATTERN = r"^lib:[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+REFERENCE_PATTERN = r"^lib:[A-Za-z0-9][A-Za-z0-9._-]{0,63}(@[1-9][0-9]{0,8})?$"
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite JSON number; strings and booleans are refused."""
@@ -42,6 +42,18 @@ class ReportModel(BaseModel):
     """Base of everything the service sends: later fields may be added, so unknown ones are kept."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+
+
+def split_reference(text: str) -> tuple[str, int | None]:
+    """Name and version of what stands behind "lib:"; None for the newest.
+
+    >>> split_reference("finisher"), split_reference("finisher@3"), split_reference("finisher@x")
+    (('finisher', None), ('finisher', 3), ('finisher@x', None))
+    """
+    name, at, version = text.rpartition("@")
+    if at and version.isascii() and version.isdecimal() and not version.startswith("0") and len(version) < 10:
+        return name, int(version)
+    return text, None
 
 
 def library_entry(value: Any, shelf: str, info: ValidationInfo) -> Any:

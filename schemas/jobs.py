@@ -25,6 +25,7 @@ class JobLinks(ReportModel):
     zones: str | None = None
     report: str | None = None
     files: str | None = None
+    view: Annotated[str | None, Field(description="The page of the job, for people.")] = None
 
 
 class JobSummary(ReportModel):
@@ -35,6 +36,15 @@ class JobSummary(ReportModel):
     reach_coverage: Annotated[float | None, Field(description="The same of what some tool and axis can reach.")] = None
     findings: Annotated[int, Field(ge=0, description="How many findings the proof has.")] = 0
     machining_time_s: float | None = None
+
+
+class JobLibraryEntry(ReportModel):
+    """A version of a library entry that a job used."""
+
+    shelf: Literal["tools", "machines", "materials"]
+    name: str
+    version: Annotated[int, Field(ge=1)]
+    shared: bool = False
 
 
 class JobWebhook(ReportModel):
@@ -74,6 +84,7 @@ class Job(ReportModel):
     expired_at: Annotated[str | None, Field(description="When its files were let go of, UTC, ISO 8601; null while "
                                                         "they are kept.")] = None
     summary: Annotated[JobSummary | None, Field(description="Of a plan or verification that was proved or not.")] = None
+    library: Annotated[list[JobLibraryEntry], Field(description="What its setup referred to, as of its posting.")] = []
     webhook: Annotated[JobWebhook | None, Field(description="Null where no webhook_url was given.")] = None
     error: Annotated[Problem | None, Field(description="Why it failed.")] = None
     links: JobLinks
@@ -113,24 +124,31 @@ class JobEvent(ReportModel):
     progress: Annotated[float, Field(ge=0, le=1)]
 
 
-class ToolEntry(ReportModel):
-    """A tool of the library; a setup refers to it as "lib:NAME"."""
+class LibraryEntry(ReportModel):
+    """What every entry of a library says of itself."""
 
     name: str
+    version: Annotated[int | None, Field(ge=1, description="A setup may say lib:NAME@VERSION; null for built-in "
+                                                           "ones.")] = None
+    shared: Annotated[bool, Field(description="It belongs to all principals.")] = False
+    created_at: Annotated[str | None, Field(description="When this version was written, UTC, ISO 8601.")] = None
+
+
+class ToolEntry(LibraryEntry):
+    """A tool of the library; a setup refers to it as "lib:NAME"."""
+
     entry: Tool
 
 
-class MachineEntry(ReportModel):
+class MachineEntry(LibraryEntry):
     """A machine of the library."""
 
-    name: str
     entry: Machine
 
 
-class MaterialEntry(ReportModel):
+class MaterialEntry(LibraryEntry):
     """A material of the library, or a built-in one."""
 
-    name: str
     entry: Material
     built_in: Annotated[bool, Field(description="Built-in materials are used by their name alone and cannot be "
                                                 "changed.")] = False

@@ -48,6 +48,7 @@ jobs = sa.Table(
     Column("webhook_problem", String(200), nullable=True),
     Column("summary_json", Text, nullable=True),
     Column("expired", Float, nullable=True),
+    Column("library_json", Text, nullable=True),
     sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
     sa.Index("ix_jobs_state", "state", "lease_until"),
     sa.Index("ix_jobs_principal", "principal", "id"),
@@ -55,11 +56,15 @@ jobs = sa.Table(
     sa.Index("ix_jobs_expiry", "expired", "finished"),
 )
 
-library = sa.Table(
-    "library", metadata,
+entries = sa.Table(
+    "entries", metadata,
+    Column("owner", String(64), primary_key=True),
     Column("shelf", String(16), primary_key=True),
     Column("name", String(64), primary_key=True),
+    Column("version", Integer, primary_key=True),
     Column("entry_json", Text, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("deleted", Float, nullable=True),
 )
 
 api_keys = sa.Table(

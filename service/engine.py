@@ -25,9 +25,10 @@ from service.db import connect, migrate
 from service.errors import RateError, UnavailableError
 from service.janitor import Janitor
 from service.keys import KeyStore
+from service.library import LibraryStore
 from service.settings import Settings, is_loopback
 from service.storage import check_free, check_writable
-from service.store import JobStore, LibraryStore, NewJob, Room
+from service.store import JobStore, NewJob, Room
 from service.supervisor import Limits
 from service.webhooks import Courier
 from service.work import WorkConfig, run_job

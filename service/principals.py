@@ -70,14 +70,26 @@ def _refuse_foreign_pages(request: Request) -> None:
                                  remedy="call the service by 127.0.0.1, or make a key: zonemill keys create")
 
 
+def require(who: Identity, *scopes: str) -> None:
+    """Refuse who has none of these scopes.
+
+    Raises
+    ------
+    ForbiddenError
+        Code 'scope_missing'.
+    """
+    if not who.scopes & set(scopes):
+        raise ForbiddenError(f"the key {who.key_id} has not the scope {' or '.join(scopes)}", code="scope_missing",
+                             subjects=(str(who.key_id),), measured=sorted(who.scopes), limit=list(scopes),
+                             remedy=f"ask for a key with the scope {scopes[0]}")
+
+
 def _needs(*scopes: str) -> Callable[[Identity], str]:
     """Dependency that wants one of these scopes and gives the name of the principal."""
 
     def check(who: Annotated[Identity, Depends(identity)]) -> str:
-        if scopes and not who.scopes & set(scopes):
-            raise ForbiddenError(f"the key {who.key_id} has not the scope {' or '.join(scopes)}", code="scope_missing",
-                                 subjects=(str(who.key_id),), measured=sorted(who.scopes), limit=list(scopes),
-                                 remedy=f"ask for a key with the scope {scopes[0]}")
+        if scopes:
+            require(who, *scopes)
         return who.principal
 
     return check

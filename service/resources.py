@@ -29,7 +29,8 @@ def path_of(row: RowMapping) -> str:
     return f"/v1/jobs/{row['id']}"
 
 
-def _time(seconds: float | None) -> str | None:
+def time_text(seconds: float | None) -> str | None:
+    """A time of the database as the interface writes it: UTC, ISO 8601."""
     if seconds is None:
         return None
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
@@ -38,7 +39,7 @@ def _time(seconds: float | None) -> str | None:
 def job_resource(row: RowMapping) -> Job:
     """The job as the interface shows it."""
     path, kind = path_of(row), row["kind"]
-    links = JobLinks(self=path, events=f"{path}/events", files=f"{path}/files",
+    links = JobLinks(self=path, events=f"{path}/events", files=f"{path}/files", view=f"{path}/view",
                      zones=f"{path}/zones" if kind != "verify" else None,
                      report=f"{path}/report" if kind != "zones" else None)
     error = None
@@ -47,18 +48,18 @@ def job_resource(row: RowMapping) -> Job:
     return Job(id=row["id"], kind=kind, state=row["state"], stage=row["stage"], progress=row["progress"],
                attempt=row["attempt"], content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
                setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
-               labels=json.loads(row["labels_json"]), created_at=_time(row["created"]) or "",
-               started_at=_time(row["started"]), deadline_at=_time(row["deadline"]),
-               finished_at=_time(row["finished"]), expired_at=_time(row["expired"]), error=error,
-               links=links, webhook=_webhook(row),
+               labels=json.loads(row["labels_json"]), created_at=time_text(row["created"]) or "",
+               started_at=time_text(row["started"]), deadline_at=time_text(row["deadline"]),
+               finished_at=time_text(row["finished"]), expired_at=time_text(row["expired"]), error=error,
+               links=links, webhook=_webhook(row), library=json.loads(row["library_json"] or "[]"),
                summary=JobSummary(**json.loads(row["summary_json"])) if row["summary_json"] else None)
 
 
 def key_resource(row: RowMapping) -> Key:
     """A key as the interface shows it, without its secret and the hash of that."""
     return Key(id=row["id"], principal=row["principal"], scopes=row["scopes"].split(","), note=row["note"],
-               created_at=_time(row["created"]) or "", expires_at=_time(row["expires"]),
-               revoked_at=_time(row["revoked"]), last_used_at=_time(row["last_used"]))
+               created_at=time_text(row["created"]) or "", expires_at=time_text(row["expires"]),
+               revoked_at=time_text(row["revoked"]), last_used_at=time_text(row["last_used"]))
 
 
 def _webhook(row: RowMapping) -> JobWebhook | None:
@@ -66,7 +67,7 @@ def _webhook(row: RowMapping) -> JobWebhook | None:
         return None
     waits = row["webhook_state"] == "pending" and row["webhook_attempts"]
     return JobWebhook(url=row["webhook_url"], state=row["webhook_state"], attempts=row["webhook_attempts"],
-                      next_attempt_at=_time(row["webhook_due"]) if waits else None, problem=row["webhook_problem"])
+                      next_attempt_at=time_text(row["webhook_due"]) if waits else None, problem=row["webhook_problem"])
 
 
 def event_data(row: RowMapping) -> str:
@@ -113,7 +114,7 @@ def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
         raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
                             remedy=f"wait until it ends; GET {path_of(row)}/events follows it")
     if row["expired"] is not None:
-        raise GoneError(f"the files of job {row['id']} were let go of at {_time(row['expired'])}",
+        raise GoneError(f"the files of job {row['id']} were let go of at {time_text(row['expired'])}",
                         subjects=(row["id"],), remedy="post the same content again")
     if not row["artifact"]:
         cancelled = row["state"] == "cancelled"

@@ -19,7 +19,7 @@ from sqlalchemy.sql.dml import ReturningInsert
 
 from geometry.errors import CamError, ResourceError
 from schemas.jobs import FINAL_STATES
-from service.db import jobs, library
+from service.db import jobs
 from service.errors import KeyConflictError, NotFoundError, RateError
 
 
@@ -40,6 +40,7 @@ class NewJob:
     stock_sha256: str | None = None
     deadline_s: float | None = None
     webhook_url: str | None = None
+    library_json: str | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ class JobStore:
             "deadline": None if new.deadline_s is None else now + new.deadline_s,
             "webhook_url": new.webhook_url, "webhook_state": "pending" if new.webhook_url else None,
             "webhook_due": 0.0 if new.webhook_url else None, "webhook_attempts": 0,
+            "library_json": new.library_json,
         }
         try:
             with self.engine.begin() as c:
@@ -362,54 +364,3 @@ def _insert_where(values: dict[str, Any], condition: sa.ColumnElement[bool]) -> 
     columns = [jobs.c[name] for name in values]
     row = sa.select(*(sa.cast(sa.literal(values[c.name], c.type), c.type) for c in columns)).where(condition)
     return jobs.insert().from_select(columns, row).returning(jobs)
-
-
-class LibraryStore:
-    """Tools, machines and materials that setups refer to; entries are JSON that was validated before."""
-
-    def __init__(self, engine: Engine) -> None:
-        self.engine = engine
-
-    def all(self) -> dict[str, dict[str, Any]]:
-        """Every entry by shelf and name."""
-        found: dict[str, dict[str, Any]] = {"tools": {}, "machines": {}, "materials": {}}
-        with self.engine.connect() as c:
-            for row in c.execute(sa.select(library).order_by(library.c.name)).mappings():
-                found.setdefault(row["shelf"], {})[row["name"]] = json.loads(row["entry_json"])
-        return found
-
-    def get(self, shelf: str, name: str) -> Any:
-        """One entry.
-
-        Raises
-        ------
-        NotFoundError
-            There is none of that name.
-        """
-        entries = self.all()[shelf]
-        if name not in entries:
-            raise NotFoundError(f"the library of {shelf} has no entry '{name}'", code="no_such_entry", subjects=(name,),
-                                remedy=f"GET /v1/{shelf} lists the entries")
-        return entries[name]
-
-    def put(self, shelf: str, name: str, entry: Any) -> bool:
-        """Write an entry; returns whether it is new."""
-        at = sa.and_(library.c.shelf == shelf, library.c.name == name)
-        text = json.dumps(entry, sort_keys=True)
-        with self.engine.begin() as c:
-            if c.execute(library.update().where(at).values(entry_json=text)).rowcount:
-                return False
-            c.execute(library.insert().values(shelf=shelf, name=name, entry_json=text))
-        return True
-
-    def delete(self, shelf: str, name: str) -> None:
-        """Remove an entry.
-
-        Raises
-        ------
-        NotFoundError
-            There is none of that name.
-        """
-        self.get(shelf, name)
-        with self.engine.begin() as c:
-            c.execute(library.delete().where(library.c.shelf == shelf, library.c.name == name))

@@ -131,7 +131,8 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
         raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
                            measured=len(key), limit=KEY_LIMIT, remedy="a UUID will do")
     webhook = registered(form.webhook_url, engine.settings) if form.webhook_url is not None else None
-    setup = parse_setup(form.setup, engine.library.all())
+    library = engine.library.view(principal)
+    setup = parse_setup(form.setup, library)
     if kind != "verify":
         check_plannable(setup)
     check_spindle_tool(setup, form.spindle_tool)
@@ -143,7 +144,7 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
     setup_sha = setup_sha256(setup)
     content = content_of(part_sha, setup_sha, program_sha, form.spindle_tool, stock_sha)
     return NewJob(kind, principal, content, part_sha, setup_sha, canonical_json(setup).decode(), _labels(setup),
-                  program_sha, form.spindle_tool, key, stock_sha, form.deadline_s, webhook)
+                  program_sha, form.spindle_tool, key, stock_sha, form.deadline_s, webhook, library.as_json())
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:

@@ -1,14 +1,14 @@
-"""/v1/tools, /v1/machines, /v1/materials: entries that a setup refers to as "lib:NAME".
+"""/v1/tools, /v1/machines, /v1/materials: entries that a setup refers to as "lib:NAME", or "lib:NAME@3".
 
-The libraries belong to the whole service, not to one principal. A job keeps the entry as it was when the job was
-posted: later changes of the library change no job.
+Who writes an entry owns it. A job keeps the entry as it was when the job was posted, and says which versions it used:
+later changes of the library change no job.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request, Response, status
+from fastapi import APIRouter, Path, Query, Request, Response, status
 
 from schemas.base import NAME_PATTERN
 from schemas.jobs import MachineEntry, MachineList, MaterialEntry, MaterialList, ToolEntry, ToolList
@@ -16,103 +16,135 @@ from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material
 from schemas.tools import Tool
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
-from service.principals import Principal, Submitter
+from service.keys import ADMIN, SUBMIT, Identity
+from service.library import SHARED, Entry, LibraryStore
+from service.principals import Principal, Who, require
 from service.problems import responses
+from service.resources import time_text
 
 router = APIRouter(prefix="/v1", tags=["libraries"])
 
 Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry; a setup says lib:NAME.")]
 MaterialName = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$",
                                    description="Name as GET /v1/materials lists it; built-in ones may have blanks.")]
+Version = Annotated[int | None, Query(ge=1, le=10**9, description="A version that is not the newest.")]
+Shared = Annotated[bool, Query(description="The entry of all principals rather than one's own; for admins.")]
 READ = responses(UnauthorizedError)
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
-WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The entry is new."}}
+WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The name is new."}}
 
 
-def _put(request: Request, response: Response, shelf: str, name: str, entry: Tool | Machine | Material) -> None:
-    new = request.app.state.engine.library.put(shelf, name, entry.model_dump(mode="json"))
+def _library(request: Request) -> LibraryStore:
+    store: LibraryStore = request.app.state.engine.library
+    return store
+
+
+def _about(entry: Entry) -> dict[str, Any]:
+    return {"name": entry.name, "version": entry.version, "shared": entry.shared,
+            "created_at": time_text(entry.created)}
+
+
+def _owner(who: Identity, shared: bool) -> str:
+    """Whose entries a request writes; shared ones are for admins."""
+    require(who, ADMIN if shared else SUBMIT)
+    return SHARED if shared else who.principal
+
+
+def _put(request: Request, response: Response, who: Identity, shelf: str, name: str, shared: bool,
+         value: Tool | Machine | Material) -> dict[str, Any]:
+    entry, new = _library(request).put(_owner(who, shared), shelf, name, value.model_dump(mode="json"))
     response.status_code = status.HTTP_201_CREATED if new else status.HTTP_200_OK
+    return _about(entry)
+
+
+def _tool(entry: Entry) -> ToolEntry:
+    return ToolEntry(**_about(entry), entry=Tool.model_validate(entry.value))
+
+
+def _machine(entry: Entry) -> MachineEntry:
+    return MachineEntry(**_about(entry), entry=Machine.model_validate(entry.value))
+
+
+def _material(entry: Entry) -> MaterialEntry:
+    return MaterialEntry(**_about(entry), entry=Material.model_validate(entry.value))
 
 
 @router.get("/tools", operation_id="listTools", responses=READ)
-def list_tools(request: Request, _: Principal) -> ToolList:
-    """All tools."""
-    entries = request.app.state.engine.library.all()["tools"]
-    return ToolList(items=[ToolEntry(name=n, entry=Tool.model_validate(e)) for n, e in entries.items()])
+def list_tools(request: Request, principal: Principal) -> ToolList:
+    """The newest version of every tool you can refer to."""
+    return ToolList(items=[_tool(e) for e in _library(request).all(principal, "tools")])
 
 
 @router.get("/tools/{name}", operation_id="getTool", responses=ONE)
-def get_tool(request: Request, _: Principal, name: Name) -> ToolEntry:
-    """One tool."""
-    return ToolEntry(name=name, entry=Tool.model_validate(request.app.state.engine.library.get("tools", name)))
+def get_tool(request: Request, principal: Principal, name: Name, version: Version = None) -> ToolEntry:
+    """One tool: yours of that name, else the shared one."""
+    return _tool(_library(request).get(principal, "tools", name, version))
 
 
 @router.put("/tools/{name}", operation_id="putTool", responses=WRITE)
-def put_tool(request: Request, response: Response, _: Submitter, name: Name, tool: Tool) -> ToolEntry:
-    """Write a tool, new or over the old one."""
-    _put(request, response, "tools", name, tool)
-    return ToolEntry(name=name, entry=tool)
+def put_tool(request: Request, response: Response, who: Who, name: Name, tool: Tool,
+             shared: Shared = False) -> ToolEntry:
+    """Write a tool; what is not as the newest version becomes the next one."""
+    return ToolEntry(**_put(request, response, who, "tools", name, shared, tool), entry=tool)
 
 
 @router.delete("/tools/{name}", operation_id="deleteTool", status_code=204, responses=ONE)
-def delete_tool(request: Request, _: Submitter, name: Name) -> None:
-    """Remove a tool."""
-    request.app.state.engine.library.delete("tools", name)
+def delete_tool(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+    """Remove a tool with all its versions; jobs keep what they used."""
+    _library(request).delete(_owner(who, shared), "tools", name)
 
 
 @router.get("/machines", operation_id="listMachines", responses=READ)
-def list_machines(request: Request, _: Principal) -> MachineList:
-    """All machines."""
-    entries = request.app.state.engine.library.all()["machines"]
-    return MachineList(items=[MachineEntry(name=n, entry=Machine.model_validate(e)) for n, e in entries.items()])
+def list_machines(request: Request, principal: Principal) -> MachineList:
+    """The newest version of every machine you can refer to."""
+    return MachineList(items=[_machine(e) for e in _library(request).all(principal, "machines")])
 
 
 @router.get("/machines/{name}", operation_id="getMachine", responses=ONE)
-def get_machine(request: Request, _: Principal, name: Name) -> MachineEntry:
-    """One machine."""
-    entry = request.app.state.engine.library.get("machines", name)
-    return MachineEntry(name=name, entry=Machine.model_validate(entry))
+def get_machine(request: Request, principal: Principal, name: Name, version: Version = None) -> MachineEntry:
+    """One machine: yours of that name, else the shared one."""
+    return _machine(_library(request).get(principal, "machines", name, version))
 
 
 @router.put("/machines/{name}", operation_id="putMachine", responses=WRITE)
-def put_machine(request: Request, response: Response, _: Submitter, name: Name, machine: Machine) -> MachineEntry:
-    """Write a machine, new or over the old one."""
-    _put(request, response, "machines", name, machine)
-    return MachineEntry(name=name, entry=machine)
+def put_machine(request: Request, response: Response, who: Who, name: Name, machine: Machine,
+                shared: Shared = False) -> MachineEntry:
+    """Write a machine; what is not as the newest version becomes the next one."""
+    return MachineEntry(**_put(request, response, who, "machines", name, shared, machine), entry=machine)
 
 
 @router.delete("/machines/{name}", operation_id="deleteMachine", status_code=204, responses=ONE)
-def delete_machine(request: Request, _: Submitter, name: Name) -> None:
-    """Remove a machine."""
-    request.app.state.engine.library.delete("machines", name)
+def delete_machine(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+    """Remove a machine with all its versions; jobs keep what they used."""
+    _library(request).delete(_owner(who, shared), "machines", name)
 
 
 @router.get("/materials", operation_id="listMaterials", responses=READ)
-def list_materials(request: Request, _: Principal) -> MaterialList:
-    """Built-in materials, then the library's."""
-    entries = request.app.state.engine.library.all()["materials"]
-    own = [MaterialEntry(name=n, entry=Material.model_validate(e)) for n, e in entries.items()]
+def list_materials(request: Request, principal: Principal) -> MaterialList:
+    """Built-in materials, then the newest version of every one you can refer to."""
+    own = [_material(e) for e in _library(request).all(principal, "materials")]
     return MaterialList(items=[MaterialEntry(name=n, entry=m, built_in=True) for n, m in MATERIALS.items()] + own)
 
 
 @router.get("/materials/{name}", operation_id="getMaterial", responses=ONE)
-def get_material(request: Request, _: Principal, name: MaterialName) -> MaterialEntry:
-    """One material: the library's entry of that name, else the built-in one."""
-    library = request.app.state.engine.library
-    if name in MATERIALS and name not in library.all()["materials"]:
-        return MaterialEntry(name=name, entry=MATERIALS[name], built_in=True)
-    entry = library.get("materials", name)
-    return MaterialEntry(name=name, entry=Material.model_validate(entry))
+def get_material(request: Request, principal: Principal, name: MaterialName, version: Version = None) -> MaterialEntry:
+    """One material: yours of that name, else the shared one, else the built-in one."""
+    try:
+        return _material(_library(request).get(principal, "materials", name, version))
+    except NotFoundError:
+        if name not in MATERIALS or version is not None:
+            raise
+    return MaterialEntry(name=name, entry=MATERIALS[name], built_in=True)
 
 
 @router.put("/materials/{name}", operation_id="putMaterial", responses=WRITE)
-def put_material(request: Request, response: Response, _: Submitter, name: Name, material: Material) -> MaterialEntry:
-    """Write a material, new or over the old one."""
-    _put(request, response, "materials", name, material)
-    return MaterialEntry(name=name, entry=material)
+def put_material(request: Request, response: Response, who: Who, name: Name, material: Material,
+                 shared: Shared = False) -> MaterialEntry:
+    """Write a material; what is not as the newest version becomes the next one."""
+    return MaterialEntry(**_put(request, response, who, "materials", name, shared, material), entry=material)
 
 
 @router.delete("/materials/{name}", operation_id="deleteMaterial", status_code=204, responses=ONE)
-def delete_material(request: Request, _: Submitter, name: Name) -> None:
-    """Remove a material from the library."""
-    request.app.state.engine.library.delete("materials", name)
+def delete_material(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+    """Remove a material with all its versions from the library; jobs keep what they used."""
+    _library(request).delete(_owner(who, shared), "materials", name)

@@ -30,6 +30,37 @@ def test_a_setup_refers_to_the_library_and_keeps_what_it_found(client, post, fin
     assert post(client, setup=setup).json()["code"] == "bad_setup"
 
 
+def test_a_job_says_which_versions_it_used_and_a_setup_may_name_one(make_client, post, bearer):
+    client = make_client()
+    ada, bob = bearer(client, "ada"), bearer(client, "bob")
+    root = bearer(client, "root", "admin")
+    for diameter in (4, 5, 5, 6):
+        written = client.put("/v1/tools/cutter", json={**TOOL, "diameter_mm": diameter}, headers=ada).json()
+    assert written["version"] == 3 and written["shared"] is False and written["created_at"]
+    assert client.put("/v1/tools/cutter?shared=true", json=TOOL, headers=ada).json()["code"] == "scope_missing"
+    assert client.put("/v1/machines/mill?shared=true", json={"max_rpm": 9000}, headers=root).status_code == 201
+    assert client.get("/v1/tools/cutter?version=1", headers=ada).json()["entry"]["diameter_mm"] == 4
+    setup = {"tools": ["lib:cutter@2"], "machine": "lib:mill"}
+    job = post(client, setup=setup, headers=ada).json()
+    assert job["library"] == [{"shelf": "machines", "name": "mill", "version": 1, "shared": True},
+                              {"shelf": "tools", "name": "cutter", "version": 2, "shared": False}]
+    # the same tool and machine written out are the same content
+    written_out = {"tools": [{**TOOL, "diameter_mm": 5}], "machine": {"max_rpm": 9000}}
+    plain = post(client, setup=written_out, headers=ada).json()
+    assert plain["content_sha256"] == job["content_sha256"] and plain["library"] == []
+    for wrong in ("lib:cutter@9", "lib:cutter@0", "lib:cutter@", "lib:"):
+        answer = post(client, setup={"tools": [wrong]}, headers=ada)
+        assert answer.status_code == 422 and answer.json()["subjects"] == ["tools[0]"], wrong
+    # bob sees the shared machine, and neither ada's tool nor its name
+    answer = post(client, setup=setup, headers=bob)
+    assert answer.status_code == 422 and "it has: none" in answer.json()["detail"]
+    assert client.get("/v1/tools", headers=bob).json() == {"items": []}
+    assert client.get("/v1/tools/cutter", headers=bob).status_code == 404
+    assert client.delete("/v1/tools/cutter", headers=bob).status_code == 404
+    assert client.get("/v1/machines/mill", headers=bob).json()["shared"] is True
+    assert client.delete("/v1/machines/mill?shared=true", headers=bob).status_code == 403
+
+
 def test_library_entries_are_checked(client):
     answer = client.put("/v1/tools/x", json={**TOOL, "diameter_mm": -1})
     assert answer.status_code == 422 and answer.headers["content-type"] == "application/problem+json"

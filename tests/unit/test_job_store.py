@@ -14,7 +14,8 @@ import service.db
 from service.artifacts import Artifacts, artifact_key
 from service.db import connect, jobs, metadata, migrate
 from service.errors import KeyConflictError, NotFoundError, RateError
-from service.store import JobStore, LibraryStore, NewJob, Room
+from service.library import LibraryStore
+from service.store import JobStore, NewJob, Room
 
 
 @pytest.fixture
@@ -55,9 +56,19 @@ def test_jobs_of_the_first_schema_are_kept(tmp_path):
         old = sa.Table("jobs", sa.MetaData(), autoload_with=connection)
         assert "spindle_tool" not in old.columns
         connection.execute(old.insert().values({k: v for k, v in row.items() if k in old.columns}))
+        shelf = sa.Table("library", sa.MetaData(), autoload_with=connection)
+        connection.execute(shelf.insert().values(shelf="tools", name="a", entry_json='{"x": 1}'))
         connection.commit()
     migrate(url)
     assert JobStore(connect(url)).get("x")["spindle_tool"] == 0
+    kept = LibraryStore(connect(url)).get("anybody", "tools", "a")
+    assert (kept.value, kept.version, kept.shared) == ({"x": 1}, 1, True)
+    with connect(url).connect() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0001")
+        connection.commit()
+        assert connection.exec_driver_sql("SELECT entry_json FROM library").scalar() == '{"x": 1}'
+        command.upgrade(config, "head")
 
 
 def test_a_key_names_one_job_per_principal(store):
@@ -181,15 +192,6 @@ def test_cancel_takes_the_job_from_its_holder(store):
     assert store.counts() == {"cancelled": 1} and store.running() == 0
     with pytest.raises(NotFoundError):
         store.get(job, "somebody else")
-
-
-def test_the_library_keeps_entries_by_shelf(url):
-    shelf = LibraryStore(connect(url))
-    assert shelf.put("tools", "a", {"x": 1}) and not shelf.put("tools", "a", {"x": 2})
-    assert shelf.all()["tools"] == {"a": {"x": 2}} and shelf.get("tools", "a") == {"x": 2}
-    shelf.delete("tools", "a")
-    with pytest.raises(NotFoundError):
-        shelf.delete("tools", "a")
 
 
 def test_results_appear_whole_and_once(tmp_path):

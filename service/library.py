@@ -1,0 +1,168 @@
+"""Tools, machines and materials that setups refer to: each write is a version, and versions are never written over.
+
+An entry belongs to a principal, or to all of them (shared, written by admins only). A name means the principal's own
+entry where there is one, else the shared one. ``lib:NAME`` is the newest version, ``lib:NAME@3`` the third. A deleted
+name cannot be referred to any more; written again it goes on counting, so that ``@3`` never means two things.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Engine, RowMapping
+from sqlalchemy.exc import IntegrityError
+
+from schemas.base import split_reference
+from service.db import entries
+from service.errors import NotFoundError
+
+SHELVES = ("tools", "machines", "materials")
+SHARED = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One version of an entry. value : plain JSON data, validated when it was written."""
+
+    shelf: str
+    name: str
+    version: int
+    shared: bool
+    created: float
+    value: Any
+
+
+class LibraryStore:
+    """The table of entries."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+
+    def all(self, principal: str, shelf: str) -> list[Entry]:
+        """The newest version of every entry a principal can refer to, by name."""
+        query = (sa.select(entries).where(_seen_by(principal), entries.c.shelf == shelf, entries.c.deleted.is_(None))
+                 .order_by(entries.c.name, entries.c.owner, entries.c.version))
+        with self.engine.connect() as c:
+            # Shared ones come first and old ones before new ones, so the last of a name is the one that counts.
+            return list({row["name"]: _entry(row) for row in c.execute(query).mappings()}.values())
+
+    def get(self, principal: str, shelf: str, name: str, version: int | None = None) -> Entry:
+        """One entry, its newest version unless one is named.
+
+        Raises
+        ------
+        NotFoundError
+            There is none of that name, or no such version.
+        """
+        query = (sa.select(entries).where(_seen_by(principal), entries.c.shelf == shelf, entries.c.name == name,
+                                          entries.c.deleted.is_(None))
+                 .order_by(entries.c.owner.desc(), entries.c.version.desc()))
+        with self.engine.connect() as c:
+            rows = list(c.execute(query).mappings())
+        rows = [r for r in rows if r["owner"] == rows[0]["owner"]]
+        for row in rows:
+            if version in (None, row["version"]):
+                return _entry(row)
+        what = f"no entry '{name}'" if not rows else f"no version {version} of '{name}'"
+        raise NotFoundError(f"the library of {shelf} has {what}", code="no_such_entry", subjects=(name,),
+                            measured=version, limit=[r["version"] for r in rows] or None,
+                            remedy=f"GET /v1/{shelf} lists the entries")
+
+    def put(self, owner: str, shelf: str, name: str, value: Any) -> tuple[Entry, bool]:
+        """Write an entry, as the next version unless it is as the newest. Returns it and whether the name is new."""
+        text = json.dumps(value, sort_keys=True)
+        at = sa.and_(entries.c.owner == owner, entries.c.shelf == shelf, entries.c.name == name)
+        while True:
+            with self.engine.connect() as c:
+                newest = c.execute(sa.select(entries).where(at).order_by(entries.c.version.desc()).limit(1)
+                                   ).mappings().one_or_none()
+            live = newest is not None and newest["deleted"] is None
+            if newest is not None and live and newest["entry_json"] == text:
+                return _entry(newest), False
+            row = {"owner": owner, "shelf": shelf, "name": name, "version": newest["version"] + 1 if newest else 1,
+                   "entry_json": text, "created": time.time()}
+            try:
+                with self.engine.begin() as c:
+                    made = c.execute(entries.insert().values(row).returning(entries)).mappings().one()
+                return _entry(made), not live
+            except IntegrityError:
+                continue  # somebody wrote that very version meanwhile
+
+    def delete(self, owner: str, shelf: str, name: str) -> None:
+        """Take a name out of the library; jobs keep what they used.
+
+        Raises
+        ------
+        NotFoundError
+            This owner has none of that name.
+        """
+        change = entries.update().where(entries.c.owner == owner, entries.c.shelf == shelf, entries.c.name == name,
+                                        entries.c.deleted.is_(None)).values(deleted=time.time())
+        with self.engine.begin() as c:
+            if not c.execute(change).rowcount:
+                raise NotFoundError(f"the library of {shelf} has no entry '{name}' of this owner", subjects=(name,),
+                                    code="no_such_entry", remedy=f"GET /v1/{shelf} lists the entries")
+
+    def view(self, principal: str) -> LibraryView:
+        """The library as a setup of this principal sees it."""
+        return LibraryView(self, principal)
+
+
+class LibraryView(Mapping[str, Mapping[str, Any]]):
+    """Shelves by name, entries by what stands behind ``lib:``; keeps in ``used`` what was looked up."""
+
+    def __init__(self, store: LibraryStore, principal: str) -> None:
+        self.used: dict[tuple[str, str, int], Entry] = {}
+        self._shelves = {shelf: _Shelf(store, principal, shelf, self.used) for shelf in SHELVES}
+
+    def __getitem__(self, shelf: str) -> Mapping[str, Any]:
+        return self._shelves[shelf]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._shelves)
+
+    def __len__(self) -> int:
+        return len(self._shelves)
+
+    def as_json(self) -> str | None:
+        """What was used, for the job's row; None where nothing was."""
+        found = [{"shelf": e.shelf, "name": e.name, "version": e.version, "shared": e.shared}
+                 for _, e in sorted(self.used.items())]
+        return json.dumps(found) if found else None
+
+
+class _Shelf(Mapping[str, Any]):
+    """Entries of one shelf by reference; only what is asked for is read."""
+
+    def __init__(self, store: LibraryStore, principal: str, shelf: str,
+                 used: dict[tuple[str, str, int], Entry]) -> None:
+        self.store, self.principal, self.shelf, self.used = store, principal, shelf, used
+
+    def __getitem__(self, reference: str) -> Any:
+        name, version = split_reference(reference)
+        try:
+            found = self.store.get(self.principal, self.shelf, name, version)
+        except NotFoundError as error:
+            raise KeyError(reference) from error
+        self.used[found.shelf, found.name, found.version] = found
+        return found.value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([e.name for e in self.store.all(self.principal, self.shelf)])
+
+    def __len__(self) -> int:
+        return len(self.store.all(self.principal, self.shelf))
+
+
+def _seen_by(principal: str) -> sa.ColumnElement[bool]:
+    return entries.c.owner.in_((SHARED, principal))
+
+
+def _entry(row: RowMapping) -> Entry:
+    return Entry(row["shelf"], row["name"], row["version"], row["owner"] == SHARED, row["created"],
+                 json.loads(row["entry_json"]))
