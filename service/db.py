@@ -56,6 +56,14 @@ jobs = sa.Table(
     sa.Index("ix_jobs_expiry", "expired", "finished"),
 )
 
+labels = sa.Table(
+    "labels", metadata,
+    Column("job_id", String(40), primary_key=True),
+    Column("key", String(32), primary_key=True),
+    Column("value", String(200), nullable=False),
+    sa.Index("ix_labels_value", "key", "value", "job_id"),
+)
+
 entries = sa.Table(
     "entries", metadata,
     Column("owner", String(64), primary_key=True),

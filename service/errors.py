@@ -11,6 +11,7 @@
         ├── KeyConflictError      an Idempotency-Key used before with other content
         ├── NotReadyError         the job has no such result yet
         ├── GoneError             the files of the job were let go of
+        ├── RangeError            a part of a file that it has not
         ├── WithheldError         programs of a job that is not proved
         ├── RateError             too many requests
         └── UnavailableError      database or engine cannot be reached
@@ -90,6 +91,12 @@ class GoneError(ServiceError):
     default_code = "result_expired"
 
 
+class RangeError(ServiceError):
+    """A part of a file is asked for that it has not."""
+
+    default_code = "range_not_satisfiable"
+
+
 class WithheldError(ServiceError):
     """The programs of a job that is not proved are not handed out."""
 
@@ -143,6 +150,7 @@ ERROR_TABLE: dict[type[CamError], Mapping] = {
     KeyConflictError: Mapping(_S.UNPROCESSABLE_ENTITY, "key-conflict", "The key was used for other content", 2),
     NotReadyError: Mapping(_S.CONFLICT, "not-ready", "The job has no such result", 2),
     GoneError: Mapping(_S.GONE, "gone", "The files are gone", 2),
+    RangeError: Mapping(_S.REQUESTED_RANGE_NOT_SATISFIABLE, "range-not-satisfiable", "The file has no such part", 2),
     WithheldError: Mapping(_S.CONFLICT, "withheld", "Programs of an unproved job are withheld", 3),
     RateError: Mapping(_S.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests", 2),
     UnavailableError: Mapping(_S.SERVICE_UNAVAILABLE, "unavailable", "The service is not ready", 1),

@@ -28,4 +28,5 @@ class HeadMiddleware:
         async def without_body(message: Message) -> None:
             await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
 
-        await self.app({**scope, "method": "GET"}, receive, without_body)
+        headers = [(k, v) for k, v in scope["headers"] if k != b"range"]  # parts are for GET alone (RFC 9110, 14.2)
+        await self.app({**scope, "method": "GET", "headers": headers}, receive, without_body)

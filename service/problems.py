@@ -21,6 +21,7 @@ from service.errors import (
     ForbiddenError,
     MethodError,
     NotFoundError,
+    RangeError,
     RateError,
     RequestError,
     ServiceError,
@@ -49,6 +50,8 @@ def problem_response(request: Request, error: CamError, headers: dict[str, str] 
         extra["WWW-Authenticate"] = "Bearer"
     if isinstance(error, RateError | UnavailableError):
         extra["Retry-After"] = str(error.retry_after_s or 5)
+    if isinstance(error, RangeError):
+        extra["Content-Range"] = f"bytes */{error.limit}"
     return JSONResponse(body, body["status"], extra, PROBLEM_MEDIA_TYPE)
 
 

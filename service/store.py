@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import secrets
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from sqlalchemy.sql.dml import ReturningInsert
 
 from geometry.errors import CamError, ResourceError
 from schemas.jobs import FINAL_STATES
-from service.db import jobs
+from service.db import jobs, labels
 from service.errors import KeyConflictError, NotFoundError, RateError
 
 
@@ -95,6 +96,9 @@ class JobStore:
         try:
             with self.engine.begin() as c:
                 made = c.execute(_insert_where(values, _has_room(new.principal, room))).mappings().one_or_none()
+                if made is not None and new.labels:
+                    c.execute(labels.insert(), [{"job_id": made["id"], "key": k, "value": v}
+                                                for k, v in new.labels.items()])
             if made is not None:
                 return made, True
             found = self._by_key(new.principal, new.idempotency_key)
@@ -169,22 +173,35 @@ class JobStore:
         query = sa.select(jobs).where(jobs.c.id == job_id)
         if principal is not None:
             query = query.where(jobs.c.principal == principal)
-        with self.engine.connect() as c:
-            row = c.execute(query).mappings().one_or_none()
+        row = None
+        if len(job_id) <= 40 and job_id.isascii() and job_id.isalnum():  # PostgreSQL takes no NUL in a text
+            with self.engine.connect() as c:
+                row = c.execute(query).mappings().one_or_none()
         if row is None:
-            raise NotFoundError(f"there is no job {job_id}", code="no_such_job", subjects=(job_id,),
+            raise NotFoundError(f"there is no job {job_id[:80]}", code="no_such_job", subjects=(job_id,),
                                 remedy="GET /v1/jobs lists your jobs")
         return row
 
     def page(self, principal: str, *, limit: int, before: str | None = None, state: str | None = None,
-             kind: str | None = None) -> list[RowMapping]:
-        """Up to ``limit`` jobs of a principal, newest first, older than the job ``before``."""
+             kind: str | None = None, labelled: Iterable[tuple[str, str]] = (), since: float | None = None,
+             until: float | None = None) -> list[RowMapping]:
+        """Up to ``limit`` jobs of a principal, newest first, older than the job ``before``.
+
+        labelled     : labels a job has all of;  since, until : when it was posted, s; the second not included
+        """
         query = sa.select(jobs).where(jobs.c.principal == principal).order_by(jobs.c.id.desc()).limit(limit)
         for column, value in ((jobs.c.state, state), (jobs.c.kind, kind)):
             if value is not None:
                 query = query.where(column == value)
+        for key, value in labelled:
+            query = query.where(jobs.c.id.in_(sa.select(labels.c.job_id).where(labels.c.key == key,
+                                                                                labels.c.value == value)))
         if before is not None:
             query = query.where(jobs.c.id < before)
+        if since is not None:
+            query = query.where(jobs.c.created >= since)
+        if until is not None:
+            query = query.where(jobs.c.created < until)
         with self.engine.connect() as c:
             return list(c.execute(query).mappings())
 

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
+from pydantic import Field
 
 from schemas.jobs import Job, JobFiles, JobKind, JobPage, JobState
 from schemas.report import Report, Verification
 from schemas.zones import Zones
-from service.errors import GoneError, NotFoundError, NotReadyError, RequestError, UnauthorizedError, WithheldError
+from service.errors import (
+    GoneError,
+    NotFoundError,
+    NotReadyError,
+    RangeError,
+    RequestError,
+    UnauthorizedError,
+    WithheldError,
+)
 from service.principals import Principal, Submitter
 from service.problems import responses
+from service.ranges import check_range
 from service.resources import (
     decode_cursor,
     encode_cursor,
@@ -28,18 +40,36 @@ from service.resources import (
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
-UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "If-None-Match names what the client has."}}
+SENT: dict[int | str, dict[str, Any]] = responses(RangeError) | {
+    206: {"description": "The parts of it that Range names, if If-Range allows."},
+    304: {"description": "If-None-Match names what the client has."}}
 RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError, GoneError)
+
+
+Labels = Annotated[list[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}:[^\x00-\x1f\x7f]{0,200}$")]],
+                   Query(max_length=8, description="KEY:VALUE of a label; of several all have to be there.",
+                         examples=[["order:4711"]])]
+Time = Annotated[datetime | None, Query(description="When it was posted: from this time on, or before it; ISO 8601, "
+                                                    "UTC where no zone is named.")]
+
+
+def _seconds(time: datetime | None) -> float | None:
+    if time is None:
+        return None
+    return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
 
 
 @router.get("", operation_id="listJobs", summary="Your jobs, newest first", responses=responses(UnauthorizedError,
                                                                                               RequestError))
 def list_jobs(request: Request, principal: Principal, limit: Annotated[int, Query(ge=1, le=200)] = 50,
               cursor: Annotated[str | None, Query(max_length=100)] = None, state: JobState | None = None,
-              kind: JobKind | None = None) -> JobPage:
-    """A page of jobs; pages do not shift when jobs are added."""
+              kind: JobKind | None = None, label: Labels = [],  # noqa: B006
+              created_from: Time = None, created_to: Time = None) -> JobPage:
+    """A page of jobs that are all of what is asked for; pages do not shift when jobs are added."""
     before = decode_cursor(cursor) if cursor is not None else None
-    rows = request.app.state.engine.jobs.page(principal, limit=limit + 1, before=before, state=state, kind=kind)
+    rows = request.app.state.engine.jobs.page(
+        principal, limit=limit + 1, before=before, state=state, kind=kind, since=_seconds(created_from),
+        until=_seconds(created_to), labelled=[(k, v) for k, _, v in (text.partition(":") for text in label)])
     following = encode_cursor(rows[limit - 1]["id"]) if len(rows) > limit else None
     return JobPage(items=[job_resource(r) for r in rows[:limit]], next_cursor=following)
 
@@ -63,14 +93,14 @@ def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annot
     return job_resource(jobs.get(job_id, principal))
 
 
-@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT | UNCHANGED,
+@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT | SENT,
             response_model=Zones)
 def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
     """Walls, connections, channels, zones and remainder."""
     return _document(request, principal, job_id, "zones.json")
 
 
-@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT | UNCHANGED,
+@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT | SENT,
             response_model=Report | Verification)
 def get_report(request: Request, principal: Principal, job_id: str) -> Response:
     """The plan and its proof; of a verification, its findings."""
@@ -86,20 +116,18 @@ def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
 
 FILE_OK: dict[int | str, dict[str, Any]] = {200: {
     "description": "The file; ETag is its SHA-256.",
-    "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}}
+    "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
+    206: {"description": "The parts of it that Range names, if If-Range allows.",
+          "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}}
 
 
 @router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
-            responses=FILE_OK | UNCHANGED | responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError,
-                                          GoneError, WithheldError))
+            responses=RESULT | SENT | FILE_OK | responses(NotReadyError, WithheldError))
 def get_file(request: Request, principal: Principal, job_id: str, name: str) -> Response:
-    """A file. Programs and STEP-NC of a job that is not proved are withheld (409)."""
+    """A file, or with Range parts of it. Programs and STEP-NC of a job that is not proved are withheld (409)."""
     row = request.app.state.engine.jobs.get(job_id, principal)
     path = find_file(result_folder(request.app.state.engine.artifacts, row), row, name)
-    headers = {"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"}
-    if _is_known(request, headers["ETag"]):
-        return Response(status_code=304, headers=headers)
-    return FileResponse(path, media_type=media_type(name), filename=name, headers=headers)
+    return _sent(request, path, media_type(name), filename=name)
 
 
 def _is_known(request: Request, etag: str) -> bool:
@@ -116,7 +144,13 @@ def _document(request: Request, principal: str, job_id: str, name: str) -> Respo
     if not path.is_file():
         raise NotFoundError(f"a job of kind {row['kind']} has no {name}", code="no_such_document", subjects=(name,),
                             remedy=f"GET {path_of(row)} names the documents of this job under links")
-    headers = {"ETag": f'"{file_sha256(path)}"'}
+    return _sent(request, path, "application/json")
+
+
+def _sent(request: Request, path: Path, media: str, filename: str | None = None) -> Response:
+    """A file of a result, whole, in parts, or not at all where the client has it."""
+    headers = {"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"}
     if _is_known(request, headers["ETag"]):
         return Response(status_code=304, headers=headers)
-    return Response(path.read_bytes(), media_type="application/json", headers=headers)
+    check_range(request, path.stat().st_size, headers["ETag"])
+    return FileResponse(path, media_type=media, filename=filename, headers=headers)

@@ -55,12 +55,15 @@ def test_jobs_of_the_first_schema_are_kept(tmp_path):
         command.upgrade(config, "0001")
         old = sa.Table("jobs", sa.MetaData(), autoload_with=connection)
         assert "spindle_tool" not in old.columns
-        connection.execute(old.insert().values({k: v for k, v in row.items() if k in old.columns}))
+        old_row = {k: v for k, v in row.items() if k in old.columns}
+        connection.execute(old.insert().values(old_row))
+        connection.execute(old.insert().values({**old_row, "id": "y", "labels_json": '{"order": "4711"}'}))
         shelf = sa.Table("library", sa.MetaData(), autoload_with=connection)
         connection.execute(shelf.insert().values(shelf="tools", name="a", entry_json='{"x": 1}'))
         connection.commit()
     migrate(url)
     assert JobStore(connect(url)).get("x")["spindle_tool"] == 0
+    assert [r["id"] for r in JobStore(connect(url)).page("x", limit=5, labelled=[("order", "4711")])] == ["y"]
     kept = LibraryStore(connect(url)).get("anybody", "tools", "a")
     assert (kept.value, kept.version, kept.shared) == ({"x": 1}, 1, True)
     with connect(url).connect() as connection:

@@ -1,0 +1,42 @@
+"""Parts of files (RFC 9110, 14): what a client asks for, and what makes no sense of it.
+
+The framework sends the parts; its own answers to a range that cannot be read or met are plain text, so those are dealt
+with here: a header that cannot be read is not there, and one that cannot be met is a problem document with 416.
+"""
+
+from __future__ import annotations
+
+import re
+
+from fastapi import Request
+
+from service.errors import RangeError
+
+MOST_RANGES = 16
+_RANGES = re.compile(r"bytes=\s*(?:\d{1,18}-\d{0,18}|-\d{1,18})(?:\s*,\s*(?:\d{1,18}-\d{0,18}|-\d{1,18}))*\s*",
+                     re.ASCII | re.IGNORECASE)
+_ONE = re.compile(r"(\d*)-(\d*)", re.ASCII)
+
+
+def check_range(request: Request, size: int, etag: str) -> None:
+    """Look at the Range of a request; what is to be ignored is taken out of it.
+
+    size : of the file, bytes;  etag : as it will be sent
+
+    Raises
+    ------
+    RangeError
+        No byte of the file is asked for.
+    """
+    text = request.headers.get("range")
+    if text is None:
+        return
+    condition = request.headers.get("if-range")
+    parts = _ONE.findall(text) if _RANGES.fullmatch(text) else []
+    backwards = any(a and b and int(b) < int(a) for a, b in parts)
+    if not parts or backwards or len(parts) > MOST_RANGES or (condition is not None and condition != etag):
+        request.scope["headers"] = [(k, v) for k, v in request.scope["headers"] if k not in (b"range", b"if-range")]
+        return
+    if not all(int(a) < size if a else int(b) > 0 and size > 0 for a, b in parts):
+        raise RangeError(f"the file has {size} bytes, and the range lies beyond them", measured=text[:200], limit=size,
+                         remedy="ask for bytes that are there, or leave the Range header out")
