@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from service.cautions import MOST_RATIO, walls_to_cut
 from service.convert import rotary_machine
 from service.prepare import Prepared
 from toolpath.bands import HighWall, largest_corner, planes
+from verify.slender import thin_walls
+from zones.model import Wall
 from zones.thinness import slender_walls
 from zones.view import View
 
@@ -29,16 +33,32 @@ def in_turn(ready: Prepared) -> bool:
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:
     """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.bands``).
 
-    They are for walls over ``FREE_RATIO`` by their profile; what has single places over it the proof finds.
+    They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor bend
+    holds near by, as the proof asks it (``verify.slender``), down to what holds the lowest; what has single places over
+    it the proof finds.
 
     unheld : walls that a proof found without support, known as walls or not
     """
     if not in_turn(ready):
         return ()
-    span = {w.id: (w.z_top, w.z_bottom) for w in ready.decomposition.walls}
-    high = [HighWall(*span[s.wall], s.thickness)
-            for s in slender_walls(view.part, view.tree, walls_to_cut(ready), FREE_RATIO)]
+    slender = {s.wall: s.thickness for s in slender_walls(view.part, view.tree, walls_to_cut(ready), FREE_RATIO)}
+    high = [] if not slender else _free(view, [w for w in ready.decomposition.walls if w.id in slender], slender)
     return planes([*high, *unheld], largest_corner(ready.zones), PLANNED_RATIO)
+
+
+def _free(view: View, walls: Sequence[Wall], thickness: Mapping[str, float]) -> list[HighWall]:
+    """Heights between which nothing of the finished part holds walls near by; thickness : mm, by id."""
+    faces = view.samples.face
+    places = thin_walls(view.tree, view.samples, FREE_RATIO)
+    out = []
+    for wall in walls:
+        mine = places.free & np.isin(faces[places.row], wall.sides)
+        if mine.any():
+            z = places.points[mine, 2]
+            # what holds the wall below its lowest free place is as far down as a wall may be free
+            top, bottom = float(z.max()) + places.spacing, float((z - places.limit[mine]).min()) - places.spacing
+            out.append(HighWall(min(top, wall.z_top), max(bottom, wall.z_bottom), thickness[wall.id]))
+    return out
 
 
 __all__ = ["FREE_RATIO", "band_planes", "in_turn"]

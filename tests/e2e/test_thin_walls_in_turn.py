@@ -91,3 +91,29 @@ def test_what_no_decomposition_calls_a_wall_is_planned_again_in_bands(tmp_path):
     report = plan(step, tmp_path / "job", setup())
     assert report["state"] == "proved" and report["proof"]["support"]["most_ratio"] <= FREE_RATIO
     assert any("planned again, in lower bands" in w for w in report["part"]["warnings"])
+
+
+def test_a_wall_that_connections_hold_needs_no_bands(tmp_path):
+    """Ribs on one side, 4 mm apart: no place of the wall is as far from all of them as it is from the foot."""
+    shape = base().union(box(0.6, 8, 10, 0, -4, 2.5))
+    ribs = [box(2.0, 0.8, 10, -2.0, y, 2.5) for y in (-4.0, -0.4, 3.2)]
+    held = shape
+    for rib in ribs:
+        held = held.union(rib)
+    asked = setup()
+    ready, alone = (prepare(written(s, tmp_path / f"{k}.step"), asked, lambda *_: None)
+                    for k, s in enumerate((held, shape)))
+    assert band_planes(ready, ready.views[0]) == ()
+    assert len(band_planes(alone, alone.views[0])) == 1
+
+
+def test_bands_go_no_deeper_than_to_what_holds_a_wall(tmp_path):
+    """Two and a half times as thick up to a half of its height, a wall is free above that alone."""
+    shape = base().union(box(0.6, 8, 16, 0, -4, 2.5))
+    held = shape.union(box(1.5, 8, 7.0, -0.45, -4, 2.5))
+    asked = setup([tool(1, "flat", 4.0, 20.0)])
+    high, low = (prepare(written(s, tmp_path / f"{k}.step"), asked, lambda *_: None)
+                 for k, s in enumerate((shape, held)))
+    low_planes, high_planes = band_planes(low, low.views[0]), band_planes(high, high.views[0])
+    assert len(low_planes) == 1 and min(low_planes) > 9.5
+    assert len(high_planes) > len(low_planes) and min(high_planes) < 9.5
