@@ -19,7 +19,7 @@ from service.limits import BodyLimitMiddleware
 from service.metrics import Metrics, MetricsMiddleware
 from service.openapi import document
 from service.principals import PostRate
-from service.routes import capabilities, events, health, jobs, keys, library, submissions
+from service.routes import capabilities, events, health, jobs, keys, library, submissions, view
 from service.settings import Settings
 
 VERSION = "0.1.0"
@@ -57,7 +57,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
     app.state.stopping, app.state.startup_error = threading.Event(), None
     app.state.post_rate = PostRate(settings.post_rate)
     problems.install(app)
-    for module in (submissions, jobs, events, library, keys, capabilities, health):
+    for module in (submissions, jobs, events, library, keys, capabilities, health, view):
         app.include_router(module.router)
     app.add_middleware(BodyLimitMiddleware, limit=settings.max_body_bytes)
     app.add_middleware(MetricsMiddleware, metrics=app.state.metrics)

@@ -1,4 +1,4 @@
-"""``zonemill``: plan, zones, verify, serve, keys, demo, family, warm, openapi.
+"""``zonemill``: plan, zones, verify, serve, view, keys, demo, family, warm, openapi.
 
 Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
 stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
@@ -113,6 +113,19 @@ def serve(host: Annotated[str | None, typer.Option(help="Address; default 127.0.
         from service.server import run_server
 
         run_server(settings_with(given))
+
+
+@app.command()
+def view(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of plan --out, or of verify --out.",
+                                                show_default=False)],
+         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 0,
+         browser: Annotated[bool, typer.Option(help="Open it in the browser.")] = True,
+         as_json: AsJson = False) -> None:
+    """Show a folder of results in the browser: the page of a job, served to this machine until Ctrl-C."""
+    with reported(as_json):
+        from service.viewer import show_folder
+
+        show_folder(folder, port, open_browser=browser)
 
 
 @app.command()

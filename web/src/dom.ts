@@ -1,0 +1,64 @@
+// Elements without a framework.
+
+type Child = Node | string | null | undefined | false;
+type Props = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
+
+/** Makes an element; a property that is a function listens to the event of its name without "on". */
+export function el<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  props: Props = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(props)) {
+    if (value === undefined || value === false) continue;
+    if (typeof value === "function") node.addEventListener(name.slice(2), value);
+    else if (value === true) node.setAttribute(name, "");
+    else node.setAttribute(name, String(value));
+  }
+  add(node, ...children);
+  return node;
+}
+
+export function add(node: Node, ...children: Child[]): void {
+  for (const child of children) if (child !== null && child !== undefined && child !== false) node.appendChild(typeof child === "string" ? document.createTextNode(child) : child);
+}
+
+export function fill(node: Node, ...children: Child[]): void {
+  while (node.firstChild) node.removeChild(node.firstChild);
+  add(node, ...children);
+}
+
+/** A colour as a square; set by script, for the service forbids inline styles. */
+export function swatch(colour: string, hatched = false): HTMLElement {
+  const node = el("span", { class: hatched ? "swatch hatched" : "swatch", "aria-hidden": "true" });
+  node.style.setProperty("--colour", colour);
+  return node;
+}
+
+let serial = 0;
+
+/** A field with its label. */
+export function field(label: string, input: HTMLElement, hint?: string): HTMLElement {
+  const id = input.id || `f${++serial}`;
+  input.id = id;
+  const words = hint ? el("small", { id: `${id}h` }, hint) : null;
+  if (words) input.setAttribute("aria-describedby", words.id);
+  return el("div", { class: "field" }, el("label", { for: id }, label), input, words);
+}
+
+export function duration(seconds: number): string {
+  const s = Math.max(0, Math.round(seconds));
+  const h = Math.floor(s / 3600);
+  const m = Math.floor((s % 3600) / 60);
+  const two = (v: number): string => String(v).padStart(2, "0");
+  return h ? `${h}:${two(m)}:${two(s % 60)}` : `${m}:${two(s % 60)}`;
+}
+
+export function figure(value: number | null | undefined, digits: number, unit = ""): string {
+  return value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit ? `\u202f${unit}` : ""}`;
+}
+
+export function percent(value: number | null | undefined): string {
+  return value === null || value === undefined ? "–" : `${(100 * value).toFixed(1)}\u202f%`;
+}

@@ -1,0 +1,79 @@
+// What every page has: its head, its theme, the field for a key, and words for what was refused.
+import { Refusal, hasKey, keep } from "./api";
+import { el, fill } from "./dom";
+
+export type Theme = "auto" | "light" | "dark";
+const THEME = "zonemill-theme";
+
+export function theme(): Theme {
+  const kept = localStorage.getItem(THEME);
+  return kept === "light" || kept === "dark" ? kept : "auto";
+}
+
+export function isDark(): boolean {
+  const t = theme();
+  return t === "dark" || (t === "auto" && matchMedia("(prefers-color-scheme: dark)").matches);
+}
+
+const listeners = new Set<() => void>();
+
+export function onTheme(listener: () => void): void {
+  listeners.add(listener);
+}
+
+function apply(): void {
+  document.documentElement.dataset.theme = isDark() ? "dark" : "light";
+  listeners.forEach((l) => l());
+}
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", apply);
+apply();
+
+export function colourOf(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+/** The head of a page; `more` stands at its right end. */
+export function head(title: Node, ...more: Node[]): HTMLElement {
+  const button = el("button", { type: "button", class: "quiet", onclick: () => {
+    localStorage.setItem(THEME, isDark() ? "light" : "dark");
+    apply();
+    name();
+  } });
+  const name = (): void => {
+    button.textContent = isDark() ? "Light" : "Dark";
+    button.setAttribute("aria-label", isDark() ? "Use light colours" : "Use dark colours");
+  };
+  name();
+  return el("header", { class: "top" }, el("a", { href: "/", class: "home" }, "zonemill"), title, el("div", { class: "spring" }), ...more, button);
+}
+
+export function reducedMotion(): boolean {
+  return matchMedia("(prefers-reduced-motion: reduce)").matches;
+}
+
+/** Says what went wrong, and asks for a key where that is what is missing. */
+export function showRefusal(place: HTMLElement, error: unknown, again: () => void): void {
+  if (error instanceof Refusal && (error.status === 401 || (error.status === 403 && error.problem.code !== "foreign_page"))) {
+    fill(place, keyForm(error, again));
+    return;
+  }
+  const problem = error instanceof Refusal ? error.problem : {};
+  fill(place, el("div", { class: "refusal", role: "alert" },
+    el("h2", {}, problem.title ?? "That did not work"),
+    el("p", {}, error instanceof Error ? error.message : String(error)),
+    problem.remedy ? el("p", {}, el("strong", {}, "What to do: "), problem.remedy) : null,
+    el("button", { type: "button", onclick: again }, "Try again")));
+}
+
+function keyForm(error: Refusal, again: () => void): HTMLElement {
+  const input = el("input", { type: "password", id: "key", autocomplete: "off", required: true });
+  return el("form", { class: "refusal", onsubmit: (event: Event) => {
+    event.preventDefault();
+    keep(input.value.trim());
+    again();
+  } },
+    el("h2", {}, "This service asks for a key"),
+    el("p", {}, hasKey() ? error.message : "Its operator makes one with: zonemill keys create. It is kept in this tab only, and forgotten with it."),
+    el("label", { for: "key" }, "Key"), input, el("button", { type: "submit", class: "main" }, "Use it"));
+}

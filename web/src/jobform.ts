@@ -1,0 +1,215 @@
+// A part and a setup without JSON: the fields most jobs need, a table of tools, and the rest as text for who wants it.
+import { Refusal, ask, type Job, type Setup, type Tool } from "./api";
+import { add, el, field, fill } from "./dom";
+
+type ToolRow = Partial<Record<keyof Tool, unknown>> & { id: string; kind: string; diameter_mm: number; holder?: unknown };
+
+const KEPT = "zonemill-tools";
+const HOLDER = [{ diameter_mm: 14, diameter_top_mm: 20, length_mm: 12 }, { diameter_mm: 24, diameter_top_mm: 24, length_mm: 30 }];
+const FIRST: ToolRow[] = [
+  { id: "T1", number: 1, kind: "flat", diameter_mm: 6, flutes: 4, flute_length_mm: 18, neck_diameter_mm: 5.8, neck_length_mm: 24, shank_diameter_mm: 6, stickout_mm: 40, holder: HOLDER },
+  { id: "T2", number: 2, kind: "ball", diameter_mm: 3, flutes: 2, flute_length_mm: 9, neck_diameter_mm: 2.8, neck_length_mm: 20, shank_diameter_mm: 6, stickout_mm: 36, holder: HOLDER },
+  { id: "T3", number: 3, kind: "ball", diameter_mm: 1, flutes: 2, flute_length_mm: 3, neck_diameter_mm: 0.9, neck_length_mm: 13, shank_diameter_mm: 4, stickout_mm: 29, holder: HOLDER },
+];
+const COLUMNS: { key: string; title: string; hint: string }[] = [
+  { key: "number", title: "T", hint: "T number" }, { key: "kind", title: "Kind", hint: "Shape of the cutting end" },
+  { key: "diameter_mm", title: "Ø", hint: "Diameter, mm" }, { key: "corner_radius_mm", title: "Corner", hint: "Corner radius of a bull nose, mm" },
+  { key: "flutes", title: "Teeth", hint: "Number of teeth" }, { key: "flute_length_mm", title: "Flutes", hint: "Length of the flutes, mm" },
+  { key: "neck_diameter_mm", title: "Neck Ø", hint: "Diameter of the neck, mm" }, { key: "neck_length_mm", title: "to shank", hint: "Tip to shank, mm" },
+  { key: "shank_diameter_mm", title: "Shank Ø", hint: "Diameter of the shank, mm" }, { key: "stickout_mm", title: "Stickout", hint: "Tip to holder nose, mm" },
+];
+
+export function jobForm(): HTMLElement {
+  let tools: ToolRow[] = kept();
+  let rest: Record<string, unknown> = {};
+  const part = el("input", { type: "file", id: "part", accept: ".step,.stp,.STEP,.STP", required: true });
+  const order = el("input", { type: "text", id: "order", maxlength: 100, placeholder: "for example 4711, impeller" });
+  const material = el("select", { id: "material" }, el("option", { value: "Ti-6Al-4V" }, "Ti-6Al-4V"));
+  const scallop = el("input", { type: "number", id: "scallop", min: 0.001, max: 1, step: "any", value: 0.02 });
+  const stock = el("select", { id: "stock" }, el("option", { value: "part_offset" }, "the part grown by a margin"), el("option", { value: "box" }, "a box round the part"), el("option", { value: "cylinder" }, "a bar round the part"));
+  const margin = el("input", { type: "number", id: "margin", min: 0, max: 100, step: "any", value: 1 });
+  const control = el("select", { id: "control" }, ...["linuxcnc", "fanuc", "haas", "siemens", "heidenhain"].map((d) => el("option", { value: d }, d)));
+  const table = el("div", { class: "tools" });
+  const json = el("textarea", { id: "json", rows: 10, spellcheck: "false", class: "mono" });
+  const answer = el("div", { class: "answer", "aria-live": "polite" });
+  const send = el("button", { type: "submit", class: "main" }, "Plan and prove");
+  const dry = el("button", { type: "submit", value: "dry" }, "Dry check");
+
+  const setup = (): Record<string, unknown> => {
+    const quality = { ...(rest.quality as object | undefined), scallop_height_mm: Number(scallop.value) };
+    const machine = { kind: "3-axis", ...(rest.machine as object | undefined), dialects: [control.value] };
+    const blank = { ...(rest.stock as object | undefined), kind: stock.value, margin_mm: Number(margin.value) };
+    const labels = { ...(rest.labels as object | undefined), ...(order.value ? { order: order.value } : {}) };
+    return { ...rest, tools: tools.map(clean), quality, machine, stock: blank, material: material.value, labels };
+  };
+  const show = (): void => {
+    json.value = JSON.stringify(setup(), null, 1);
+  };
+  const drawTools = (): void => {
+    fill(table, toolTable(tools, () => {
+      keepTools(tools);
+      show();
+    }, drawTools));
+    show();
+  };
+  const take = (s: Partial<Setup> & Record<string, unknown>): void => {
+    const { tools: t, ...others } = s;
+    if (Array.isArray(t)) tools = t as unknown as ToolRow[];
+    rest = others;
+    const q = s.quality as { scallop_height_mm?: number } | undefined;
+    if (q?.scallop_height_mm) scallop.value = String(q.scallop_height_mm);
+    const b = s.stock as { kind?: string; margin_mm?: number } | undefined;
+    if (b?.kind && [...stock.options].some((o) => o.value === b.kind)) stock.value = b.kind;
+    if (b?.margin_mm !== undefined) margin.value = String(b.margin_mm);
+    const m = s.machine as { dialects?: string[] } | undefined;
+    if (m?.dialects?.[0]) control.value = m.dialects[0];
+    if (typeof s.material === "string") {
+      if (![...material.options].some((o) => o.value === s.material)) material.appendChild(el("option", { value: s.material }, s.material));
+      material.value = s.material;
+    }
+    const l = s.labels as { order?: string } | undefined;
+    if (l?.order) order.value = l.order;
+    drawTools();
+  };
+  const file = el("input", { type: "file", id: "setupfile", accept: ".json,application/json", onchange: async () => {
+    const chosen = file.files?.[0];
+    if (!chosen) return;
+    try {
+      take(JSON.parse(await chosen.text()) as Record<string, unknown>);
+      fill(answer, el("p", {}, `${chosen.name} is in the fields.`));
+    } catch {
+      fill(answer, el("p", { role: "alert", class: "bad" }, `${chosen.name} is no JSON.`));
+    }
+  } });
+  json.addEventListener("change", () => {
+    try {
+      take(JSON.parse(json.value) as Record<string, unknown>);
+      json.removeAttribute("aria-invalid");
+    } catch {
+      json.setAttribute("aria-invalid", "true");
+      fill(answer, el("p", { role: "alert", class: "bad" }, "The setup below is no JSON, so the fields are as they were."));
+    }
+  });
+  for (const x of [order, material, scallop, stock, margin, control]) x.addEventListener("change", show);
+  void materials(material);
+  drawTools();
+
+  const form = el("form", { class: "newjob", onsubmit: (event: Event) => {
+    event.preventDefault();
+    void submit((event as SubmitEvent).submitter === dry);
+  } },
+    el("h2", {}, "New job"),
+    el("div", { class: "fields" }, field("Part, a STEP file", part), field("Order", order),
+      field("Material", material), field("Height of scallops, mm", scallop), field("Blank", stock), field("Margin, mm", margin),
+      field("Control", control)),
+    el("h3", { id: "toolshead" }, "Tools"), el("p", { class: "hint" }, "Lengths in mm from the tip upwards. The stoutest tool that reaches a place is taken for it."), table,
+    el("details", {}, el("summary", {}, "A setup from a file, or as text"),
+      field("Setup, JSON", file), field("All of the setup", json, "What is written here goes into the fields; what has no field stays as it stands here.")),
+    el("p", { class: "buttons" }, send, dry), answer);
+
+  async function submit(onlyZones: boolean): Promise<void> {
+    const chosen = part.files?.[0];
+    if (!chosen) return;
+    const body = new FormData();
+    body.append("part", chosen, chosen.name);
+    body.append("setup", new Blob([JSON.stringify(setup())], { type: "application/json" }), "setup.json");
+    send.disabled = dry.disabled = true;
+    fill(answer, el("p", {}, "Sending…"));
+    try {
+      const job = (await (await ask(onlyZones ? "/v1/zones" : "/v1/jobs", { method: "POST", body, headers: { "Idempotency-Key": crypto.randomUUID?.() ?? String(Date.now()) } })).json()) as Job;
+      location.assign(`/v1/jobs/${job.id}/view`);
+    } catch (error) {
+      refuse(answer, error);
+      send.disabled = dry.disabled = false;
+    }
+  }
+  return form;
+}
+
+/** What is wrong with a setup, each with the field it is about. */
+function refuse(place: HTMLElement, error: unknown): void {
+  const problem = error instanceof Refusal ? error.problem : {};
+  const list = el("ul");
+  if (Array.isArray(problem.measured))
+    for (const m of problem.measured as { at?: string; problem?: string }[]) if (m && m.at) add(list, el("li", {}, el("strong", {}, m.at), ` ${m.problem ?? ""}`));
+  fill(place, el("div", { class: "refusal", role: "alert" }, el("h3", {}, problem.title ?? "The job was not taken"), el("p", {}, error instanceof Error ? error.message : String(error)), list,
+    problem.remedy ? el("p", {}, el("strong", {}, "What to do: "), problem.remedy) : null));
+}
+
+async function materials(select: HTMLSelectElement): Promise<void> {
+  try {
+    const found = (await (await ask("/v1/materials")).json()) as { items: { name: string }[] };
+    for (const m of found.items) if (![...select.options].some((o) => o.value === m.name)) select.appendChild(el("option", { value: m.name }, m.name));
+  } catch {
+    // the built-in default stays; the list of jobs says what is wrong
+  }
+}
+
+function toolTable(tools: ToolRow[], changed: () => void, redraw: () => void): HTMLElement {
+  const body = el("tbody");
+  tools.forEach((t, i) => {
+    const row = el("tr");
+    for (const c of COLUMNS) {
+      const label = `${c.hint}, tool ${i + 1}`;
+      const value = (t as Record<string, unknown>)[c.key];
+      const input = c.key === "kind"
+        ? el("select", { "aria-label": label }, ...["flat", "ball", "bull"].map((k) => el("option", { value: k, selected: k === t.kind }, k)))
+        : el("input", { type: "number", "aria-label": label, min: 0, step: "any", value: typeof value === "number" ? value : "" });
+      input.addEventListener("change", () => {
+        if (c.key === "kind") t.kind = input.value;
+        else if (input.value === "") delete (t as Record<string, unknown>)[c.key];
+        else (t as Record<string, unknown>)[c.key] = Number(input.value);
+        if (c.key === "number") t.id = `T${input.value || i + 1}`;
+        changed();
+      });
+      add(row, el("td", { "data-title": c.title }, input));
+    }
+    const holder = el("input", { type: "checkbox", "aria-label": `Holder, tool ${i + 1}`, checked: Array.isArray(t.holder) && t.holder.length > 0 });
+    holder.addEventListener("change", () => {
+      t.holder = holder.checked ? structuredClone(HOLDER) : [];
+      changed();
+    });
+    add(row, el("td", { "data-title": "Holder" }, holder));
+    add(row, el("td", {}, el("button", { type: "button", "aria-label": `Remove tool ${i + 1}`, onclick: () => {
+      tools.splice(i, 1);
+      redraw();
+      changed();
+    } }, "✕")));
+    add(body, row);
+  });
+  return el("div", {}, el("table", { "aria-labelledby": "toolshead" }, el("thead", {}, el("tr", {}, ...COLUMNS.map((c) => el("th", { scope: "col", title: c.hint }, c.title)), el("th", { scope: "col", title: "A holder of 14 to 24 mm, or the one of the setup" }, "Holder"), el("th", { scope: "col" }, el("span", { class: "sr" }, "Remove")))), body),
+    el("p", { class: "buttons" },
+      el("button", { type: "button", onclick: () => {
+        const last = tools[tools.length - 1] ?? FIRST[0]!;
+        const number = Math.max(0, ...tools.map((t) => Number(t.number ?? 0))) + 1;
+        tools.push({ ...structuredClone(last), id: `T${number}`, number });
+        redraw();
+        changed();
+      } }, "Add a tool like the last"),
+      el("button", { type: "button", onclick: () => {
+        tools.splice(0, tools.length, ...structuredClone(FIRST));
+        redraw();
+        changed();
+      } }, "The first three again")));
+}
+
+/** A tool as the setup takes it: without what its kind does not have. */
+function clean(t: ToolRow): ToolRow {
+  const out = { ...t };
+  if (out.kind !== "bull") delete out.corner_radius_mm;
+  return out;
+}
+
+function kept(): ToolRow[] {
+  try {
+    const found = JSON.parse(localStorage.getItem(KEPT) ?? "null") as ToolRow[] | null;
+    if (Array.isArray(found) && found.length) return found;
+  } catch {
+    // what was kept cannot be read: begin anew
+  }
+  return structuredClone(FIRST);
+}
+
+function keepTools(tools: ToolRow[]): void {
+  localStorage.setItem(KEPT, JSON.stringify(tools));
+}

@@ -1,0 +1,58 @@
+// All jobs with their progress as it goes, and the form for a new one.
+import { FINAL, ask, follow, get, type Job, type JobPage } from "./api";
+import { el, fill } from "./dom";
+import { head, showRefusal } from "./frame";
+import { stateBadge } from "./jobpage";
+import { jobForm } from "./jobform";
+
+export async function listPage(app: HTMLElement): Promise<void> {
+  document.title = "Jobs · zonemill";
+  const list = el("div", { class: "jobs" });
+  const main = el("main", { id: "main", class: "list" }, jobForm(), el("section", { "aria-labelledby": "jobs" }, el("h2", { id: "jobs" }, "Jobs"), list));
+  fill(app, head(el("h1", { class: "title" }, "Jobs")), main);
+  await load(app, list);
+}
+
+async function load(app: HTMLElement, list: HTMLElement, cursor = ""): Promise<void> {
+  let page: JobPage;
+  try {
+    page = await get<JobPage>(`/v1/jobs?limit=30${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
+  } catch (error) {
+    showRefusal(list, error, () => void listPage(app));
+    return;
+  }
+  if (!cursor && !page.items.length) fill(list, el("p", { class: "hint" }, "There are none yet. Post a part above, or run make demo."));
+  for (const job of page.items) list.appendChild(row(job));
+  if (page.next_cursor) {
+    const next = page.next_cursor;
+    const more = el("button", { type: "button", onclick: () => {
+      more.remove();
+      void load(app, list, next);
+    } }, "Older jobs");
+    list.appendChild(more);
+  }
+}
+
+const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
+
+function row(job: Job): HTMLElement {
+  const node = el("article", { class: "jobrow" });
+  const draw = (j: Job): void => {
+    const running = !FINAL.has(j.state);
+    const bar = el("progress", { max: 1, value: j.progress, "aria-label": "Progress" });
+    const words = el("span", { class: "where" }, running ? `${Math.round(100 * j.progress)} % ${j.stage}` : "");
+    const order = j.labels?.order ?? j.labels?.part ?? `${j.id.slice(0, 13)}…`;
+    fill(node, el("h3", {}, el("a", { href: `/v1/jobs/${j.id}/view` }, order)), stateBadge(j.state),
+      el("span", { class: "where" }, `${KINDS[j.kind] ?? j.kind}, ${new Date(j.created_at).toLocaleString()}`),
+      running ? bar : null, running ? words : null,
+      running ? el("button", { type: "button", onclick: () => void ask(j.links.self, { method: "DELETE" }) }, "Cancel") : null,
+      j.error ? el("p", { class: "where" }, j.error.detail) : null);
+    if (running)
+      void follow(j, (event) => {
+        bar.value = event.progress;
+        words.textContent = `${Math.round(100 * event.progress)} % ${event.stage}`;
+      }, new AbortController().signal).then(async () => draw(await get<Job>(j.links.self)), () => (words.textContent = "the connection was lost; load the page again"));
+  };
+  draw(job);
+  return node;
+}

@@ -1,0 +1,636 @@
+// The picture: part, ways of the tool, tool, section, marks. It draws only when something has changed.
+import {
+  BufferAttribute, BufferGeometry, Color, DoubleSide, Group, LatheGeometry, LineSegments,
+  Mesh, MeshBasicMaterial, MeshLambertMaterial, HemisphereLight, DirectionalLight, PerspectiveCamera, Plane, Quaternion, Raycaster, Scene,
+  ShaderMaterial, Vector2, Vector3, Vector4, WebGLRenderer, LineBasicMaterial, LinearSRGBColorSpace, GLSL3, type Intersection,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER, STEPS, UNCUT, toolColour, wallColour, zoneColour, type RGB } from "./colours";
+import type { ChunkEntry, Table, ViewHead } from "./viewfile";
+
+
+export type Mode = "zones" | "walls" | "deviation";
+export type P3 = [number, number, number];
+
+const PART_VERTEX = /* glsl */ `
+in float left_; in float judged; in vec3 wall;
+out vec3 vNormal_; out vec3 vPlace; out float vLeft; out float vJudged; out vec3 vWall; out vec3 vEye;
+void main() {
+  vec4 here = modelViewMatrix * vec4(position, 1.0);
+  vPlace = position; vLeft = left_; vJudged = judged; vWall = wall;
+  vNormal_ = normalMatrix * normal; vEye = -here.xyz;
+  gl_Position = projectionMatrix * here;
+}`;
+
+const PART_FRAGMENT = /* glsl */ `
+precision highp float;
+in vec3 vNormal_; in vec3 vPlace; in float vLeft; in float vJudged; in vec3 vWall; in vec3 vEye;
+out vec4 outColour;
+uniform int mode; uniform vec3 own; uniform int hatched; uniform float faded; uniform float lit; uniform vec4 section;
+uniform float limits[6]; uniform vec3 classes[7]; uniform vec3 uncut; uniform vec3 pale; uniform vec3 stripe;
+uniform vec3 cap; uniform vec3 paper;
+float stripes(float width) { return step(0.62, fract((gl_FragCoord.x + gl_FragCoord.y) / width)); }
+void main() {
+  if (dot(section.xyz, vPlace) > section.w) discard;
+  if (!gl_FrontFacing) {
+    outColour = vec4(mix(cap, cap * 0.82, stripes(9.0)), 1.0);
+    return;
+  }
+  vec3 base = own; bool lines = hatched == 1; vec3 ink = stripe;
+  if (mode == 1) { base = vWall; lines = false; }
+  if (mode == 2) {
+    lines = false; base = pale;
+    if (vJudged > 0.25) {
+      int k = 0;
+      for (int i = 0; i < 6; i++) if (vLeft > limits[i]) k = i + 1;
+      base = classes[k];
+      if (vJudged > 1.5) { base = uncut; lines = true; ink = vec3(0.36, 0.36, 0.40); }
+    }
+  }
+  base = mix(base, paper, faded);
+  if (lines) base = mix(base, mix(ink, paper, 0.5 * faded), stripes(8.0));
+  vec3 n = normalize(vNormal_), eye = normalize(vEye);
+  float shade = 0.62 + 0.26 * max(dot(n, normalize(vec3(-0.35, 0.55, 0.75))), 0.0) + 0.14 * max(dot(n, eye), 0.0);
+  outColour = vec4(base * mix(1.0, shade + lit, 0.92), 1.0);
+}`;
+
+const WAY_VERTEX = /* glsl */ `
+in float time; out vec3 vPlace; out float vTime;
+void main() {
+  vec4 eye = modelViewMatrix * vec4(position, 1.0);
+  vPlace = position; vTime = time;
+  gl_Position = projectionMatrix * vec4(eye.xyz * 0.9985, 1.0); // a little nearer, at the same place of the picture
+}`;
+
+const WAY_FRAGMENT = /* glsl */ `
+precision highp float;
+in vec3 vPlace; in float vTime; out vec4 outColour;
+uniform vec3 colour; uniform float strength; uniform float now; uniform vec4 section; uniform float dashed;
+void main() {
+  if (dot(section.xyz, vPlace) > section.w) discard;
+  if (dashed > 0.5 && fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) > 0.55) discard;
+  float seen = vTime <= now ? strength : 0.10 * strength;
+  if (seen < 0.02) discard;
+  outColour = vec4(colour, seen);
+}`;
+
+/** What is kept of one workingstep. */
+interface Way {
+  lod: number;
+  place: Float32Array;
+  time: Float32Array;
+  kind: Uint8Array;
+  axis: Float32Array | null;
+  line: Int32Array | null;
+  cut: LineSegments;
+  rapid: LineSegments;
+}
+
+export interface Hit {
+  point: Vector3;
+  face: number;
+  label: number;
+  left: number;
+  judged: number;
+}
+
+const NO_SECTION = new Vector4(0, 0, 0, 1);
+
+export class Picture {
+  readonly canvas: HTMLCanvasElement;
+  readonly controls: OrbitControls;
+  readonly camera = new PerspectiveCamera(32, 1, 0.1, 10000);
+  private drawn = 0;
+  private renderer: WebGLRenderer;
+  private scene = new Scene();
+  private part = new Group();
+  private edges: LineSegments | null = null;
+  private paths = new Group();
+  private tool = new Group();
+  private marks = new Group();
+  private shine = new Group();
+  private parts = new Map<number, { lod: number; mesh: Mesh }>();
+  private ways = new Map<number, Way>();
+  private section = NO_SECTION.clone();
+  private plane = new Plane();
+  private shared: Record<string, { value: unknown }>;
+  private asked = false;
+  private toolShown = -1;
+  private head: ViewHead | null = null;
+  private wallOf = new Map<number, RGB>();
+  private shownSteps = new Set<number>();
+  private rapids = false;
+  private holder = true;
+  onDraw: () => void = () => {};
+  onMove: () => void = () => {};
+
+  constructor(place: HTMLElement) {
+    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.canvas = this.renderer.domElement;
+    place.appendChild(this.canvas);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.ask());
+    this.controls.addEventListener("start", () => (this.moving = true));
+    this.controls.addEventListener("end", () => {
+      this.rest();
+      this.onMove();
+    });
+    const light = new DirectionalLight(0xffffff, 1.6);
+    light.position.set(-0.3, -0.5, 1);
+    this.scene.add(new HemisphereLight(0xffffff, 0x8a8f98, 1.6), light, this.part, this.paths, this.tool, this.marks, this.shine);
+    this.shared = {
+      mode: { value: 0 }, faded: { value: 0 }, lit: { value: 0.06 }, section: { value: this.section },
+      limits: { value: [0, 0, 0, 0, 0, 0] }, classes: { value: CLASSES.map((c) => new Color(...c)) },
+      uncut: { value: new Color(...UNCUT) }, pale: { value: new Color(...PALE) }, stripe: { value: new Color(...REMAINDER) },
+      cap: { value: new Color(0.55, 0.57, 0.6) }, paper: { value: new Color(1, 1, 1) }, now: { value: Infinity },
+    };
+    new ResizeObserver(() => this.resize(place)).observe(place);
+    this.resize(place);
+  }
+
+  private moving = false;
+  private coarse = 1;
+  private resting = 0;
+
+  /** Ends the coarse pictures a slow machine draws while something moves. */
+  private rest(): void {
+    this.moving = false;
+    clearTimeout(this.resting);
+    this.resting = window.setTimeout(() => this.grain(1), 150);
+  }
+
+  private grain(share: number): void {
+    if (share === this.coarse) return;
+    this.coarse = share;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2) * share);
+    this.ask();
+  }
+
+  /** Something plays: frames come one after the other, and coarse ones are better than late ones. */
+  play(on: boolean): void {
+    if (on) this.moving = true;
+    else this.rest();
+  }
+
+  private resize(place: HTMLElement): void {
+    const { clientWidth: w, clientHeight: h } = place;
+    if (!w || !h) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2) * this.coarse);
+    this.renderer.setSize(w, h, false);
+    this.camera.aspect = w / h;
+    this.camera.updateProjectionMatrix();
+    this.ask();
+  }
+
+  /** Draws before the browser shows the next picture. */
+  ask(): void {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      const gap = performance.now() - this.drawn;
+      this.drawn = performance.now();
+      if (this.moving && gap > 70 && gap < 2000) this.grain(Math.max(0.4, this.coarse * 0.75));
+      this.renderer.render(this.scene, this.camera);
+      this.onDraw();
+    });
+  }
+
+  /** Draws at once and waits until it is drawn; ms. */
+  timed(): number {
+    const from = performance.now();
+    this.renderer.render(this.scene, this.camera);
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    return performance.now() - from;
+  }
+
+  png(): string {
+    this.renderer.render(this.scene, this.camera);
+    return this.canvas.toDataURL("image/png");
+  }
+
+  theme(background: string, ink: string): void {
+    this.scene.background = new Color(background);
+    (this.shared.paper!.value as Color).setStyle(background, LinearSRGBColorSpace).lerp(new Color(1, 1, 1), 0.35);
+    if (this.edges) (this.edges.material as LineBasicMaterial).color.set(ink);
+    this.ink = ink;
+    this.ask();
+  }
+  private ink = "#15202b";
+
+  begin(head: ViewHead): void {
+    this.head = head;
+    head.walls.forEach((w, i) => w.faces.forEach((f) => this.wallOf.set(f, wallColour(i))));
+    head.connections.forEach((c) => c.faces.forEach((f) => this.wallOf.set(f, CONNECTION)));
+    const low = head.budget_mm.gouge + 1e-6;
+    const high = head.budget_mm.scallop + 1e-6;
+    this.shared.limits!.value = [-STEPS[1]! * low, -STEPS[0]! * low, -low, high, STEPS[0]! * high, STEPS[1]! * high];
+    this.fit();
+  }
+
+  chunk(entry: ChunkEntry, t: Table): void {
+    if (entry.kind === "mesh") this.addPart(entry, t);
+    else if (entry.kind === "edges") this.addEdges(t);
+    else this.addWay(entry, t);
+    this.ask();
+  }
+
+  private places(t: Table, grid: number): Float32Array {
+    const [x, y, z] = this.head!.low_mm;
+    const from = t.place!;
+    const out = new Float32Array(from.length);
+    for (let i = 0; i < from.length; i += 3) {
+      out[i] = x + grid * from[i]!;
+      out[i + 1] = y + grid * from[i + 1]!;
+      out[i + 2] = z + grid * from[i + 2]!;
+    }
+    return out;
+  }
+
+  private addPart(entry: ChunkEntry, t: Table): void {
+    const head = this.head!;
+    const label = entry.label!;
+    const n = t.face!.length;
+    const g = new BufferGeometry();
+    g.setAttribute("position", new BufferAttribute(this.places(t, head.mesh_grid_mm), 3));
+    g.setAttribute("normal", new BufferAttribute(Int8Array.from(t.normal!), 3, true));
+    const left = new Float32Array(n);
+    const wall = new Uint8Array(3 * n);
+    const none: RGB = [0.82, 0.83, 0.84];
+    for (let i = 0; i < n; i++) {
+      left[i] = t.left![i]! * head.left_unit_mm;
+      const c = this.wallOf.get(t.face![i]!) ?? none;
+      for (let k = 0; k < 3; k++) wall[3 * i + k] = 255 * c[k]!;
+    }
+    g.setAttribute("left_", new BufferAttribute(left, 1));
+    g.setAttribute("judged", new BufferAttribute(Uint8Array.from(t.judged!), 1));
+    g.setAttribute("wall", new BufferAttribute(wall, 3, true));
+    g.setIndex(new BufferAttribute(Uint32Array.from(t.corners!), 1));
+    const mesh = new Mesh(g, this.partMaterial(label));
+    mesh.userData = { label, face: t.face };
+    const old = this.parts.get(label);
+    if (old && old.lod > entry.lod) return;
+    if (old) {
+      this.part.remove(old.mesh);
+      old.mesh.geometry.dispose();
+    }
+    this.parts.set(label, { lod: entry.lod, mesh });
+    this.part.add(mesh);
+  }
+
+  /** The rough facets of labels that have none in the fine level are in the way of it. */
+  settle(): void {
+    const finest = Math.max(0, ...[...this.parts.values()].map((p) => p.lod));
+    for (const [label, p] of this.parts)
+      if (p.lod < finest && this.head!.chunks.some((c) => c.kind === "mesh" && c.lod === finest)) {
+        this.part.remove(p.mesh);
+        this.parts.delete(label);
+      }
+    this.ask();
+  }
+
+  colourOf(label: number): { colour: RGB; hatched: boolean } {
+    const what = label < 0 ? undefined : this.head!.labelled[label];
+    if (what?.zone) return { colour: zoneColour(this.head!.zones.findIndex((z) => z.id === what.zone)), hatched: false };
+    if (what?.remainder !== undefined) return { colour: [0.98, 0.86, 0.84], hatched: true };
+    return { colour: OTHER, hatched: false };
+  }
+
+  private partMaterial(label: number): ShaderMaterial {
+    const { colour, hatched } = this.colourOf(label);
+    return new ShaderMaterial({
+      glslVersion: GLSL3, vertexShader: PART_VERTEX, fragmentShader: PART_FRAGMENT, side: DoubleSide,
+      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+      uniforms: { ...this.shared, own: { value: new Color(...colour) }, hatched: { value: hatched ? 1 : 0 } } as never,
+    });
+  }
+
+  /** Makes some labels stand out; none: all as they are. */
+  highlight(labels: Set<number> | null): void {
+    for (const [label, { mesh }] of this.parts) {
+      const m = mesh.material as ShaderMaterial;
+      m.uniforms.faded = labels ? { value: labels.has(label) ? 0 : 0.82 } : (this.shared.faded as never);
+      m.uniforms.lit = labels?.has(label) ? { value: 0.16 } : (this.shared.lit as never);
+    }
+    // what stands out shines through what stands before it
+    this.shine.clear();
+    for (const label of labels ?? []) {
+      const known = this.parts.get(label);
+      if (!known) continue;
+      const through = new Mesh(known.mesh.geometry, new MeshBasicMaterial({ color: 0xe0007a, transparent: true, opacity: 0.28, depthTest: false, depthWrite: false, side: DoubleSide }));
+      through.renderOrder = 5;
+      this.shine.add(through);
+    }
+    this.ask();
+  }
+
+  private addEdges(t: Table): void {
+    const place = this.places(t, this.head!.mesh_grid_mm);
+    const begins = t.begins!;
+    const index: number[] = [];
+    for (let k = 0; k + 1 < begins.length; k++)
+      for (let i = begins[k]!; i + 1 < begins[k + 1]!; i++) index.push(i, i + 1);
+    const g = new BufferGeometry();
+    g.setAttribute("position", new BufferAttribute(place, 3));
+    g.setIndex(index);
+    this.edges = new LineSegments(g, new LineBasicMaterial({ color: this.ink, transparent: true, opacity: 0.7 }));
+    this.part.add(this.edges);
+    this.clip();
+  }
+
+  private addWay(entry: ChunkEntry, t: Table): void {
+    const head = this.head!;
+    const step = entry.step!;
+    const old = this.ways.get(step);
+    if (old && old.lod > entry.lod) return;
+    const place = this.places(t, head.path_grid_mm);
+    const n = t.kind!.length;
+    const time = new Float32Array(n);
+    for (let i = 0; i < n; i++) time[i] = t.time![i]! / 1000;
+    const axis = t.axis ? Float32Array.from(t.axis, (v) => v / head.axis_unit) : null;
+    const cuts: number[] = [];
+    const moves: number[] = [];
+    for (let i = 1; i < n; i++) if (t.kind![i] !== 0) (t.kind![i] === 2 ? cuts : moves).push(i - 1, i);
+    const g = (index: number[]): BufferGeometry => {
+      const out = new BufferGeometry();
+      out.setAttribute("position", at);
+      out.setAttribute("time", when);
+      out.setIndex(new BufferAttribute(Uint32Array.from(index), 1));
+      return out;
+    };
+    const at = new BufferAttribute(place, 3);
+    const when = new BufferAttribute(time, 1);
+    const tools = head.tools.map((x) => x.number);
+    const colour = toolColour(Math.max(0, tools.indexOf(head.steps[step]!.tool)));
+    const cut = new LineSegments(g(cuts), this.wayMaterial(colour, head.steps[step]!.operation === "roughing" ? 0.45 : 0.85, 0));
+    const rapid = new LineSegments(g(moves), this.wayMaterial([0.35, 0.37, 0.42], 0.7, 1));
+    if (old) for (const x of [old.cut, old.rapid]) {
+      this.paths.remove(x);
+      x.geometry.dispose();
+    }
+    this.paths.add(cut, rapid);
+    this.ways.set(step, { lod: entry.lod, place, time, kind: Uint8Array.from(t.kind!), axis, line: t.line ?? null, cut, rapid });
+    this.showWays();
+  }
+
+  private wayMaterial(colour: RGB, strength: number, dashed: number): ShaderMaterial {
+    return new ShaderMaterial({
+      glslVersion: GLSL3, vertexShader: WAY_VERTEX, fragmentShader: WAY_FRAGMENT, transparent: true, depthWrite: false,
+      uniforms: { section: this.shared.section, now: this.shared.now, colour: { value: new Color(...colour) },
+        strength: { value: strength }, dashed: { value: dashed } } as never,
+    });
+  }
+
+  /** Which workingsteps are drawn, and whether their rapids are. */
+  show(steps: Set<number>, rapids: boolean): void {
+    this.shownSteps = steps;
+    this.rapids = rapids;
+    this.showWays();
+    this.ask();
+  }
+
+  private showWays(): void {
+    for (const [step, w] of this.ways) {
+      w.cut.visible = this.shownSteps.has(step);
+      w.rapid.visible = this.rapids && this.shownSteps.has(step);
+    }
+    this.shared.faded!.value = this.shownSteps.size && this.shared.mode!.value !== 2 ? 0.6 : 0;
+  }
+
+  setMode(mode: Mode): void {
+    this.shared.mode!.value = { zones: 0, walls: 1, deviation: 2 }[mode];
+    this.showWays();
+    this.ask();
+  }
+
+  /** Cuts away what lies beyond a plane across an axis, at a share of the part; null: nothing. */
+  cutAway(axis: 0 | 1 | 2 | null, share: number, flipped: boolean): void {
+    if (axis === null) this.section.copy(NO_SECTION);
+    else {
+      const [low, high] = this.head!.bounds_mm;
+      const at = low[axis] + share * (high[axis] - low[axis]);
+      const n = new Vector3().setComponent(axis, flipped ? -1 : 1);
+      this.section.set(n.x, n.y, n.z, flipped ? -at : at);
+    }
+    this.clip();
+    this.ask();
+  }
+
+  private clip(): void {
+    const s = this.section;
+    const on = s.lengthSq() > 0 && (s.x !== 0 || s.y !== 0 || s.z !== 0);
+    this.plane.set(new Vector3(-s.x, -s.y, -s.z), s.w);
+    this.renderer.localClippingEnabled = true;
+    if (this.edges) (this.edges.material as LineBasicMaterial).clippingPlanes = on ? [this.plane] : [];
+  }
+
+  // --- the tool in time -------------------------------------------------------------------------------------------
+
+  /** Where the tip is at a second, and along which axis; null where the tool is on no way. */
+  at(seconds: number): { step: number; row: number; place: Vector3; axis: Vector3; line: number | null; kind: number } | null {
+    const head = this.head!;
+    let step = head.steps.findIndex((s) => seconds <= s.end_s);
+    if (step < 0) step = head.steps.length - 1;
+    while (step >= 0 && !this.ways.get(step)) step--;
+    const w = this.ways.get(step);
+    if (!w || w.time.length === 0) return null;
+    let low = 0;
+    let high = w.time.length - 1;
+    while (low < high) {
+      const mid = (low + high) >> 1;
+      if (w.time[mid]! < seconds) low = mid + 1;
+      else high = mid;
+    }
+    const row = low;
+    const before = Math.max(0, row - 1);
+    const span = w.time[row]! - w.time[before]!;
+    const share = span > 0 && w.kind[row] !== 0 ? Math.min(1, Math.max(0, (seconds - w.time[before]!) / span)) : 1;
+    const pick = (a: Float32Array): Vector3 =>
+      new Vector3(...(a.subarray(3 * before, 3 * before + 3) as unknown as P3)).lerp(
+        new Vector3(...(a.subarray(3 * row, 3 * row + 3) as unknown as P3)), share);
+    const own = head.steps[step]!.axis;
+    const axis = w.axis ? pick(w.axis).normalize() : new Vector3(...(own ?? [0, 0, 1]));
+    return { step, row, place: pick(w.place), axis, line: w.line ? w.line[row]! : null, kind: w.kind[row]! };
+  }
+
+  /** Puts the tool where it is at a second; null: no tool, all of the way as done. */
+  time(seconds: number | null): ReturnType<Picture["at"]> {
+    this.shared.now!.value = seconds ?? Infinity;
+    const here = seconds === null ? null : this.at(seconds);
+    this.tool.visible = here !== null;
+    if (here) {
+      const number = this.head!.steps[here.step]!.tool;
+      if (number !== this.toolShown) this.makeTool(number);
+      this.tool.position.copy(here.place);
+      this.tool.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), here.axis));
+    }
+    this.ask();
+    return here;
+  }
+
+  showHolder(on: boolean): void {
+    this.holder = on;
+    this.toolShown = -1;
+  }
+
+  private makeTool(number: number): void {
+    this.toolShown = number;
+    this.tool.clear();
+    const shape = this.head!.tools.find((t) => t.number === number);
+    const look: Record<string, [number, number]> = {
+      "cutting part": [0xd9a62e, 1], neck: [0x9aa3ad, 1], shank: [0x7d8791, 0.85], holder: [0x6d7a87, 0.45],
+    };
+    for (const body of shape?.bodies ?? []) {
+      if (body.kind === "holder" && !this.holder) continue;
+      const p = body.profile.map(([r, z]) => new Vector2(r, z));
+      const closed = [new Vector2(0, p[0]!.y), ...p, new Vector2(0, p[p.length - 1]!.y)];
+      const g = new LatheGeometry(closed, 40);
+      g.rotateX(Math.PI / 2); // its axis is Y
+      const [colour, opacity] = look[body.kind] ?? [0x888888, 1];
+      this.tool.add(new Mesh(g, new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, side: DoubleSide, depthWrite: opacity === 1 })));
+    }
+  }
+
+  // --- where one looks from ------------------------------------------------------------------------------------------
+
+  get middle(): Vector3 {
+    const [low, high] = this.head!.bounds_mm;
+    return new Vector3(...low).add(new Vector3(...high)).multiplyScalar(0.5);
+  }
+
+  get size(): number {
+    const [low, high] = this.head!.bounds_mm;
+    return new Vector3(...high).distanceTo(new Vector3(...low)) || 1;
+  }
+
+  private away(radius: number): number {
+    const half = (this.camera.fov * Math.PI) / 360;
+    return radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+  }
+
+  fit(direction: P3 = [-0.55, -0.95, 0.9]): void {
+    const d = new Vector3(...direction).normalize();
+    this.controls.target.copy(this.middle);
+    this.camera.position.copy(this.middle).addScaledVector(d, this.away(0.5 * this.size) * 0.98);
+    this.camera.near = this.size / 500;
+    this.camera.far = this.size * 60;
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.ask();
+  }
+
+  /** Looks at a place from where it is seen, the present direction first. */
+  lookAt(point: P3, radius: number): void {
+    const p = new Vector3(...point);
+    const now = this.camera.position.clone().sub(this.controls.target).normalize();
+    const tries = [now];
+    for (const up of [35, 60, 15, 85, -20])
+      for (let k = 0; k < 12; k++) {
+        const a = (k * Math.PI) / 6 + 0.3;
+        const e = (up * Math.PI) / 180;
+        tries.push(new Vector3(Math.cos(a) * Math.cos(e), Math.sin(a) * Math.cos(e), Math.sin(e)));
+      }
+    const far = this.away(radius);
+    const free = tries.find((d) => {
+      const caster = new Raycaster(p.clone().addScaledVector(d, 0.02 * radius + 0.05), d, 0, far);
+      return this.cast(caster) === null;
+    });
+    const d = free ?? now;
+    this.controls.target.copy(p);
+    this.camera.position.copy(p).addScaledVector(d, far);
+    this.controls.update();
+    this.ask();
+    this.onMove();
+  }
+
+  /** Turns (rad), moves (shares of the picture) or nears (factor) the camera; for keys. */
+  nudge(turn: number, tilt: number, x: number, y: number, near: number): void {
+    const t = this.controls.target;
+    const off = this.camera.position.clone().sub(t);
+    const r = off.length() * near;
+    let polar = Math.acos(Math.min(1, Math.max(-1, off.z / off.length())));
+    const azimuth = Math.atan2(off.y, off.x) + turn;
+    polar = Math.min(Math.PI - 0.01, Math.max(0.01, polar + tilt));
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrix, 0).multiplyScalar(x * r);
+    const up = new Vector3().setFromMatrixColumn(this.camera.matrix, 1).multiplyScalar(y * r);
+    t.add(right).add(up);
+    this.camera.position.set(Math.sin(polar) * Math.cos(azimuth), Math.sin(polar) * Math.sin(azimuth), Math.cos(polar))
+      .multiplyScalar(r).add(t);
+    this.controls.update();
+    this.onMove();
+  }
+
+  get pose(): number[] {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()].map((v) => Math.round(v * 100) / 100);
+  }
+
+  set pose(p: number[]) {
+    this.camera.position.set(p[0]!, p[1]!, p[2]!);
+    this.controls.target.set(p[3]!, p[4]!, p[5]!);
+    this.controls.update();
+    this.ask();
+  }
+
+  // --- what is under the pointer --------------------------------------------------------------------------------------
+
+  private cast(caster: Raycaster): Intersection | null {
+    const s = this.section;
+    for (const hit of caster.intersectObjects([...this.parts.values()].map((p) => p.mesh), false))
+      if (s.x * hit.point.x + s.y * hit.point.y + s.z * hit.point.z <= s.w) return hit;
+    return null;
+  }
+
+  /** The place of the part under a point of the page, CSS pixels. */
+  pick(x: number, y: number): Hit | null {
+    const box = this.canvas.getBoundingClientRect();
+    const caster = new Raycaster();
+    caster.setFromCamera(new Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height), this.camera);
+    const hit = this.cast(caster);
+    if (!hit?.face) return null;
+    const mesh = hit.object as Mesh;
+    const g = mesh.geometry;
+    const corner = [hit.face.a, hit.face.b, hit.face.c].reduce((best, c) =>
+      hit.point.distanceToSquared(new Vector3().fromBufferAttribute(g.attributes.position as BufferAttribute, c)) <
+      hit.point.distanceToSquared(new Vector3().fromBufferAttribute(g.attributes.position as BufferAttribute, best)) ? c : best);
+    return {
+      point: hit.point, face: (mesh.userData.face as Int32Array)[corner]!, label: mesh.userData.label as number,
+      left: (g.attributes.left_ as BufferAttribute).getX(corner), judged: (g.attributes.judged as BufferAttribute).getX(corner),
+    };
+  }
+
+  /** Where a place is drawn, CSS pixels of the canvas; null where it is behind the viewer. */
+  screen(p: Vector3): { x: number; y: number } | null {
+    const q = p.clone().project(this.camera);
+    if (q.z > 1) return null;
+    return { x: ((q.x + 1) / 2) * this.canvas.clientWidth, y: ((1 - q.y) / 2) * this.canvas.clientHeight };
+  }
+
+  /** Whether the section leaves a place. */
+  kept(p: Vector3): boolean {
+    return this.section.x * p.x + this.section.y * p.y + this.section.z * p.z <= this.section.w;
+  }
+
+  /** Whether nothing of the part stands before a place. */
+  free(p: Vector3): boolean {
+    const d = this.camera.position.clone().sub(p);
+    const far = d.length();
+    d.normalize();
+    return this.cast(new Raycaster(p.clone().addScaledVector(d, 0.01 * this.size), d, 0, far)) === null;
+  }
+
+  /** A straight line between two places that the part does not hide; null takes it away. */
+  rule(a: Vector3 | null, b: Vector3 | null): void {
+    this.marks.clear();
+    if (a && b) {
+      const g = new BufferGeometry().setFromPoints([a, b]);
+      const line = new LineSegments(g, new LineBasicMaterial({ color: 0xe0007a, depthTest: false }));
+      line.renderOrder = 9;
+      this.marks.add(line);
+    }
+    this.ask();
+  }
+}
