@@ -1,3 +1,12 @@
+# The page, built by Node; the image itself has none.
+FROM node:22-slim AS page
+WORKDIR /build/web
+COPY web/package.json web/package-lock.json web/.npmrc ./
+RUN npm ci
+COPY openapi.yaml /build/
+COPY web ./
+RUN mkdir /build/service && npm run build
+
 # One image for api, worker and scheduler. The numba kernels are compiled while it is built, so a container starts warm.
 FROM python:3.11-slim
 
@@ -20,6 +29,7 @@ COPY output output
 COPY verify verify
 COPY schemas schemas
 COPY service service
+COPY --from=page /build/service/page service/page
 COPY examples examples
 RUN pip install --no-deps --editable .
 

@@ -13,7 +13,14 @@ INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m p
 
 .PHONY: setup check types test test-slow golden bench docs demo serve lock clean
 
-setup: $(STAMP)
+# The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
+PAGE := service/page/index.html
+NODE := $(shell npm --version >/dev/null 2>&1 && node -e 'const [a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' >/dev/null 2>&1 && echo yes)
+NPM = $(if $(NODE),npm,PATH="$(CURDIR)/$(BIN):$$PATH" npm)
+
+.PHONY: web page
+
+setup: $(STAMP) page
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; try make PYTHON=python3.12 setup"; exit 1; }
@@ -28,6 +35,18 @@ $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
 	$(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
+
+web: $(PAGE)
+
+$(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requirements-web.lock | $(BIN)/python
+	$(if $(NODE),,$(INSTALL) --no-deps -r requirements-web.lock)
+	cd web && $(NPM) ci --loglevel=error
+	cd web && $(NPM) run --silent build
+	@touch $@
+
+# Whoever cannot get the packages of the page has everything but the page, and is told.
+page: | $(BIN)/python
+	@$(MAKE) --no-print-directory -s web || echo "The page was not built, for the reason above. All else works. Remedy: make web"
 
 check: $(STAMP)
 	$(BIN)/ruff check .
@@ -56,7 +75,7 @@ docs: $(STAMP)
 demo: $(STAMP)
 	$(BIN)/zonemill demo --out $(OUT)
 
-serve: $(STAMP)
+serve: $(STAMP) page
 	$(BIN)/zonemill serve --port $(PORT)
 
 LOCK_FLAGS = --universal --python-version 3.11 --no-header --no-emit-index-url --no-annotate -q
@@ -65,4 +84,4 @@ lock:
 	uv pip compile pyproject.toml --extra dev --extra bench $(LOCK_FLAGS) -c requirements.lock -o requirements-bench.lock
 
 clean:
-	rm -rf build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
