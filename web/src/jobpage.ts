@@ -268,7 +268,7 @@ class JobView {
     left.dataset.bytes = String(bytes);
     left.dataset.ready = String(Math.round(ms));
     if (this.look.t !== undefined) this.setTime(this.look.t);
-    (window as unknown as { zonemill: unknown }).zonemill = { picture: this.picture, frame: () => this.picture.timed() };
+    (window as unknown as { zonemill: unknown }).zonemill = { picture: this.picture, frame: () => this.picture.timed(), moving: () => this.picture.timedMoving() };
   }
 
   // --- the panel ------------------------------------------------------------------------------------------------------

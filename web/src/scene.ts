@@ -94,6 +94,15 @@ export interface Hit {
   judged: number;
 }
 
+/** Whether the browser draws without a graphics card: smooth edges then cost more than they give. */
+function drawnBySoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? String(gl!.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 const NO_SECTION = new Vector4(0, 0, 0, 1);
 
 export class Picture {
@@ -108,6 +117,8 @@ export class Picture {
   private paths = new Group();
   private tool = new Group();
   private marks = new Group();
+  private roughPart = new Map<number, Mesh>();
+  private roughWays = new Map<number, [LineSegments, LineSegments]>();
   private shine = new Group();
   private parts = new Map<number, { lod: number; mesh: Mesh }>();
   private ways = new Map<number, Way>();
@@ -125,7 +136,7 @@ export class Picture {
   onMove: () => void = () => {};
 
   constructor(place: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({ antialias: !drawnBySoftware(), powerPreference: "high-performance" });
     this.canvas = this.renderer.domElement;
     place.appendChild(this.canvas);
     this.camera.up.set(0, 0, 1);
@@ -165,6 +176,7 @@ export class Picture {
   private grain(share: number): void {
     if (share === this.coarse) return;
     this.coarse = share;
+    this.showLevels();
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2) * share);
     this.ask();
   }
@@ -206,6 +218,16 @@ export class Picture {
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
     return performance.now() - from;
+  }
+
+  /** The same while something moves: the rough level, on fewer pixels. */
+  timedMoving(): number {
+    const kept = this.coarse;
+    this.grain(0.5);
+    const took = Math.min(this.timed(), this.timed());
+    this.grain(kept);
+    this.timed();
+    return took;
   }
 
   png(): string {
@@ -275,11 +297,12 @@ export class Picture {
     const old = this.parts.get(label);
     if (old && old.lod > entry.lod) return;
     if (old) {
-      this.part.remove(old.mesh);
-      old.mesh.geometry.dispose();
+      old.mesh.material = mesh.material; // one look for both levels
+      this.roughPart.set(label, old.mesh);
     }
     this.parts.set(label, { lod: entry.lod, mesh });
     this.part.add(mesh);
+    this.showLevels();
   }
 
   /** The rough facets of labels that have none in the fine level are in the way of it. */
@@ -290,6 +313,7 @@ export class Picture {
         this.part.remove(p.mesh);
         this.parts.delete(label);
       }
+    this.showLevels();
     this.ask();
   }
 
@@ -368,9 +392,9 @@ export class Picture {
     const colour = toolColour(Math.max(0, tools.indexOf(head.steps[step]!.tool)));
     const cut = new LineSegments(g(cuts), this.wayMaterial(colour, head.steps[step]!.operation === "roughing" ? 0.45 : 0.85, 0));
     const rapid = new LineSegments(g(moves), this.wayMaterial([0.35, 0.37, 0.42], 0.7, 1));
-    if (old) for (const x of [old.cut, old.rapid]) {
-      this.paths.remove(x);
-      x.geometry.dispose();
+    if (old) {
+      [old.cut.material, old.rapid.material] = [cut.material, rapid.material];
+      this.roughWays.set(step, [old.cut, old.rapid]);
     }
     this.paths.add(cut, rapid);
     this.ways.set(step, { lod: entry.lod, place, time, kind: Uint8Array.from(t.kind!), axis, line: t.line ?? null, cut, rapid });
@@ -393,10 +417,27 @@ export class Picture {
     this.ask();
   }
 
+  /** While something moves on a slow machine the rough level is drawn, else the fine one. */
+  private showLevels(): void {
+    for (const [label, { mesh }] of this.parts) {
+      const rough = this.roughPart.get(label);
+      mesh.visible = !(rough && this.coarse < 1);
+      if (rough) rough.visible = this.coarse < 1;
+    }
+    this.showWays();
+  }
+
   private showWays(): void {
     for (const [step, w] of this.ways) {
-      w.cut.visible = this.shownSteps.has(step);
-      w.rapid.visible = this.rapids && this.shownSteps.has(step);
+      const rough = this.coarse < 1 ? this.roughWays.get(step) : undefined;
+      const [cut, rapid] = [this.shownSteps.has(step), this.rapids && this.shownSteps.has(step)];
+      w.cut.visible = cut && !rough;
+      w.rapid.visible = rapid && !rough;
+      const kept = this.roughWays.get(step);
+      if (kept) {
+        kept[0].visible = cut && rough !== undefined;
+        kept[1].visible = rapid && rough !== undefined;
+      }
     }
     this.shared.faded!.value = this.shownSteps.size && this.shared.mode!.value !== 2 ? 0.6 : 0;
   }
