@@ -22,7 +22,8 @@ from toolpath.motion import Workingstep
 from verify.model import Finding, FindingKind, Proof
 from zones.zoning import ZoneArea
 
-PLANS = 3  # of a job at most
+PLANS = 3  # of a job, where proofs go on finding something
+FURTHER = 3  # of a job beyond these, while each proof finds no more than half of what the one before it found
 MOST = 24  # findings: more are no wrong estimates
 MOST_PACKED = 96  # those of the engaged angle, which hang on the lattice of the stock all along a pass
 MET = (FindingKind.COLLISION, FindingKind.RUBBING)
@@ -123,6 +124,16 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
     return Learned(out, tuple(notes))
 
 
+def worth_another(found: Sequence[int], plans: int = PLANS) -> bool:
+    """Whether a job is planned again after proofs that found so many findings each, the last one some.
+
+    >>> [worth_another(n) for n in ([9], [9, 9], [9, 9, 9], [53, 3, 1], [53, 3, 1, 1])]
+    [True, True, False, True, False]
+    """
+    made = len(found)
+    return made < plans or (1 < made < plans + FURTHER and 2 * found[-1] <= found[-2])
+
+
 def _held(before: Counterexamples, old: Counterexamples, f: Finding, tried: Attempt, side: Side) -> Counterexamples:
     """With a wall that a finding says was finished without support; it counts as thinner the second time."""
     top = float((np.array(f.point) @ tried.look.rotation @ side.view.rotation.T)[2])
@@ -146,4 +157,4 @@ def _step_of(f: Finding, programs: Sequence[Program]) -> Workingstep | None:
     return None
 
 
-__all__ = ["PLANS", "Attempt", "Learned", "learned"]
+__all__ = ["PLANS", "Attempt", "Learned", "learned", "worth_another"]

@@ -19,9 +19,10 @@ import numpy as np
 
 from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
+from output.arcs import SHARE as ARCS
 from schemas.setup import Setup
 from service import reporting
-from service.again import PLANS, Attempt, Learned, learned
+from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.artifacts import clear_results
 from service.cautions import bent, limited, lives_ended, sentences, thin_walls, unheld
 from service.convert import (
@@ -115,7 +116,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     dense = look.into(scored.samples, first)
     told, begun = Learned(), PREPARED
     sides: list[Side] = []
-    for attempt in range(PLANS):
+    found: list[int] = []
+    while True:
         # how many there will be is not known: each takes most of what is left
         ended = begun + FIRST_SHARE * (PROVED - begun)
         span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
@@ -128,7 +130,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
                       ScoredSamples(dense, zone), [z.id for z in ready.zones], span.proving)
         more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
-        if more is None or attempt + 1 == PLANS:
+        found.append(sum(proof.counts.values()))
+        if more is None or not worth_another(found, PLANS):
             break
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
@@ -330,7 +333,8 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
     tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
-    return PlanSettings(q.scallop_height_mm, q.chordal_tolerance_mm, q.stock_allowance_mm, ready.lift, floor + ABOVE,
+    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if ready.setup.machine.arcs else 0.0))
+    return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
                         rates=rates_of(ready.setup))
