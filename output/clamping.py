@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from output.grid import GRID, I64, grid_path, to_grid
 from output.grid import link as grid_link
 from output.model import Clamping, Frame, Workplan
-from toolpath.motion import Motion, Workingstep
+from toolpath.motion import Arc, Motion, Workingstep
 
 TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a turn
 SPARE = 0.5  # mm, outside the ball, for what a turn of joints leaves its chords by
@@ -36,6 +36,7 @@ class Leg:
     tips   : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, tip to spindle
     turns  : (n, 2) float64, rad, where the rotary axes stand
     feed   : mm/min of the tip
+    arcs   : stretches of it about Z of the setup frame, none unless both rotary axes stand at 0
     """
 
     motion: Motion
@@ -43,6 +44,7 @@ class Leg:
     axes: F64
     turns: F64
     feed: float
+    arcs: tuple[Arc, ...] = ()
 
     @property
     def is_turning(self) -> bool:
@@ -161,7 +163,7 @@ class _Walk:
                                   limit=self.machine.axes(self.turn[None])[0].tolist(),
                                   remedy="turn it along a trajectory, or in a step of its own")
             if t.axes is None:
-                legs.append(self._straight(t.motion, tips, t.feed))
+                legs.append(replace(self._straight(t.motion, tips, t.feed), arcs=self._arcs(t.arcs, frame)))
             else:
                 tips, turns = self.machine.course(tips, t.axes @ frame.rotation, 0.5 * step.chordal_tolerance, SWING,
                                                   gauge, self.turn)
@@ -169,6 +171,13 @@ class _Walk:
                 self.turn = turns[-1]
             self.tip = tips[-1]
         return legs
+
+    def _arcs(self, arcs: tuple[Arc, ...], frame: Frame) -> tuple[Arc, ...]:
+        """Arcs of the frame of an access in that of the setup, where the machine stands as one of three axes does."""
+        if not arcs or np.abs(self.turn).max() > AT_REST:
+            return ()
+        centres = np.array([[*a.centre, 0.0] for a in arcs]) @ frame.rotation
+        return tuple(replace(a, centre=(x, y)) for a, (x, y, _) in zip(arcs, centres.tolist(), strict=True))
 
     def home(self) -> list[Leg]:
         """Back to where tools are changed."""

@@ -7,6 +7,10 @@ planned one on each axis. "Equal" and "moves" mean equality on the grid.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +18,7 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from output.model import Workplan
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 I64 = NDArray[np.int64]
 
@@ -52,6 +56,49 @@ def without_repeats(points: I64) -> I64:
     keep[0] = True
     np.any(points[1:] != points[:-1], axis=1, out=keep[1:])
     return points[keep]
+
+
+@dataclass(frozen=True)
+class GridArc:
+    """An arc or helix about Z as it is written, grid units: X, Y, Z of both ends, X and Y of the centre.
+
+    left : counter-clockwise seen from above
+    """
+
+    start: tuple[int, int, int]
+    end: tuple[int, int, int]
+    centre: tuple[int, int]
+    left: bool
+
+    @property
+    def offset(self) -> tuple[int, int]:
+        """X and Y of the centre from the start on."""
+        return self.centre[0] - self.start[0], self.centre[1] - self.start[1]
+
+    @property
+    def sweep(self) -> float:
+        """rad, positive to the left."""
+        (ax, ay), (bx, by) = ((p[0] - self.centre[0], p[1] - self.centre[1]) for p in (self.start, self.end))
+        return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+
+
+def pieces(points: I64, arcs: Sequence[Arc]) -> Iterator[I64 | GridArc]:
+    """What a path is written as: polylines (m, k), m >= 2, without repeats, and arcs, in order.
+
+    points : (n, k) int64, grid units, X, Y, Z first;  arcs : of rows of it
+    """
+    at = 0
+    for arc in arcs:
+        line = without_repeats(points[at:arc.first + 1])
+        if len(line) > 1:
+            yield line
+        (sx, sy, sz), (ex, ey, ez) = points[[arc.first, arc.last], :3].tolist()
+        x, y = to_grid(np.array(arc.centre)).tolist()
+        yield GridArc((sx, sy, sz), (ex, ey, ez), (x, y), arc.left)
+        at = arc.last
+    line = without_repeats(points[at:])
+    if len(line) > 1:
+        yield line
 
 
 def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:

@@ -29,10 +29,10 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from output.clamping import Leg, Section, home_of, sections
 from output.dialects.base import Dialect
-from output.grid import GRID, I64, check_plan, grid_path, link, to_grid
+from output.grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.model import Clamping, Workplan
 from output.text import decimal, face_words, height_word, step_title, tool_name
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
 LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
@@ -86,6 +86,7 @@ class _Walk:
         self.tool: ToolBody | None = None
         self.rapid: bool | None = None
         self.feed = self.speed = ""
+        self.arcs = any(t.arcs for s in plan.steps for t in s.trajectories)
 
     def _put_in(self, step: Workingstep) -> None:
         """The tool of a step, fresh from the magazine or in the place of a worn one."""
@@ -111,12 +112,30 @@ class _Walk:
 
     def _say(self, rows: list[str], rapid: bool, feed: float = 0.0) -> None:
         """Straight blocks of one kind, with what changes."""
-        word = "" if rapid else decimal(feed, 1 if feed >= 1.0 else 4)
-        changed = bool(word) and word != self.feed
-        self.lines += self.dialect.straight(rows, rapid, rapid is not self.rapid, word if changed else "")
+        word = "" if rapid else self._changed(feed)
+        self.lines += self.dialect.straight(rows, rapid, rapid is not self.rapid, word)
         self.rapid = rapid
-        if changed:
-            self.feed = word
+
+    def _round(self, arc: GridArc, feed: float) -> None:
+        """The block or blocks of an arc; what follows states its kind again."""
+        self.lines += self.dialect.arc(arc, self._changed(feed))
+        self.rapid = None
+
+    def _wind(self, points: I64, arcs: Sequence[Arc], feed: float) -> None:
+        """A path with arcs; points (n, k) on the grid, the first is where the tool stands."""
+        for piece in pieces(points, arcs):
+            if isinstance(piece, GridArc):
+                self._round(piece, feed)
+            else:
+                self._say(self._rows(piece), False, feed)
+
+    def _changed(self, feed: float) -> str:
+        """A feed as it is written, where it is another than before, else ''."""
+        word = decimal(feed, 1 if feed >= 1.0 else 4)
+        if word == self.feed:
+            return ""
+        self.feed = word
+        return word
 
     def _rows(self, points: I64) -> list[str]:
         """Coordinate words of points[1:], only those that differ from the point before."""
@@ -145,7 +164,8 @@ class _Upright(_Walk):
             self.lines += self._modes()
 
     def _modes(self) -> list[str]:
-        return [*self.dialect.modes(self.tolerance, False), *self.dialect.state_zero(self.zero)]
+        d = self.dialect
+        return [*d.modes(self.tolerance, False), *(d.arc_modes() if self.arcs else []), *d.state_zero(self.zero)]
 
     def add_step(self, step: Workingstep) -> None:
         """A step with the way to it."""
@@ -191,7 +211,9 @@ class _Upright(_Walk):
 
     def _follow(self, trajectory: Trajectory, points: I64) -> None:
         """One line a point, with the words that change; the first point is where the tool stands."""
-        if len(points) > 1:
+        if trajectory.arcs:
+            self._wind(to_grid(trajectory.points), trajectory.arcs, trajectory.feed)
+        elif len(points) > 1:
             self._say(self._rows(points), trajectory.motion is Motion.RAPID, trajectory.feed)
 
 
@@ -218,8 +240,8 @@ class _Turning(_Walk):
 
     def _modes(self) -> list[str]:
         d = self.dialect
-        return [*d.modes(self.tolerance, True), *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero),
-                *d.aloft(self.machine.letters)]
+        return [*d.modes(self.tolerance, True), *(d.arc_modes() if self.arcs else []),
+                *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero), *d.aloft(self.machine.letters)]
 
     def _add(self, section: Section) -> None:
         step = section.step
@@ -256,8 +278,8 @@ class _Turning(_Walk):
         axis = legs[0].axes[0]
         flat = not any(leg.is_turning for leg in legs) and float(np.hypot(*axis[:2])) > UPRIGHT
         if flat and self.dialect.planes and self.machine.tcp:
-            first, second = to_grid(np.degrees([-np.arcsin(axis[1]), np.arctan2(axis[0], axis[2])])).tolist()
-            self.plane = plane_axes(np.radians(first * GRID), np.radians(second * GRID))
+            first, second = to_grid(np.degrees(self.dialect.plane_angles(axis))).tolist()
+            self.plane = self.dialect.plane_axes(np.radians(first * GRID), np.radians(second * GRID))
             self.place = to_grid(legs[0].tips[0] @ self.plane)
             self.lines += self.dialect.plane_on(first, second)
             self.rapid = None
@@ -279,6 +301,9 @@ class _Turning(_Walk):
         rapid = leg.motion is Motion.RAPID
         in_time = not self.machine.tcp and not rapid and leg.is_turning
         self.position = points[-1]
+        if leg.arcs:
+            self._wind(points, leg.arcs, leg.feed)
+            return
         moved = (points[1:] != points[:-1]).any(axis=1)
         if self.plane is None:
             rows = [row for row in self._rows(points) if row]
@@ -292,7 +317,6 @@ class _Turning(_Walk):
             self.rapid, self.feed = None, ""
             return
         self._say(rows, rapid, leg.feed)
-
 
     def _planar(self, points: I64, places: F64) -> list[str]:
         """Rows of points (m, 3) of the plane, grid steps, and the places they stand for, mm.
@@ -310,17 +334,6 @@ class _Turning(_Walk):
         rows = self._rows(np.vstack([self.place, points]))
         self.place = at
         return rows
-
-
-def plane_axes(first: float, second: float) -> F64:
-    """(3, 3): columns are X, Y, Z of the setup frame turned about its X by ``first`` and then about its Y, rad.
-
-    >>> np.round(plane_axes(np.radians(90.0), 0.0) @ [0.0, 0.0, 1.0], 9) + 0.0
-    array([ 0., -1.,  0.])
-    """
-    a, b = (np.cos(first), np.sin(first)), (np.cos(second), np.sin(second))
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, a[0], -a[1]], [0.0, a[1], a[0]]])
-    return np.array([[b[0], 0.0, b[1]], [0.0, 1.0, 0.0], [-b[1], 0.0, b[0]]]) @ about_x
 
 
 def label_number(plan: Workplan, step: Workingstep) -> int:
@@ -428,4 +441,4 @@ def step_words(step: Workingstep) -> str:
     return "; ".join(words)
 
 
-__all__ = ["label_number", "lowest_tip", "path_tolerance", "plane_axes", "step_words", "write_program"]
+__all__ = ["label_number", "lowest_tip", "path_tolerance", "step_words", "write_program"]

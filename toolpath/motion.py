@@ -28,6 +28,21 @@ class Motion(StrEnum):
     LIFT = "lift"
 
 
+@dataclass(frozen=True)
+class Arc:
+    """A stretch of a trajectory on a circle as seen along Z; where Z changes it goes evenly with the angle, a helix.
+
+    first, last : rows of the points it begins and ends at
+    centre      : mm, X and Y
+    left        : counter-clockwise seen from above, as G3 goes
+    """
+
+    first: int
+    last: int
+    centre: tuple[float, float]
+    left: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """One polyline of the tool tip.
@@ -36,12 +51,15 @@ class Trajectory:
     points : (n, 3) float64, mm, n >= 2; the first point equals the last of the trajectory before it
     feed   : mm/min; ignored for a rapid
     axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points all the way
+    arcs   : stretches that may be gone along as G2 or G3, in order, apart but for their ends; the points between those
+             of an arc lie on it
     """
 
     motion: Motion
     points: F64
     feed: float
     axes: F64 | None = None
+    arcs: tuple[Arc, ...] = ()
 
     @property
     def length(self) -> float:

@@ -4,7 +4,8 @@ Moves are compared one by one, after what is no move has been left out: ways tha
 turn the tool about itself, and pieces a reading cut a turning block into. Where one of the two leaves the way to the
 control, as STEP-NC does from a tool change to the next path, the rapids of the other up to the same place are not
 looked at. A stretch of one feed that has another number of points on both sides, as arcs for chords, is compared as a
-line in space.
+line in space: the chords a G2 or G3 is read as may leave their arc by ``CHORD``, so that the points of STEP-NC on that
+arc may be so much farther off.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from geometry.errors import InternalError
 from geometry.mesh import F64
+from verify.arcs import CHORD
 from verify.program import Program
 
 TIP = 1e-3  # mm
@@ -101,16 +103,17 @@ def check_agreement(nc: Program, stepnc: Program) -> Agreement:
         count = end - begin
         if i + count <= len(a) and _same_words(a, i, b, begin, count) is None:
             apart = np.abs(a.at[i:i + count] - b.at[begin:end])
-            tip, axis = max(tip, float(apart[:, :6].max(initial=0.0))), max(axis, float(apart[:, 6:].max(initial=0.0)))
             bad = np.flatnonzero((apart[:, :6].max(axis=1, initial=0.0) > TIP)
                                  | (apart[:, 6:].max(axis=1, initial=0.0) > AXIS))
-            if len(bad):
+            if len(bad) and not _chords(a, i, i + count):
                 _differ(a, i + int(bad[0]), b, begin + int(bad[0]), "go to different places, or with different axes")
-            i += count
-        else:
-            i, far = _by_stretches(a, i, b, begin, end)
-            tip = max(tip, far)
-        moves += count
+            if not len(bad):
+                tip = max(tip, float(apart[:, :6].max(initial=0.0)))
+                axis = max(axis, float(apart[:, 6:].max(initial=0.0)))
+                i, moves = i + count, moves + count
+                continue
+        i, far = _by_stretches(a, i, b, begin, end)
+        tip, moves = max(tip, far), moves + count
     while i < len(a) and a.rapid[i]:
         i += 1  # to where nothing follows
     if i < len(a):
@@ -133,21 +136,25 @@ def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
 
 
 def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int, float]:
-    """Compare stretches of one tool, kind and feed as lines in space; returns where ``a`` goes on, and the distance."""
+    """Compare stretches of one tool, kind and feed as lines in space; returns where ``a`` goes on, and the distance,
+    past what chords may leave their arcs by."""
     far = 0.0
     while begin < end:
         last_b = _stretch(b, begin, end)
         if i >= len(a):
             _differ(a, len(a) - 1, b, begin, "do not end together")
         last_a = _stretch(a, i, len(a))
+        if b.rapid[begin]:  # no arcs, and behind them ``a`` may go on to where nothing is said in ``b``
+            last_a = min(last_a, i + last_b - begin)
         if _same_words(a, i, b, begin, 1) is not None:
             _differ(a, i, b, begin, "have different feeds, speeds, coolant, tools or kinds of move")
-        if last_a - i == last_b - begin:
+        if last_a - i == last_b - begin and not _chords(a, i, last_a):
             apart = float(np.abs(a.at[i:last_a, :6] - b.at[begin:last_b, :6]).max(initial=0.0))
             leaning = float(np.abs(a.at[i:last_a, 6:] - b.at[begin:last_b, 6:]).max(initial=0.0))
         else:
             one, other = (np.vstack([r.at[k, :3], r.at[k:m, 3:6]]) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
-            apart, leaning = max(_along(one, other), _along(other, one)), 0.0
+            bow = CHORD if _chords(a, i, last_a) else 0.0
+            apart = max(_along(one, other, TIP), _along(other, one, TIP + bow) - bow)
             axis = np.tile(a.at[i, 6:9], 2)  # of stretches with other points it must not turn
             leaning = max(float(np.abs(r.at[k:m, 6:] - axis).max()) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
         if apart > TIP or leaning > AXIS:
@@ -156,16 +163,25 @@ def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int
     return i, far
 
 
+def _chords(r: _Rows, begin: int, end: int) -> bool:
+    """Whether some of these moves are chords of one block, an arc."""
+    return bool((r.line[begin + 1:end] == r.line[begin:end - 1]).any())
+
+
 def _stretch(r: _Rows, begin: int, end: int) -> int:
-    """Where the moves from ``begin`` on that have its tool, kind and feed end."""
+    """Where the moves from ``begin`` on that have its tool, kind and feed end; of feed moves its speed as well."""
     feed = np.nan_to_num(r.feed[begin:end])
+    speed = (r.speed[begin:end] != r.speed[begin]) & ~r.rapid[begin]
     other = np.flatnonzero((r.rapid[begin:end] != r.rapid[begin]) | (r.tool[begin:end] != r.tool[begin])
-                           | (np.abs(feed - feed[0]) > FEED * feed[0]) | (r.speed[begin:end] != r.speed[begin]))
+                           | (np.abs(feed - feed[0]) > FEED * feed[0]) | speed)
     return begin + (int(other[0]) if len(other) else end - begin)
 
 
-def _along(points: F64, way: F64) -> float:
-    """mm, the farthest of points (n, 3) from a way (m, 3), gone along in its order: none is behind the one before."""
+def _along(points: F64, way: F64, limit: float) -> float:
+    """mm, the farthest of points (n, 3) from a way (m, 3), gone along in its order: none is behind the one before.
+
+    Ends at the first that is farther than the limit.
+    """
     at, far = 0, 0.0
     for p in points:
         best, place = np.inf, at
@@ -175,10 +191,10 @@ def _along(points: F64, way: F64) -> float:
             distance = float(np.linalg.norm(p - way[k] - share * d))
             if distance < best:
                 best, place = distance, k
-            elif best <= TIP:
+            elif best <= limit:
                 break
         at, far = place, max(far, best)
-        if far > TIP:
+        if far > limit:
             return far
     return far
 

@@ -4,6 +4,9 @@ Compared is what a reading gives: where the tip goes, how the tool stands, rapid
 the tool, its speed, the coolant, dwells, and what is unknown of a way; how the machine is left where a tool is changed,
 where somebody is waited for, and at the end; and what is taken for granted. Moves that go nowhere are left out on both
 sides, for controls differ in how they say "home". How far a path is left is compared where both programs bound it.
+
+An arc is read as chords. Where two controls say the same arc in words that are rounded otherwise, one may have a chord
+more: such a block is compared as a whole, and its chords as lines in space.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from geometry.errors import InternalError, ProgramError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
+from verify.arcs import CHORD
 from verify.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
 from verify.program import Pause, Program
@@ -49,19 +53,20 @@ def difference(proved: Program, other: Program) -> str:
     if not (other.unbounded or proved.unbounded) and other.blend > proved.blend + 1e-12:
         return (f"{other.name} lets the control leave the path by {other.blend:g} mm, {proved.name} by "
                 f"{proved.blend:g} mm")
-    mine, yours = _moving(proved), _moving(other)
+    mine, yours = _evened(proved, other, _moving(proved), _moving(other))
     n = min(len(mine), len(yours))
+    mine, yours = mine[:n + 1], yours[:n + 1]
     compared = _compared(proved, other, mine[:n], yours[:n])
     off = np.flatnonzero(np.any([unlike for _, unlike in compared], axis=0))
     if len(off):
         k = int(off[0])
-        return (f"line {other.line[yours[k]]} of {other.name} and line {proved.line[mine[k]]} of {proved.name} "
+        return (f"line {other.line[yours[k, 0]]} of {other.name} and line {proved.line[mine[k, 0]]} of {proved.name} "
                 f"differ in {', '.join(what for what, unlike in compared if unlike[k])}")
     if len(mine) != len(yours):
         more = proved if len(mine) > n else other
-        row = int((mine if len(mine) > n else yours)[n])
+        row = int((mine if len(mine) > n else yours)[n, 0])
         return f"line {more.line[row]} of {more.name} has no counterpart"
-    return _careless(proved) or _careless(other) or _paused(proved, other, mine, yours)
+    return _careless(proved) or _careless(other) or _paused(proved, other, mine[:, 0], yours[:, 0])
 
 
 def _careless(p: Program) -> str:
@@ -110,29 +115,87 @@ def _moving(p: Program) -> NDArray[np.int64]:
     return np.flatnonzero(moves)
 
 
-def _compared(a: Program, b: Program, i: NDArray[np.int64],
-              j: NDArray[np.int64]) -> list[tuple[str, NDArray[np.bool_]]]:
-    """What is compared, and for which pairs of rows it differs."""
-    def far(one: F64, other: F64, limit: float) -> NDArray[np.bool_]:
-        return np.asarray(~(np.linalg.norm(one[i] - other[j], axis=1) <= limit))
+def _evened(a: Program, b: Program, i: NDArray[np.int64],
+            j: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last row (n, 2) of each move that is compared, of both programs.
+
+    A row each, but for blocks of several rows that have another number of them in the other program: these are one.
+    """
+    begins, counts = zip(*(_blocks(p, rows) for p, rows in ((a, i), (b, j))), strict=True)
+    out = []
+    n = min(len(counts[0]), len(counts[1]))
+    odd = np.zeros(max(len(counts[0]), len(counts[1])), np.bool_)
+    odd[:n] = (counts[0][:n] != counts[1][:n]) & (counts[0][:n] > 1) & (counts[1][:n] > 1)
+    for rows, begin, count in zip((i, j), begins, counts, strict=True):
+        one = odd[:len(count)]
+        block = np.repeat(np.arange(len(count)), count)
+        keep = ~one[block]
+        keep[begin[one]] = True
+        last = rows.copy()
+        last[begin[one]] = rows[(begin + count - 1)[one]]
+        out.append(np.column_stack([rows, last])[keep])
+    return out[0], out[1]
+
+
+def _blocks(p: Program, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where, among rows, each block of the program begins, and how many of them it has."""
+    line = p.line[rows]
+    begin = np.flatnonzero(np.append(True, line[1:] != line[:-1])) if len(rows) else np.zeros(0, np.int64)
+    return begin, np.diff(np.append(begin, len(rows)))
+
+
+def _compared(a: Program, b: Program, first: NDArray[np.int64],
+              second: NDArray[np.int64]) -> list[tuple[str, NDArray[np.bool_]]]:
+    """What is compared, and for which pairs of moves, given by their first and last rows (n, 2), it differs."""
+    (i, il), (j, jl) = first.T, second.T
+
+    def far(one: F64, other: F64, limit: float, *, at_start: bool = False) -> NDArray[np.bool_]:
+        apart = one[i] - other[j] if at_start else one[il] - other[jl]
+        return np.asarray(~(np.linalg.norm(apart, axis=1) <= limit))
 
     def unlike(one: F64, other: F64) -> NDArray[np.bool_]:
         x, y = one[i], other[j]
         return np.asarray(~((np.abs(x - y) <= RATE * np.abs(x)) | (np.isnan(x) & np.isnan(y))))
 
     out = [("rapid or feed", a.kind[i] != b.kind[j]), ("the tool", a.tool[i] != b.tool[j]),
-           ("where the move begins", far(a.start, b.start, TIP)), ("where the move ends", far(a.end, b.end, TIP)),
+           ("where the move begins", far(a.start, b.start, TIP, at_start=True)),
+           ("where the move ends", far(a.end, b.end, TIP)), ("the way between", _wide(a, b, first, second)),
            ("what is known of the way", _unknown(a)[i] != _unknown(b)[j])]
-    for what, one, other in (("the tool axis before the move", _axes(a, True), _axes(b, True)),
-                             ("the tool axis after the move", _axes(a, False), _axes(b, False))):
-        out.append((what, far(one, other, AXIS)))
+    out += [("the tool axis before the move", far(_axes(a, True), _axes(b, True), AXIS, at_start=True)),
+            ("the tool axis after the move", far(_axes(a, False), _axes(b, False), AXIS))]
     if a.poses is not None and b.poses is not None:
         out.append(("where the rotary axes stand", far(a.poses.end_turn, b.poses.end_turn, AXIS)))
     # what a block takes is rounded with its places
     slack = 1e-9 + TIP / np.maximum(np.nan_to_num(a.feed[i], nan=1.0), 1.0)
-    took = ~((np.abs(a.minutes[i] - b.minutes[j]) <= slack) | (np.isnan(a.minutes[i]) & np.isnan(b.minutes[j])))
+    mine, yours = (_minutes(p, rows) for p, rows in ((a, first), (b, second)))
+    took = ~((np.abs(mine - yours) <= slack) | (np.isnan(mine) & np.isnan(yours)))
     return [*out, ("the feed", unlike(a.feed, b.feed)), ("the time they take", took),
             ("the speed of the spindle", unlike(a.speed, b.speed)), ("the coolant", a.coolant[i] != b.coolant[j])]
+
+
+def _minutes(p: Program, rows: NDArray[np.int64]) -> F64:
+    """What moves take, from their first to their last row (n, 2)."""
+    out = p.minutes[rows[:, 0]]
+    for k in np.flatnonzero(rows[:, 0] != rows[:, 1]).tolist():
+        out[k] = p.minutes[rows[k, 0]:rows[k, 1] + 1].sum()
+    return out
+
+
+def _wide(a: Program, b: Program, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Of moves of several rows whether their chords leave one another: by more than each may leave their arc."""
+    out = np.zeros(len(first), np.bool_)
+    for k in np.flatnonzero((first[:, 0] != first[:, 1]) | (second[:, 0] != second[:, 1])).tolist():
+        one, other = (np.vstack([p.start[m], p.end[m:n + 1]]) for p, (m, n) in ((a, first[k]), (b, second[k])))
+        out[k] = max(_off(one, other), _off(other, one)) > TIP + CHORD
+    return out
+
+
+def _off(points: F64, way: F64) -> float:
+    """mm, the farthest of points (n, 3) from a way (m, 3), wherever along it."""
+    d = np.diff(way, axis=0)
+    share = ((points[:, None] - way[:-1]) * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30)
+    near = way[:-1] + np.clip(share, 0.0, 1.0)[:, :, None] * d
+    return float(np.linalg.norm(points[:, None] - near, axis=2).min(axis=1).max())
 
 
 def _unknown(p: Program) -> NDArray[np.int64]:

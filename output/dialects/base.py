@@ -11,8 +11,11 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from geometry.errors import OutputError
-from output.grid import PER_MM
+from geometry.mesh import F64
+from output.grid import PER_MM, GridArc
 from output.text import ascii_text, decimal
 
 UP_THE_TOOL = 50.0
@@ -38,11 +41,26 @@ class Switches:
     high_speed : say the word for fast contouring (G05.1 Q1, CYCLE832) where the control has it as an option
     haas_tcp   : the word by which a Haas keeps the tip: 'G234' or 'G43.4'
     planes     : a Heidenhain cuts with a fixed tool axis in a plane tilted to it (PLANE SPATIAL)
+    swivel     : so does a Siemens (CYCLE800); the name of its swivel data record, '' where it has one alone; None: it
+                 does not
     """
 
     high_speed: bool = False
     haas_tcp: str = "G234"
     planes: bool = False
+    swivel: str | None = None
+
+
+def about_x(angle: float) -> F64:
+    """(3, 3): turns right-handed about X by rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def about_y(angle: float) -> F64:
+    """(3, 3): turns right-handed about Y by rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 class Dialect:
@@ -180,9 +198,20 @@ class Dialect:
         """Whether steps of a fixed tool axis are written in a plane square to it; the tip is kept all along."""
         return False
 
+    def plane_angles(self, axis: F64) -> tuple[float, float]:
+        """rad about X and about Y that a plane square to a tool axis (3,), unit, is turned by; see ``plane_axes``."""
+        return -math.asin(float(axis[1])), math.atan2(float(axis[0]), float(axis[2]))
+
+    def plane_axes(self, first: float, second: float) -> F64:
+        """(3, 3): columns are X, Y, Z of the setup frame turned about its X by ``first``, then about its Y, rad.
+
+        >>> np.round(Dialect(Switches()).plane_axes(np.radians(90.0), 0.0) @ [0.0, 0.0, 1.0], 9) + 0.0
+        array([ 0., -1.,  0.])
+        """
+        return np.asarray(about_y(second) @ about_x(first))
+
     def plane_on(self, first: int, second: int) -> list[str]:
-        """From here on X, Y, Z count in the setup frame turned about its X by ``first`` and then about its Y by
-        ``second``, grid steps of 0.0001 deg; no axis moves."""
+        """From here on X, Y, Z count in the frame of ``plane_axes``, grid steps of 0.0001 deg; no axis moves."""
         return []
 
     def plane_off(self) -> list[str]:
@@ -203,6 +232,17 @@ class Dialect:
         """
         words = [*(["G0" if rapid else "G1"] if first else []), rows[0], *([self.feed(feed)] if feed else [])]
         return [" ".join(words), *rows[1:]]
+
+    def arc_modes(self) -> list[str]:
+        """Behind ``modes`` in a program with arcs: I and J count from the start of an arc."""
+        return []
+
+    def arc(self, arc: GridArc, feed: str) -> list[str]:
+        """An arc of less than half a turn, or a helix, in the XY plane; feed: mm/min where it changes, else ''."""
+        (x, y, z), (i, j) = arc.end, arc.offset
+        words = [("X", x), ("Y", y), *([("Z", z)] if z != arc.start[2] else []), ("I", i), ("J", j)]
+        return [" ".join(["G3" if arc.left else "G2", *(a + self.number(v) for a, v in words),
+                          *([self.feed(feed)] if feed else [])])]
 
     def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
         """Feed blocks that say how often each would fit into a minute (inverse time)."""

@@ -8,10 +8,12 @@ wants it, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL), M1
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from geometry.errors import OutputError
 from output.dialects.base import Dialect, axis_tolerance
+from output.grid import PER_MM, GridArc
 from output.text import decimal
 
 
@@ -122,6 +124,16 @@ class Heidenhain(Dialect):
             return [f"L {row} R0 FMAX" for row in rows]
         out = [f"L {row}" for row in rows]
         return [f"{out[0]} R0 F{feed}" if feed else out[0], *out[1:]]
+
+    def arc(self, arc: GridArc, feed: str) -> list[str]:
+        """C round CC; a helix is there in polar coordinates alone, by the angle it goes on."""
+        number, sense = self.number, "+" if arc.left else "-"
+        x, y, z = arc.end
+        words = f"C X{number(x)} Y{number(y)}"
+        if z != arc.start[2]:
+            words = f"CP IPA{number(round(math.degrees(arc.sweep) * PER_MM))} Z{number(z)}"
+        return [f"CC X{number(arc.centre[0])} Y{number(arc.centre[1])}",
+                f"{words} DR{sense}" + (f" R0 F{feed}" if feed else "")]
 
     def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
         """There is no word for it."""

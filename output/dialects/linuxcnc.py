@@ -34,6 +34,10 @@ class LinuxCnc(Dialect):
         """Both M words in one block: they are of two groups."""
         return [" ".join(super().spindle(speed, first))]
 
+    def arc_modes(self) -> list[str]:
+        """G90.1 of a run before may still be in force."""
+        return ["G91.1"]
+
     def rise(self) -> list[str]:
         """The control itself goes up to change a tool, but not for one that it has."""
         return ["G53 G0 Z0."]

@@ -23,7 +23,8 @@ from verify.likeness import difference
 from verify.reader import read_program
 
 OTHERS = ("fanuc", "haas", "siemens", "heidenhain")
-SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4"), "planes": Switches(planes=True)}
+SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4"),
+         "planes": Switches(planes=True, swivel="TC1")}
 TURNED = clamped("table-table-BC", swings=False)
 
 
@@ -219,7 +220,8 @@ def test_a_move_left_out_or_put_in_is_found():
     ("haas", "S900 M3 M8", "one M word in a block"),
     ("siemens", "R1=5", "unknown word"), ("siemens", "GOTOF ENDE", "unknown word"), ("siemens", "G500", "switches"),
     ("siemens", "G70", "F in what the machine"),
-    ("siemens", "X=IC(5)", "no plain number"), ("siemens", "CYCLE800(0)", "cycle or function"),
+    ("siemens", "X=IC(5)", "no plain number"), ("siemens", "CYCLE800(0)", "15 arguments"),
+    ("siemens", "CYCLE801(0)", "cycle or function"),
     ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
     ("heidenhain", "L IX+5", "cannot read"), ("heidenhain", "L X+5 RL F100", "cannot read"),
     ("heidenhain", "CALL LBL 1", "cannot read"), ("heidenhain", "FN 0: Q1 = 5", "cannot read"),
@@ -388,6 +390,59 @@ def test_planes_hold_the_steps_of_a_fixed_axis(kind):
     with pytest.raises(ProgramError, match="place the program has not stated"):
         read_program("BEGIN PGM A MM\nM128\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nL X+1 FMAX\nM30\n",
                      dialect="heidenhain", kinematics=Kinematics("table-table-AC"))
+
+
+@pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC", "head-head-BC"])
+def test_planes_of_cycle800_hold_the_steps_of_a_fixed_axis(kind):
+    work = clamped(kind)
+    text = write(work, "siemens", SHOPS["planes"])
+    assert text.count("CYCLE800(0,\"TC1\",0,57,") == 3 and text.count("CYCLE800()") == 4  # S05 turns, S01 is upright
+    inside = text.split("CYCLE800(0,")[1].split("CYCLE800()")[0]
+    assert not re.search(r" [ABC][+-]?[0-9]", inside) and len(inside.splitlines()) > 10
+    planar, same = read(work, text, "siemens"), read(work, write(work, "siemens"), "siemens")
+    assert difference(same, planar) == "" and difference(read(work, write_linuxcnc(work), "linuxcnc"), planar) == ""
+    far = np.linalg.norm(planar.end - same.end, axis=1)
+    assert 0.0 < far.max() < 2.5e-4
+    for wrong in (("57,0,0,0,18.", "57,0,0,0,-18."), (",27.", ",28."), ("-74.3839,0", "-74.3839,0.01"),
+                  (",18.4349,27.", ",27.7913,18.")):
+        assert wrong[0] in text and difference(same, read(work, text.replace(*wrong, 1), "siemens")) != ""
+    assert "CYCLE800 with direction 0" in text and "CYCLE800" not in write(work, "siemens")
+
+
+def test_a_plane_of_cycle800_is_square_to_the_tool():
+    """X, then the new Y: Z of the plane is the tool axis, as an independent formula has it."""
+    control = DIALECTS["siemens"](SHOPS["planes"])
+    for axis in ((0.5, -0.3, 0.9), (-0.8, 0.2, 0.1), (0.0, 0.7, -0.2), (0.0, -1.0, 0.0)):
+        axis = np.array(axis) / np.linalg.norm(axis)
+        a, b = control.plane_angles(axis)
+        frame = control.plane_axes(a, b)
+        assert np.allclose(frame[:, 2], axis) and np.allclose(frame.T @ frame, np.eye(3))
+        assert np.allclose(frame[:, 0] @ [0.0, np.cos(a), np.sin(a)], 0.0)  # X lies across the Y that X has turned
+
+
+PLANE = 'CYCLE800(0,"T",0,57,0,0,0,10,20,0,0,0,0,0,0)'
+
+
+@pytest.mark.parametrize(("lines", "said"), [
+    ([PLANE], "while TRAORI keeps the tip"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,0,10,20,0,0,0,0,-1,0)'], "direction 0"),
+    (["TRAORI", "G54", 'CYCLE800(1,"T",0,57,0,0,0,10,20,0,0,0,0,0,0)'], "without a way up"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",1,57,0,0,0,10,20,0,0,0,0,0,0)'], "new plane"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",0,39,0,0,0,10,20,0,0,0,0,0,0)'], "axis by axis"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,5,10,20,0,0,0,0,0,0)'], "from the zero to the zero"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,0,R1,20,0,0,0,0,0,0)'], "plain numbers"),
+    (["TRAORI", "G54", PLANE, "G0 X1"], "has not stated"),
+    (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "TRAFOOF"], "M429 in a plane"),
+    (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "SUPA G0 Z0"], "in a plane"),
+    (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "G2 X1 Y1 I1 J1"], "G2 in a pla"),
+    (["TRAORI", "G54", "G91", PLANE], "in incremental"),
+    (["TRAORI", "G54", "G0 X1 Y1 Z50", "G91", "X1", "G90", PLANE, "Z1"], "not stat"),
+])
+def test_other_planes_of_cycle800_are_refused(lines, said):
+    head = ["G710 G17 G90 G94 G54", "T1 M6", "D1", "S900 M3"]
+    with pytest.raises(ProgramError, match=re.escape(said)):
+        read_program("\n".join([*head, *lines, "CYCLE800()", "M30", ""]), dialect="siemens",
+                     kinematics=Kinematics("table-table-AC"))
 
 
 @pytest.mark.parametrize("shop", SHOPS)

@@ -1,9 +1,10 @@
 """Heidenhain, conversational: a keyword opens each block, FMAX makes a rapid for one block, F stays.
 
-Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C, CR, M words, LBL, STOP, of the cycles 247
-(preset) and 32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup frame turned about
-its X, then Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius compensation, incremental words
-(IX), other arcs, Q parameters, calls and shifts are refused by name. F of an INCH program counts tenths of an inch.
+Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C or with CP and IPA, CR, M words, LBL, STOP,
+the cycles 247 (preset) and 32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup
+frame turned about its X, then Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius
+compensation, other incremental words (IX), other arcs, Q parameters, calls and shifts are refused by name. F of an INCH
+program counts tenths of an inch.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ from __future__ import annotations
 import math
 import re
 
-import numpy as np
-
 from geometry.mesh import F64
 from verify.dialects.base import NUMBER, BlockError, Control, zero_word
+from verify.dialects.planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 _LINE = re.compile(rf"L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?: +M[0-9]+)*)")
 _CENTRE = re.compile(rf"CC(?: +X({_NUM}))?(?: +Y({_NUM}))?")
 _ARC = re.compile(rf"(C|CR)((?: +[XYZ]{_NUM})*)(?: +R({_NUM}))? +DR([+-])(?: +R0)?(?: +(F{_NUM}))?")
+_POLAR = re.compile(rf"CP +IPA({_NUM})(?: +Z({_NUM}))? +DR([+-])(?: +R0)?(?: +(F{_NUM}))?")
 _TOOL = re.compile(rf'TOOL CALL(?: +"?([0-9]+)"?)?(?: +([XYZ]))?(?: +S({NUMBER}))?(?: +F({NUMBER}))?'
                    r"(?: +D[LR][+-]?0*\.?0*)*")
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
@@ -34,16 +35,6 @@ _IDLE = ("BLK FORM", "TOOL DEF", "CYCL DEF 32.0", "* -")
 def is_conversational(text: str) -> bool:
     """Whether a text begins as a program in plain language does."""
     return re.match(r"\s*(?:[0-9]+\s+)?BEGIN PGM\b", text.upper()) is not None
-
-
-def _turn(axis: int, angle: float) -> F64:
-    """(3, 3): right-handed about X, Y or Z (0, 1, 2) by rad."""
-    out = np.eye(3)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    out[i, i] = out[j, j] = math.cos(angle)
-    out[j, i] = math.sin(angle)
-    out[i, j] = -out[j, i]
-    return out
 
 
 class Heidenhain(Control):
@@ -80,6 +71,8 @@ class Heidenhain(Control):
             return []
         if m := _ARC.fullmatch(text):
             return self._arc(m)
+        if m := _POLAR.fullmatch(text):
+            return self._polar(m)
         if text.startswith("PLANE"):
             return self._tilt(text)
         if m := re.fullmatch(rf"CYCL DEF 32\.1(?: T({NUMBER}))?", text):
@@ -111,7 +104,7 @@ class Heidenhain(Control):
             raise BlockError(f"cannot read '{text[:60]}': of tilted planes only PLANE SPATIAL and PLANE RESET with "
                              "STAY are read, and only while M128 keeps the tip")
         a, b, c = (math.radians(float(v)) for v in m.groups())
-        self.plane = _turn(2, c) @ _turn(1, b) @ _turn(0, a)
+        self.plane = turn(2, c) @ turn(1, b) @ turn(0, a)
         return []
 
     def _setup(self, words: str, machine: bool) -> str:
@@ -124,13 +117,9 @@ class Heidenhain(Control):
         if self.plane is None:
             self.at = [v if math.isnan(w) else w for v, w in zip(self.at, linear, strict=True)]
             return words
-        if len(named) == 0 or not named.keys() & set("XYZ"):
+        if not named.keys() & set("XYZ"):
             return words
-        here = np.array(self.at) @ self.plane
-        there = self.plane @ np.where(np.isnan(linear), here, linear)
-        if np.isnan(there).any():
-            raise BlockError("a move in a tilted plane from a place the program has not stated")
-        self.at = there.tolist()
+        self.at = placed(self.plane, self.at, named)
         turns = [k + v for k, v in named.items() if k not in "XYZ"]
         return " ".join([*(f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)), *turns])
 
@@ -182,19 +171,33 @@ class Heidenhain(Control):
 
     def _arc(self, m: re.Match[str]) -> list[str]:
         """C round the centre of CC, or CR by a radius, whose sign says which of both arcs."""
-        if self.plane is not None:
-            raise BlockError("an arc in a tilted plane")
         start, words = list(self.at), self._setup(" ".join(m[2].split()), False)
-        block = f"{'G3' if m[4] == '+' else 'G2'} {words}"
         if (m[1] == "CR") != (m[3] is not None):
             raise BlockError(f"{m[1]} {'without' if m[1] == 'CR' else 'with'} a radius R")
-        if m[1] == "CR":
-            block += f" R{m[3]}"
-        elif any(math.isnan(v) for v in (*start[:2], *self.centre)):
-            raise BlockError("C round a centre (CC), or from a place, that the program has not stated")
-        else:
-            block += f" I{self.centre[0] - start[0]:.9f} J{self.centre[1] - start[1]:.9f}"
-        return [f"{block} {self._feed(m[5])}" if m[5] else block]
+        return self._round(words, f"R{m[3]}" if m[3] else self._offset("C", start), m[4], m[5])
+
+    def _polar(self, m: re.Match[str]) -> list[str]:
+        """CP round the centre of CC by an angle of less than a turn, which goes the way DR says; Z makes a helix."""
+        angle = math.radians(float(m[1]))
+        if not 0.0 < abs(angle) < 2.0 * math.pi or (angle > 0.0) != (m[3] == "+"):
+            raise BlockError(f"CP IPA{m[1]} DR{m[3]}: read are angles of less than a turn with the sign of DR")
+        start, centre = list(self.at), self._offset("CP", self.at)
+        (u, v), c, s = [a - b for a, b in zip(start[:2], self.centre, strict=True)], math.cos(angle), math.sin(angle)
+        end = [self.centre[0] + c * u - s * v, self.centre[1] + s * u + c * v]
+        words = " ".join([*(f"{k}{p:.12f}" for k, p in zip("XY", end, strict=True)), *([f"Z{m[2]}"] if m[2] else [])])
+        return self._round(self._setup(words, False), centre, m[3], m[4])
+
+    def _offset(self, word: str, start: list[float]) -> str:
+        """The centre from the start of an arc."""
+        if any(math.isnan(v) for v in (*start[:2], *self.centre)):
+            raise BlockError(f"{word} round a centre (CC), or from a place, that the program has not stated")
+        return " ".join(f"{k}{c - s:.12f}" for k, c, s in zip("IJ", self.centre, start, strict=False))
+
+    def _round(self, words: str, centre: str, sense: str, feed: str | None) -> list[str]:
+        if self.plane is not None:
+            raise BlockError("an arc in a tilted plane")
+        block = f"{'G3' if sense == '+' else 'G2'} {words} {centre}"
+        return [f"{block} {self._feed(feed)}" if feed else block]
 
     def _machine(self, ms: list[int], stop: str) -> list[str]:
         self._switch(ms)

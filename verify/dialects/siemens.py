@@ -3,14 +3,18 @@
 D1 is the only cutting edge whose length is known; a tool that is put in has it at once (machine data 20270). What a
 program computes (R parameters, DEF, IF, GOTO, subprograms) is refused by name, and so are frames of the program.
 TRAORI and TRAFOOF may switch the zero off (G500): a move after one of them, unless past all frames (SUPA, G53), is
-refused until a zero is stated again.
+refused until a zero is stated again. Of swivelled planes CYCLE800 is read with direction 0 while TRAORI is on, which
+moves no axis: X, Y, Z count in the setup frame turned about its X and then about the new Y and the new Z (mode 57).
 """
 
 from __future__ import annotations
 
+import math
 import re
 
-from verify.dialects.base import NUMBER, BlockError, Control, zero_word
+from geometry.mesh import F64
+from verify.dialects.base import NUMBER, ZEROS, BlockError, Control, zero_word
+from verify.dialects.planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 _PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{_NUM} ?)*(?:F{_NUM} ?)?\r?")
@@ -18,6 +22,7 @@ _TOKEN = re.compile(rf"""\s*(?:(?P<call>[A-Z_][A-Z_0-9]*)\s*\((?P<args>[^()]*)\)
     |(?P<name>[A-Z_][A-Z_0-9]*)\s*=\s*(?P<value>"[^"]*"|[^\s;"]+)
     |(?P<letter>[A-Z])(?P<digits>{NUMBER})(?![A-Z_0-9.])
     |(?P<word>[A-Z_][A-Z_0-9]*))""", re.VERBOSE)
+_PLACE = re.compile(rf"([XYZ])({_NUM}|NAN)")
 _LABEL = re.compile(r"(?:N[0-9]+\s+)?[A-Z_]{2}[A-Z_0-9]*:")
 SMALL = 0.01
 """deg a tool axis may leave its way by without a word about it: 0.01 mm at 57 mm above the tip."""
@@ -25,6 +30,10 @@ _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]
                     r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
 _SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
 _UNITS = {700: 20, 710: 21, 71: 21}
+_LOSING = frozenset({"G20", "G21", "M6"})
+"""Words of the reader after which places count otherwise, or are not known."""
+_PLANELESS = frozenset({"G2", "G3", "G53", "G91", "G93", "M6", "M428", "M429", *ZEROS})
+"""Those that are not taken in a plane of CYCLE800."""
 _IDLE = frozenset({"ORIMKS", "ORIAXES", "FFWON", "FFWOF", "SOFT", "BRISK", "COMPOF", "DIAMOF", "CFTCP"})
 _UNBOUNDED = frozenset({64, 642, 643, 644, 645})
 _M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
@@ -46,10 +55,17 @@ class Siemens(Control):
         self.tool = self.selected = 0
         self.loose = ""
         self.lost = ""  # the word after which no zero has been stated
+        self.tcp = self.relative = False
+        self.plane: F64 | None = None  # columns are its axes in the setup frame
+        self.at = [math.nan] * 3  # setup frame, where a plane is on
+        self.trail: list[str] = []  # blocks with places since one was
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move as it is; everything else word by word."""
         if not self.lost and _PLAIN.fullmatch(raw):
+            if self.plane is not None:
+                return [self._in_plane(raw.split())]
+            self.trail.append(raw)
             return [raw]
         if raw.startswith("%_N_"):
             return []
@@ -89,11 +105,72 @@ class Siemens(Control):
             raise BlockError(f"a move after {self.lost} without a zero: the control may count from none (G500)",
                              "state the zero (G54 to G57, G505 on) before anything moves")
         out += self._path(codes, values)
+        self._follow(out)
+        if self.plane is not None and any(w[0] in "XYZ" for w in out):
+            out = [self._in_plane(out)]
         if 4 in codes:
             out = [f"G4 P{w[1:]}" for w in out if w[0] == "F"]
             if not out:
                 raise BlockError("G4 without F, the seconds")
         return [" ".join(out), *after] if out or after else []
+
+    def _follow(self, out: list[str]) -> None:
+        """Keep where the tool is, and what a plane rests on."""
+        if self.plane is not None:
+            told = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
+            if told:
+                raise BlockError(f"{told[0]} in a plane of CYCLE800", "end it with CYCLE800() before")
+            return
+        if self.relative or not _LOSING.isdisjoint(out):
+            self.trail.append("XNAN YNAN ZNAN")
+        if "G91" in out or "G90" in out:
+            self.relative = "G91" in out
+        if not self.relative:
+            self.trail.append(" ".join(f"{w[0]}NAN" if "G53" in out else w for w in out if w[0] in "XYZ"))
+
+    def _in_plane(self, words: list[str]) -> str:
+        """The same block with X, Y, Z in the setup frame."""
+        named = {w[0]: w[1:] for w in words if w[0] in "XYZ"}
+        if not named or self.plane is None:
+            return " ".join(words)
+        self.at = placed(self.plane, self.at, named)
+        rest = [w for w in words if w[0] not in "XYZ"]
+        places = [f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)]
+        head = [w for w in rest if w[0] in "NG"]
+        return " ".join([*head, *places, *(w for w in rest if w[0] not in "NG")])
+
+    def _swivel(self, parts: list[str]) -> None:
+        """CYCLE800, which turns the coordinates or turns them back."""
+        if parts == [""]:
+            if self.plane is not None:
+                self.trail = [" ".join(k + f"{v:.12f}" for k, v in zip("XYZ", self.at, strict=True))]
+            self.plane = None
+            return
+        said = f"CYCLE800({','.join(parts)})"[:60]
+        numbers = [parts[0], *parts[2:15]]
+        if not 15 <= len(parts) <= 16 or not all(re.fullmatch(NUMBER, p) for p in numbers) or parts[15:] not in (
+                [], [""], ["0"]):
+            raise BlockError(f"{said}: read with its 15 arguments as plain numbers, the second a name")
+        given = [float(n) for n in numbers]
+        if given[12] != 0.0 or not self.tcp:
+            raise BlockError(f"{said}: read with direction 0, which moves no axis, and while TRAORI keeps the tip")
+        if given[:3] not in ([0.0, 0.0, 57.0], [0.0, 200000.0, 57.0]) or any(given[3:6]) or any(given[9:12]):
+            raise BlockError(f"{said}: read as a new plane, without a way up (0), axis by axis about X, Y, Z (57) and "
+                             "from the zero to the zero")
+        if self.relative or self.plane is not None:
+            raise BlockError(f"{said} in incremental coordinates, or in a plane of another")
+        a, b, c = (math.radians(v) for v in given[6:9])
+        self.at, self.plane = self._here(), turn(0, a) @ turn(1, b) @ turn(2, c)
+
+    def _here(self) -> list[float]:
+        """Where the tool stands by the blocks so far, nan where they do not say."""
+        found: dict[str, float] = {}
+        for block in reversed(self.trail):
+            for letter, value in _PLACE.findall(block):
+                found.setdefault(letter, float(value))
+            if len(found) == 3:
+                break
+        return [found.get(k, math.nan) for k in "XYZ"]
 
     def _path(self, codes: list[int], values: dict[str, float]) -> list[str]:
         """Words for how far corners are rounded."""
@@ -182,7 +259,7 @@ class Siemens(Control):
         if word == "TRAORI" and self.loose:
             self.notes.append(self.loose)
         if known != "G53":
-            self.lost = word
+            self.lost, self.tcp = word, word == "TRAORI"
         return [known]
 
     def _oriented(self, parts: list[str]) -> None:
@@ -198,6 +275,9 @@ class Siemens(Control):
         parts = [p.strip() for p in arguments.split(",")]
         if name == "TRAORI" and parts in ([""], ["1"]):
             return self._name("TRAORI")
+        if name == "CYCLE800":
+            self._swivel(parts)
+            return []
         if name == "CYCLE832":
             if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
                 self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
