@@ -11,7 +11,7 @@ PORT ?= 8000
 # uv installs into a given interpreter; plain pip is called by the interpreter itself.
 INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 
-.PHONY: setup check types test test-slow golden bench docs demo serve lock clean
+.PHONY: setup check types test test-slow soak golden bench docs demo serve lock clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -55,10 +55,14 @@ check: $(STAMP)
 	$(BIN)/python -m pytest -q tests/unit/test_docstrings.py tests/unit/test_dependencies.py
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -m "not slow" -n 2 --dist worksteal
+	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
 
 test-slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -m "slow and not soak"
+
+# What takes longer than CI waits; each test prints its figures. SOAK_COUNT=50 for a quick look.
+soak: $(STAMP)
+	$(BIN)/python -m pytest -q -s -m soak
 
 # Rewrites the expected files; the diff is what gets reviewed.
 golden: $(STAMP)

@@ -33,8 +33,8 @@ def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None =
     Raises
     ------
     SetupError
-        Code 'setup_not_json', 'repeated_key', 'bad_setup' (``measured`` lists every problem as {"at", "problem"},
-        ``subjects`` the places), or as ``check_blank``.
+        Code 'setup_not_json', 'repeated_key', 'bad_text', 'bad_setup' (``measured`` lists every problem as {"at",
+        "problem"}, ``subjects`` the places), or as ``check_blank``.
     """
     if isinstance(data, bytes | str):
         try:
@@ -42,6 +42,12 @@ def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None =
         except (ValueError, RecursionError) as error:
             raise SetupError(f"the setup is not JSON: {error}", code="setup_not_json",
                              remedy="send one JSON object as described by the Setup schema") from None
+    try:
+        json.dumps(data, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError as error:
+        raise SetupError("the setup holds half a character (a lone surrogate), which no text may", code="bad_text",
+                         measured=ascii(error.object[max(0, error.start - 20):error.end + 20]),
+                         remedy="write the text of the setup as UTF-8") from None
     try:
         setup = Setup.model_validate(data, context={"library": library or {}})
     except ValidationError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import sys
 from collections.abc import MutableMapping
 from contextlib import suppress
@@ -15,6 +16,19 @@ from asgi_correlation_id import correlation_id
 def _request_id(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
     if request_id := correlation_id.get():
         event["request_id"] = request_id
+    return event
+
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
+
+
+def _harmless(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """Text of others cannot make lines or colours of the log: control characters are written out, and traces, which
+    may hold any text, stand behind a bar."""
+    for key, value in event.items():
+        if isinstance(value, str):
+            text = _CONTROL.sub(lambda m: ascii(m[0])[1:-1], value)
+            event[key] = text.replace("\n", "\n    | ") if key in ("exception", "stack") else text.replace("\n", "\\n")
     return event
 
 
@@ -46,6 +60,6 @@ def configure(level: str, form: str) -> None:
     structlog.configure(
         processors=[structlog.contextvars.merge_contextvars, _request_id, structlog.processors.add_log_level,
                     structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
-                    renderer],
+                    *([] if form == "json" else [_harmless]), renderer],
         wrapper_class=structlog.make_filtering_bound_logger(number),
         logger_factory=structlog.PrintLoggerFactory(STDERR), cache_logger_on_first_use=False)

@@ -62,6 +62,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _validation)
     app.add_exception_handler(DBAPIError, _database)
     app.add_exception_handler(OSError, _disk)
+    app.add_exception_handler(UnicodeEncodeError, _half_a_character)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -125,6 +126,12 @@ async def _disk(request: Request, error: Exception) -> JSONResponse:
     return problem_response(request, UnavailableError("there is no room left on a disk of the service",
                                                       code=STORAGE_FULL, retry_after_s=60,
                                                       remedy="try again when there is room"))
+
+
+async def _half_a_character(request: Request, error: Exception) -> JSONResponse:
+    """JSON can write half a character, and the validator has no error of its own for it."""
+    return problem_response(request, RequestError("the request holds half a character (a lone surrogate), which no "
+                                                  "text may", code="bad_text", remedy="write texts as UTF-8"))
 
 
 async def _unexpected(request: Request, error: Exception) -> JSONResponse:

@@ -81,7 +81,8 @@ def post(setup_json):
 
     def send(client, do="", *, path="/v1/jobs", part=STEP, key=None, setup=None, program=None, headers=None,
              spindle_tool=None, stock=None, **fields):
-        text = json.dumps(setup_json(do)) if setup is None else setup if isinstance(setup, str) else json.dumps(setup)
+        text = json.dumps(setup_json(do)) if setup is None else setup if isinstance(setup, str | bytes) else (
+            json.dumps(setup))
         files = {"part": ("part.step", part, "model/step"), "setup": ("setup.json", text, "application/json")}
         if program is not None:
             files["program"] = ("x.ngc", program, "text/plain")

@@ -59,28 +59,30 @@ def test_every_field_says_its_unit_or_has_a_description(document):
 
 
 @pytest.mark.slow
-def test_schemathesis_finds_no_answer_outside_the_document(client):
+def test_schemathesis_finds_no_answer_outside_the_document(make_client, bearer):
+    """All its checks but one: what the schema allows may still contradict itself (a neck thicker than its cutter)."""
     import schemathesis
     from hypothesis import HealthCheck, Phase, given, settings
+    from schemathesis.checks import CHECKS, load_all_checks
 
-    schema = schemathesis.openapi.from_asgi("/openapi.json", client.app)
-    probed = 0
-    for result in schema.exclude(path="/v1/jobs/{job_id}/events").get_all_operations():
+    load_all_checks()
+    (accepts,) = CHECKS.get_by_names(["positive_data_acceptance"])
+    client = make_client(auth="keys")
+    headers = {**bearer(client, "ada", "submit", "read", "admin"), "host": "127.0.0.1:8000"}
+    probed: set[str] = set()
+    for result in schemathesis.openapi.from_asgi("/openapi.json", client.app).get_all_operations():
         operation = result.ok()
 
         @settings(max_examples=8, deadline=None, database=None, derandomize=True, phases=[Phase.generate],
                   suppress_health_check=list(HealthCheck))
         @given(case=operation.as_strategy())
         def probe(case):
-            nonlocal probed
-            probed += 1
-            answer = case.call()
-            told = case.operation.definition.raw["responses"]
-            assert answer.status_code < 500 and str(answer.status_code) in told, (
-                case.as_curl_command(), answer.status_code, answer.text)
+            probed.add(case.operation.label)
+            case.call_and_validate(headers=headers, excluded_checks=[accepts])
 
         probe()
-    assert probed > 50
+    wanted = {f"{method.upper()} {path}" for path, item in client.app.openapi()["paths"].items() for method in item}
+    assert probed == wanted
 
 
 @pytest.mark.slow

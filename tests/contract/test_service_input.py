@@ -114,6 +114,29 @@ def test_a_library_body_that_is_no_entry_is_422(client, body):
     assert "dictionary" not in _is_problem(answer, 422, "malformed_request")["detail"]
 
 
+def test_half_a_character_is_refused_wherever_it_stands(client, post):
+    for setup in ('{"tools": [], "\\ud800": 1}', '{"tools": [{"id": "T1\\udfff"}]}', '{"labels": {"a": "\\ud800"}}'):
+        _is_problem(post(client, setup=setup), 422, "bad_text")
+    body = b'{"id": "\\ud800", "kind": "ball", "diameter_mm": 3}'
+    answer = client.put("/v1/tools/x", content=body, headers={"content-type": "application/json"})
+    assert answer.status_code == 422 and answer.headers["content-type"] == "application/problem+json"
+
+
+def test_broken_setups_over_http_are_no_bugs(client, post):
+    from tests.hostile_inputs import FULL_SETUP, mutated_setup
+
+    statuses = {}
+    for seed in range(60):
+        answer = post(client, setup=mutated_setup(seed, FULL_SETUP).encode("utf-8", "surrogatepass"))
+        assert answer.status_code in (202, 422), (seed, answer.text)
+        if answer.status_code == 422:
+            assert answer.json()["remedy"] and answer.headers["content-type"] == "application/problem+json"
+        else:
+            client.delete(answer.json()["links"]["self"])
+        statuses[answer.status_code] = statuses.get(answer.status_code, 0) + 1
+    assert statuses[422] > 30
+
+
 def test_the_key_has_a_length(client, post):
     _is_problem(post(client, key="k" * 256), 422, "malformed_request")
     _is_problem(post(client, key=""), 422, "malformed_request")
