@@ -3,8 +3,8 @@
     python benchmarks/view_size.py [--triangles 300000] [--points 1000000] [--out DIR]
 
 Makes a folder of results with a wavy block of so many facets in 40 zones and a way of so many points in 80 steps, noisy
-enough that hardly a point of it can be left out, serves it as ``zonemill view`` does, and opens it in Chromium without a
-graphics card (web/tests/measure.mjs). Prints one line of figures; docs/view.md has them.
+enough that hardly a point of it can be left out, serves it as ``zonemill view`` does, and opens it in Chromium without
+a graphics card (web/tests/measure.mjs). Prints one line of figures; docs/view.md has them.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 import { FINAL, ask, follow, get, type Job, type JobPage } from "./api";
 import { el, fill } from "./dom";
 import { head, showRefusal } from "./frame";
-import { stateBadge } from "./jobpage";
 import { jobForm } from "./jobform";
+import { stateBadge } from "./words";
 
 export async function listPage(app: HTMLElement): Promise<void> {
   document.title = "Jobs · zonemill";
