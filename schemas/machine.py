@@ -58,6 +58,15 @@ class Machine(WireModel):
     heidenhain_plane: Annotated[bool, Field(
         description="On heidenhain, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL, STAY) instead "
                     "of the setup frame; M128 keeps the tip in both.")] = False
+    siemens_cycle800: Annotated[str | None, Field(
+        max_length=32, pattern=r"^[A-Za-z0-9_]*$",
+        description="On siemens, steps of a fixed tool axis stand in a plane of CYCLE800 (direction 0: no axis moves) "
+                    "instead of the setup frame; TRAORI keeps the tip in both. The name of the swivel data record, "
+                    "empty where the machine has one alone. null: no such planes.")] = None
+    arcs: Annotated[bool, Field(
+        description="Cuts are written as arcs and helices in the XY plane, and as longer lines, where they stay within "
+                    "a third of quality.chordal_tolerance_mm of the planned path; the plan is made for the other two "
+                    "thirds. Steps that lean stay straight moves.")] = False
     travel_mm: Annotated[Triple | None, Field(
         description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
                     "counted; where on the machine is for the work offset. null: not limited.")] = None

@@ -11,6 +11,8 @@ from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
 from geometry.toolbody import ToolBody
+from output.arcs import SHARE as ARCS
+from output.arcs import fitted
 from output.clamping import SWING, home_of
 from output.dialects import DIALECTS, Switches
 from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
@@ -82,7 +84,9 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
     The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
     """
     machine = ready.setup.machine
-    switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane)
+    switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane, machine.siemens_cycle800)
+    if machine.arcs:
+        work = fitted(work, ARCS * ready.setup.quality.chordal_tolerance_mm)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     index = [view.id for view in ready.views].index(access)
