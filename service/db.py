@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,8 @@ from sqlalchemy import Column, Float, Integer, String, Text
 from sqlalchemy.engine import Engine
 
 from service.artifacts import make_private
+
+MIGRATION_LOCK = 0x7A6F6E65  # a number of our own among PostgreSQL's advisory locks
 
 metadata = sa.MetaData()
 
@@ -122,6 +126,22 @@ def migrate(url: str) -> None:
         make_private(Path(url.removeprefix("sqlite:///")).parent)
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
-    with connect(url).connect() as connection:
+    with connect(url).connect() as connection, _alone(connection):
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
+
+
+@contextmanager
+def _alone(connection: sa.Connection) -> Iterator[None]:
+    """Only one service at a time brings a PostgreSQL up to date; the embedded one has its data folder for itself."""
+    if connection.dialect.name != "postgresql":
+        yield
+        return
+    connection.execute(sa.text("SELECT pg_advisory_lock(:n)"), {"n": MIGRATION_LOCK})
+    connection.commit()
+    try:
+        yield
+    finally:
+        connection.rollback()
+        connection.execute(sa.text("SELECT pg_advisory_unlock(:n)"), {"n": MIGRATION_LOCK})
+        connection.commit()

@@ -3,6 +3,7 @@
 import json
 import runpy
 import time
+import uuid
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.logs import configure
 from service.settings import Settings
+from tests.contract.servers import postgres_server
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 HERE = "http://127.0.0.1:8000"  # without keys the service answers to the names of this machine only
@@ -22,6 +24,24 @@ def fake_path():
         patch.setenv("PYTHONPATH", str(Path(__file__).parent / "fakes"))
         configure("error", "console")
         yield
+
+
+@pytest.fixture(scope="session")
+def postgres_port():
+    """Port of a PostgreSQL for all tests that want one."""
+    with postgres_server() as port:
+        yield port
+
+
+@pytest.fixture
+def postgres(postgres_port):
+    """URL of an empty database of PostgreSQL."""
+    import psycopg
+
+    name = f"t{uuid.uuid4().hex}"
+    with psycopg.connect(f"host=127.0.0.1 port={postgres_port} user=zonemill dbname=postgres", autocommit=True) as c:
+        c.execute(f"CREATE DATABASE {name}")
+    return f"postgresql+psycopg://zonemill@127.0.0.1:{postgres_port}/{name}"
 
 
 @pytest.fixture

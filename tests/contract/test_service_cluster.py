@@ -1,9 +1,7 @@
-"""The cluster: PostgreSQL, a Dask scheduler and a worker of its own, as docker-compose.yml starts them."""
+"""The cluster: PostgreSQL, a Dask scheduler, workers and API processes, as docker-compose.yml starts them."""
 
 import os
-import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -13,6 +11,7 @@ import httpx
 import pytest
 
 from service.server import background, settings_with
+from tests.contract.servers import free_port, until_open
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
@@ -20,80 +19,62 @@ FAKES = Path(__file__).parent / "fakes"
 pytestmark = pytest.mark.slow
 
 
-def _free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+class Cluster:
+    """A scheduler with workers of one thread, and API processes beside it."""
+
+    def __init__(self, database, data):
+        self.port, self.data = free_port(), data
+        self.environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{FAKES}", "ZONEMILL_LEASE_S": "3",
+                            "ZONEMILL_DATABASE_URL": database, "ZONEMILL_SCHEDULER": self.address}
+        self.processes = []
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+        until_open(self.port, self.scheduler)
+
+    @property
+    def address(self):
+        return f"tcp://127.0.0.1:{self.port}"
+
+    def _start(self, *words):
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": ROOT, "env": self.environment}
+        self.processes.append(subprocess.Popen([sys.executable, "-m", "dask", *words], **quiet))
+        return self.processes[-1]
+
+    def worker(self):
+        return self._start("worker", self.address, "--no-nanny", "--nthreads", "1", "--memory-limit", "0",
+                           "--no-dashboard")
+
+    def api(self):
+        """A process that serves; returns it with a client."""
+        command = [sys.executable, str(FAKES / "serve_fake.py"), str(self.data), "3"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=self.environment, cwd=ROOT)
+        self.processes.append(process)
+        return process, httpx.Client(base_url=process.stdout.readline().strip(), trust_env=False, timeout=20)
+
+    def close(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
 
 
-def _programs():
-    """Folder of PostgreSQL's server programs, None when it is not installed."""
-    found = shutil.which("initdb")
-    folders = [Path(found).resolve().parent] if found else sorted(Path("/usr/lib/postgresql").glob("*/bin"))
-    return folders[-1] if folders else None
+@pytest.fixture
+def cluster(postgres, fake_path, tmp_path):
+    found = Cluster(postgres, tmp_path / "data")
+    yield found
+    found.close()
 
 
-def _until_open(port, process):
+def _until_ready(client):
     deadline = time.monotonic() + 40
-    while time.monotonic() < deadline and process.poll() is None:
-        try:
-            socket.create_connection(("127.0.0.1", port), 0.5).close()
-            return
-        except OSError:
-            time.sleep(0.1)
-    pytest.fail(f"nothing listens on port {port}")
+    while client.get("/readyz").status_code != 200 and time.monotonic() < deadline:
+        time.sleep(0.2)
 
 
-@pytest.fixture
-def postgres(tmp_path):
-    pytest.importorskip("psycopg", reason="psycopg is not installed")
-    programs = _programs()
-    if programs is None:
-        pytest.skip("PostgreSQL is not installed")
-    # PostgreSQL refuses to run as root, and nobody cannot enter pytest's folders.
-    folder = Path(subprocess.check_output(["mktemp", "-d"], text=True).strip())
-    user = "nobody" if os.geteuid() == 0 else None
-    if user:
-        shutil.chown(folder, user)
-    port = _free_port()
-    made = subprocess.run([programs / "initdb", "-D", folder / "db", "-A", "trust", "-U", "zonemill"], user=user,
-                          capture_output=True, text=True, cwd=folder)
-    assert made.returncode == 0, made.stderr
-    server = subprocess.Popen([programs / "postgres", "-D", folder / "db", "-p", str(port), "-k", folder, "-h",
-                               "127.0.0.1"], user=user, cwd=folder, stderr=subprocess.DEVNULL)
-    _until_open(port, server)
-    time.sleep(1.0)
-    yield f"postgresql+psycopg://zonemill@127.0.0.1:{port}/postgres"
-    server.send_signal(signal.SIGINT)  # fast shutdown: connections of the pool are dropped
-    server.wait(timeout=20)
-    shutil.rmtree(folder, ignore_errors=True)
-
-
-@pytest.fixture
-def scheduler(postgres, fake_path):
-    """Address of a scheduler with one worker of one thread."""
-    port = _free_port()
-    dask = [sys.executable, "-m", "dask"]
-    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{FAKES}"}
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": ROOT, "env": environment}
-    first = subprocess.Popen([*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"],
-                             **quiet)
-    _until_open(port, first)
-    second = subprocess.Popen([*dask, "worker", f"tcp://127.0.0.1:{port}", "--no-nanny", "--nthreads", "1",
-                               "--memory-limit", "0", "--no-dashboard"], **quiet)
-    yield f"tcp://127.0.0.1:{port}"
-    for process in (second, first):
-        process.kill()
-        process.wait()
-
-
-def test_a_job_runs_on_the_cluster_and_is_cancelled_there(postgres, scheduler, tmp_path, post, finish):
+def test_a_job_runs_on_the_cluster_and_is_cancelled_there(cluster, postgres, tmp_path, post, finish):
+    cluster.worker()
     settings = settings_with({"data_dir": tmp_path / "data", "port": 0, "database_url": postgres,
-                              "scheduler": scheduler})
+                              "scheduler": cluster.address})
     with background(settings, "fake_chain") as url, httpx.Client(base_url=url, trust_env=False) as client:
-        deadline = time.monotonic() + 40
-        while client.get("/readyz").status_code != 200 and time.monotonic() < deadline:
-            time.sleep(0.2)
+        _until_ready(client)
         job = finish(client, post(client, "", key="k").json())
         assert (job["state"], job["attempt"]) == ("proved", 1)
         assert post(client, "", key="k").json()["id"] == job["id"]
@@ -106,3 +87,24 @@ def test_a_job_runs_on_the_cluster_and_is_cancelled_there(postgres, scheduler, t
         finish(client, waiting, until=("queued",))
         assert time.monotonic() - started < 1.0
         assert finish(client, waiting)["state"] == "proved"
+
+
+def test_two_apis_and_two_workers_lose_nothing_when_one_of_each_is_killed(cluster, post, finish):
+    workers = [cluster.worker(), cluster.worker()]
+    (first, here), (second, there) = cluster.api(), cluster.api()
+    for client in (here, there):
+        _until_ready(client)
+    while here.get("/v1/capabilities").json()["slots"] < 2:
+        time.sleep(0.1)
+    jobs = [post((here, there)[k % 2], "nap", key=f"k{k}").json() for k in range(8)]
+    assert post(there, "nap", key="k0").json()["id"] == jobs[0]["id"]  # what one took the other knows
+    for job in jobs[:2]:
+        finish(there, job, until=("queued",))
+    workers[0].send_signal(signal.SIGKILL)
+    time.sleep(1.0)
+    first.send_signal(signal.SIGKILL)
+    started = time.monotonic()
+    ended = [finish(there, job, patience=90) for job in jobs]
+    assert [j["state"] for j in ended] == ["proved"] * 8, ended
+    assert max(j["attempt"] for j in ended) <= 3 and time.monotonic() - started < 60
+    assert second.poll() is None and there.get("/readyz").json()["checks"]["database"] == "ok"
