@@ -51,7 +51,8 @@ def drive(tmp_path_factory):
 
     def run(what, url, *more):
         argv = [node(), str(DRIVE), what, url, *(str(m) for m in more)]
-        argv.insert(4 if what == "look" else len(argv), str(shots))
+        if what != "key":
+            argv.insert(4 if what == "look" else len(argv), str(shots))
         done = subprocess.run(argv, capture_output=True, text=True, timeout=400, cwd=ROOT / "web",
                               env={**os.environ, "CHROMIUM": browser()})
         assert done.returncode == 0, done.stderr[-3000:]
@@ -99,6 +100,17 @@ def test_a_first_job_without_json(drive, part, tmp_path):  # noqa: F811
     with background(settings_with(given)) as url:
         said = drive("upload", f"{url}/", part, tmp_path / "setup.json")
     assert said["progress"] >= 2 and int(said["bytes"]) > 2000
+
+
+def test_a_key_is_asked_for_and_kept_in_the_tab_alone(drive, tmp_path):
+    from service.db import connect
+    from service.keys import KeyStore
+
+    given = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": tmp_path / "data", "auth": "keys"})
+    with background(given) as url:
+        secret, _ = KeyStore(connect(given.url)).make("shop", ["read", "submit"])
+        said = drive("key", f"{url}/", secret)
+    assert said["session"] == ["zonemill-key"]
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["desk", "phone"])

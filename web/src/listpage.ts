@@ -33,6 +33,29 @@ async function load(app: HTMLElement, list: HTMLElement, cursor = ""): Promise<v
   }
 }
 
+const STREAMS = 3; // at a time: a browser keeps six connections to a host, and the page needs some itself
+let streams = 0;
+
+/** Follows a job by its events, or where many run by asking now and then; returns it as it ended. */
+async function watch(job: Job, say: (now: { progress: number; stage: string }) => void): Promise<Job> {
+  if (streams < STREAMS) {
+    streams++;
+    try {
+      await follow(job, say, new AbortController().signal);
+    } finally {
+      streams--;
+    }
+    return get<Job>(job.links.self);
+  }
+  for (;;) {
+    await new Promise((resume) => setTimeout(resume, 4000));
+    const now = await get<Job>(job.links.self);
+    if (FINAL.has(now.state)) return now;
+    say(now);
+    if (streams < STREAMS) return watch(now, say);
+  }
+}
+
 const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
 
 function row(job: Job): HTMLElement {
@@ -48,10 +71,10 @@ function row(job: Job): HTMLElement {
       running ? el("button", { type: "button", onclick: () => void ask(j.links.self, { method: "DELETE" }) }, "Cancel") : null,
       j.error ? el("p", { class: "where" }, j.error.detail) : null);
     if (running)
-      void follow(j, (event) => {
-        bar.value = event.progress;
-        words.textContent = `${Math.round(100 * event.progress)} % ${event.stage}`;
-      }, new AbortController().signal).then(async () => draw(await get<Job>(j.links.self)), () => (words.textContent = "the connection was lost; load the page again"));
+      void watch(j, (now) => {
+        bar.value = now.progress;
+        words.textContent = `${Math.round(100 * now.progress)} % ${now.stage}`;
+      }).then(draw, () => (words.textContent = "the connection was lost; load the page again"));
   };
   draw(job);
   return node;

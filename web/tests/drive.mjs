@@ -1,5 +1,6 @@
 // Drives the page as a person would, and looks for what a person would complain about. Called by tests/e2e/test_page.py:
 //   node drive.mjs upload URL PART.step SETUP.json SHOTS      a job from the form to the picture
+//   node drive.mjs key URL KEY                                   a service that asks for a key
 //   node drive.mjs look URL SHOTS WIDTH HEIGHT                  a finished job, on a screen of that size
 // Prints one line of JSON; exits with 1 and says why where something is not as it should be.
 import assert from "node:assert/strict";
@@ -183,8 +184,27 @@ async function look() {
   return { ...said, jumped, clock, distance, minor };
 }
 
+async function key() {
+  const { browser, page } = await open(1280, 800);
+  await page.goto(url);
+  await page.getByText("asks for a key").waitFor();
+  await accessible(page, "key");
+  await page.fill("#key", "zm_000000000000_" + "x".repeat(43));
+  await page.click("button:has-text('Use it')");
+  await page.waitForTimeout(500);
+  await page.fill("#key", rest[0]);
+  await page.click("button:has-text('Use it')");
+  await page.getByText("There are none yet").waitFor();
+  const kept = await page.evaluate(() => ({ session: Object.keys(sessionStorage), local: JSON.stringify(localStorage), cookie: document.cookie }));
+  assert(!kept.local.includes(rest[0]) && !kept.cookie && !(await page.evaluate(() => location.href)).includes(rest[0]));
+  // what the browser says of the refusals that were asked for
+  complaints.splice(0, complaints.length, ...complaints.filter((c) => !/401/.test(c)));
+  await browser.close();
+  return kept;
+}
+
 try {
-  const said = await { upload, look }[what]();
+  const said = await { upload, look, key }[what]();
   assert.deepEqual(complaints, []);
   console.log(JSON.stringify(said));
 } catch (error) {
