@@ -1,4 +1,4 @@
-"""STEP-NC of real jobs before the schema checker: small parts planned on 3 axes, 3+2 and 5, seed by seed.
+"""Files of real jobs before readers of others: small parts planned on 3 axes, 3+2 and 5, seed by seed.
 
     .venv/bin/python benchmarks/stepnc_family.py [--recipe small] [--seeds 0 1 2] [--machines 3-axis 3+2 5-axis]
         [--minutes 30]
@@ -7,7 +7,8 @@ A part is drawn, planned and proved, and both its STEP-NC files are held against
 ../shared/stepnc/p21check.py with --rules --roots; jobs that are not proved have none, and say so. Recipe small is a
 plate of 16 by 14 mm with one wall, its thickness, height and lean drawn from the seed, which takes seconds; the others
 are those of the family (docs/family.md; with two walls and one connection where they let one choose), which take
-minutes. The three forms of AP238 go round with the seeds. The chain itself has read them back and held them against
+minutes. Programs go to LinuxCNC's interpreter (../shared/tools/gcode_check.sh). The three forms of AP238 go round with
+the seeds, and every other seed has arcs. The chain itself has read them back and held them against
 the program before they are there (docs/stepnc.md). Ends where the minutes are spent; a row is printed as it is known.
 """
 
@@ -35,6 +36,7 @@ from service import chain  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 
 CHECK = ROOT.parent / "shared" / "stepnc" / "p21check.py"
+GCODE = ROOT.parent / "shared" / "tools" / "gcode_check.sh"
 SCHEMAS = {"cc1": "ap238e3_aim_lf.exp", "cc2": "ap238e3_aim_lf.exp", "integrated_cnc": "ap238e1_aim_lf.exp"}
 FIVE = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-100, 100], [-720, 720]]}
 MACHINES: dict[str, dict[str, Any]] = {
@@ -50,6 +52,13 @@ def checked(path: Path, schema: str) -> str:
     if schema.startswith("iso") and not all(line.endswith("unreferenced: PROJECT x1 (e.g. #1)") for line in roots):
         bad.append(roots[0])
     return "ok" if done.returncode == 0 and not bad else f"exit {done.returncode}: {bad[0] if bad else '?'}"
+
+
+def interpreted(path: Path, tcp: bool) -> str:
+    """'ok' where LinuxCNC's interpreter takes a program, else what it says last."""
+    done = subprocess.run(["bash", str(GCODE), *(["--tcp"] if tcp else []), str(path)], capture_output=True, text=True)
+    said = (done.stdout + done.stderr).strip().splitlines()
+    return "ok" if done.returncode == 0 else f"exit {done.returncode}: {said[-1] if said else '?'}"
 
 
 def small(seed: int, folder: Path) -> tuple[Path, dict[str, Any]]:
@@ -85,11 +94,11 @@ def row(recipe: str, seed: int, machine: str, folder: Path) -> str:
     started = time.monotonic()
     part, setup = drawn(recipe, seed, folder)
     form = list(SCHEMAS)[seed % len(SCHEMAS)]
-    setup["machine"] = {**setup.get("machine", {}), **MACHINES[machine], "ap238": form}
+    setup["machine"] = {**setup.get("machine", {}), **MACHINES[machine], "ap238": form, "arcs": seed % 2 == 1}
     try:
         report = chain.plan(part, parse_setup(setup), folder / "out", lambda _stage, _share: None)
     except CamError as refusal:
-        return f"| {seed} | {machine} | {form} | {refusal.code} | | | | {time.monotonic() - started:.0f} |"
+        return f"| {seed} | {machine} | {form} | {refusal.code} | | | | | {time.monotonic() - started:.0f} |"
     out = [str(report["state"]), str(len(report["steps"]))]
     for pattern, schema in (("job*.arm.stpnc", "iso14649_milling.exp"), ("job*.stpnc", SCHEMAS[form])):
         files = [f for f in sorted((folder / "out").glob(pattern)) if pattern.endswith("arm.stpnc")
@@ -97,6 +106,9 @@ def row(recipe: str, seed: int, machine: str, folder: Path) -> str:
         said = [checked(f, schema) for f in files]
         out.append(next((s for s in said if s != "ok"), f"ok {sum(f.stat().st_size for f in files) / 1e6:.1f} MB")
                    if files else "none")
+    programs = sorted((folder / "out").glob("program*.linuxcnc.ngc"))
+    heard = [interpreted(f, machine != "3-axis") for f in programs]
+    out.append(next((s for s in heard if s != "ok"), f"ok {len(heard)}") if programs else "none")
     return f"| {seed} | {machine} | {form} | {' | '.join(out)} | {time.monotonic() - started:.0f} |"
 
 
@@ -109,7 +121,7 @@ def main() -> None:
     ask.add_argument("--minutes", type=float, default=60.0)
     asked = ask.parse_args()
     begun = time.monotonic()
-    print("| seed | machine | AP238 as | state | steps | ISO 14649 | AP238 | s |\n|---|---|---|---|---|---|---|---|")
+    print("| seed | machine | AP238 as | state | steps | ISO 14649 | AP238 | LinuxCNC | s |\n|" + "---|" * 9)
     for seed in asked.seeds:
         for machine in asked.machines:
             if time.monotonic() - begun > 60.0 * asked.minutes:

@@ -1,6 +1,7 @@
 """Whole jobs from a box, ours beside a plan nobody optimised: proof, time, air, retracts, tool changes, engagement.
 
-    python benchmarks/whole_job.py [PART/AXES ...] [--plan ours|baseline] [--out out/whole_job] [--table]
+    python benchmarks/whole_job.py [PART/AXES ...] [--plan ours|baseline] [--spacing MM] [--out out/whole_job]
+        [--table]
 
 Parts: the demo, a gap of 0.8 mm, a closed pocket, a strut impeller; axes 3 (upright) and 5 (table A/C, A -30 to 110
 degrees). Each is planned and proved in a process of its own, with the feeds of its setup; what it gave is a line of
@@ -8,7 +9,9 @@ degrees). Each is planned and proved in a process of its own, with the feeds of 
 ``baseline_plan.py``, which stays as it was committed; its lines in ``benchmarks/whole_job_rows`` were made then, and
 again with the feeds of ours where these changed.
 ``--table`` prints the newest line of each. Times and moves are those the proof simulated; air is all time but that of
-moves which take stock.
+moves which take stock. A move takes stock where it takes a line of the proof's stock, and lines stand 0.15 mm apart, so
+a skin that a finishing pass takes off a wall meets few of them and much of the pass counts as air; ``--spacing`` says
+how far apart they are to be.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +43,8 @@ HEAD = ("part", "axes", "plan", "state", "left mm²", "min", "air min", "air", "
         "engaged max / p99 deg", "gouge mm", "s by stage")
 
 
-def planned(part: str, axes: str, plan: str, folder: Path) -> dict[str, Any]:
-    """Make, plan and prove one part: plain data."""
+def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None = None) -> dict[str, Any]:
+    """Make, plan and prove one part: plain data. spacing : mm between lines of the proof's stock, where not its own."""
     from benchmarks import baseline_plan
     from examples.demo import demo_setup
     from examples.family import make_part
@@ -49,13 +53,16 @@ def planned(part: str, axes: str, plan: str, folder: Path) -> dict[str, Any]:
     from service import chain
     from toolpath.plan import plan_job
 
+    if spacing is not None:
+        usual = chain.proof_setup
+        chain.proof_setup = lambda *a, **k: replace(usual(*a, **k), line_spacing=spacing)
     recipe, seed = part.split(":")
     made = make_part(int(seed), recipe, **PARTS[part])
     step, _, _ = made.write(folder)
     setup = {**(demo_setup() if recipe == "demo" else made.setup), "stock": STOCK}
     if AXES[axes] is not None:
         setup["machine"] = AXES[axes]
-    stages, facts = Stages(), {"part": part, "axes": axes, "plan": plan}
+    stages, facts = Stages(), {"part": part, "axes": axes, "plan": plan, "spacing": spacing}
     try:
         report = chain.plan(step, Setup.model_validate(setup), folder / "job", stages,
                             planner=baseline_plan.plan_job if plan == "baseline" else plan_job)
@@ -72,13 +79,13 @@ def planned(part: str, axes: str, plan: str, folder: Path) -> dict[str, Any]:
         "steps": len(report["steps"]), "stages": {k: round(v, 1) for k, v in stages.seconds.items()}}
 
 
-def run(part: str, axes: str, plan: str, limit: float | None) -> dict[str, Any]:
+def run(part: str, axes: str, plan: str, limit: float | None, spacing: float | None) -> dict[str, Any]:
     """One part in a process of its own."""
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as scratch:
         try:
-            done = subprocess.run([sys.executable, __file__, "--one", part, axes, plan, scratch], capture_output=True,
-                                  text=True, timeout=limit)
+            done = subprocess.run([sys.executable, __file__, "--one", part, axes, plan, scratch, str(spacing or "")],
+                                  capture_output=True, text=True, timeout=limit)
             lines = done.stdout.splitlines()
             row = json.loads(lines[-1]) if done.returncode == 0 and lines else {
                 "part": part, "axes": axes, "plan": plan, "state": "error", "message": done.stderr[-400:]}
@@ -103,16 +110,18 @@ def cells(row: dict[str, Any]) -> list[str]:
 def table(rows: list[dict[str, Any]]) -> None:
     """The newest line of each part, axes and plan; after ours what is saved against the baseline."""
     print("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
-    newest = {(r["part"], r["axes"], r["plan"]): r for r in rows}
-    for part, axes in [(p, a) for p in PARTS for a in AXES]:
-        pair = [newest.get((part, axes, plan)) for plan in ("baseline", "ours")]
+    newest = {(r["part"], r["axes"], r["plan"], r.get("spacing")): r for r in rows}
+    spacings = sorted({key[3] for key in newest}, key=lambda s: s or 1.0, reverse=True)
+    for part, axes, spacing in [(p, a, s) for p in PARTS for a in AXES for s in spacings]:
+        pair = [newest.get((part, axes, plan, spacing)) for plan in ("baseline", "ours")]
         for row in pair:
             if row is not None:
                 print("| " + " | ".join(cells(row)) + " |")
         if all(r is not None and r["state"] != "error" for r in pair):
             was, now = pair
             assert was is not None and now is not None
-            print(f"\n{part} {axes} axes: total time {1 - now['seconds'] / was['seconds']:+.1%} saved, air "
+            apart = "" if spacing is None else f", lines {spacing:g} mm apart"
+            print(f"\n{part} {axes} axes{apart}: total time {1 - now['seconds'] / was['seconds']:+.1%} saved, air "
                   f"{1 - now['time']['in_air_s'] / was['time']['in_air_s']:+.1%} saved\n")
 
 
@@ -123,17 +132,19 @@ def main() -> None:
     parser.add_argument("--plan", choices=("ours", "baseline"), default="ours")
     parser.add_argument("--out", type=Path, default=ROWS)
     parser.add_argument("--limit", type=float)
+    parser.add_argument("--spacing", type=float)
     parser.add_argument("--table", action="store_true")
-    parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
+    parser.add_argument("--one", nargs=5, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.one:
-        print(json.dumps(planned(*args.one[:3], Path(args.one[3]))))
+        spacing = float(args.one[4]) if args.one[4] else None
+        print(json.dumps(planned(*args.one[:3], Path(args.one[3]), spacing)))
         return
     args.out.mkdir(parents=True, exist_ok=True)
     kept = args.out / "rows.jsonl"
     jobs = args.jobs or [f"{p}/{a}" for p in PARTS for a in AXES]
     for part, axes in [job.split("/") for job in jobs] if not args.table else ():
-        row = {"sources": digest_of(SOURCES)} | run(part, axes, args.plan, args.limit)
+        row = {"sources": digest_of(SOURCES)} | run(part, axes, args.plan, args.limit, args.spacing)
         with kept.open("a") as out:
             out.write(json.dumps(row) + "\n")
         print(f"{part}/{axes} {args.plan}: {row['state']} {row['wall']} s", flush=True)
