@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Annotated
 from urllib.parse import urlsplit
 
@@ -84,10 +84,10 @@ def require(who: Identity, *scopes: str) -> None:
                              remedy=f"ask for a key with the scope {scopes[0]}")
 
 
-def _needs(*scopes: str) -> Callable[[Identity], str]:
+def _needs(*scopes: str) -> Callable[[Identity], Awaitable[str]]:
     """Dependency that wants one of these scopes and gives the name of the principal."""
 
-    def check(who: Annotated[Identity, Depends(identity)]) -> str:
+    async def check(who: Annotated[Identity, Depends(identity)]) -> str:  # waits for nothing, so it needs no thread
         if scopes:
             require(who, *scopes)
         return who.principal

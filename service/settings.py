@@ -21,7 +21,7 @@ def _cores() -> int:
 class Settings(BaseSettings):
     """Settings with their defaults."""
 
-    model_config = SettingsConfigDict(env_prefix="ZONEMILL_", extra="ignore")
+    model_config = SettingsConfigDict(env_prefix="ZONEMILL_", env_ignore_empty=True, extra="ignore")
 
     host: Annotated[str, Field(description="Address to listen on.")] = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")] = 8000

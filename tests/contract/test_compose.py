@@ -1,5 +1,6 @@
 """docker-compose.yml and Dockerfile, checked without a Docker engine."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,24 @@ def test_everything_comes_back_and_says_how_it_is(compose):
     assert {"api", "worker", "scheduler", "postgres"} == set(compose["services"])
 
 
+def test_containers_write_to_their_volumes_alone_and_gain_no_rights(compose):
+    for name in ("api", "worker", "scheduler"):
+        service = compose["services"][name]
+        assert service["read_only"] is True and service["cap_drop"] == ["ALL"], name
+        assert service["security_opt"] == ["no-new-privileges:true"]
+        assert [m.split(":")[0] for m in service["tmpfs"]] == ["/tmp"]
+        assert {v.split(":")[0] for v in service["volumes"]} <= set(compose["volumes"])
+    assert compose["services"]["api"]["environment"]["ZONEMILL_AUTH"] == "keys"
+
+
+def test_every_setting_it_names_is_one():
+    from service.settings import Settings
+
+    text = (ROOT / "docker-compose.yml").read_text()
+    named = set(re.findall(r"ZONEMILL_[A-Z_]+(?=:)", text))
+    assert len(named) > 6 and named <= {f"ZONEMILL_{n.upper()}" for n in Settings.model_fields}
+
+
 def test_no_password_or_token_is_written_down(compose):
     for service in compose["services"].values():
         for key, value in service["environment"].items():
@@ -45,9 +64,11 @@ def test_no_password_or_token_is_written_down(compose):
 
 def test_the_image_runs_as_nobody_in_particular_and_copies_what_is_there():
     lines = (ROOT / "Dockerfile").read_text().splitlines()
-    assert lines[1].startswith("FROM python:3.11-slim")
+    last = max(k for k, line in enumerate(lines) if line.startswith("FROM "))
+    assert lines[last].startswith("FROM python:3.11-slim")
+    lines = lines[last:]  # what comes before builds the page
     assert [line for line in lines if line.startswith("USER ")] == ["USER zonemill"]
-    for line in (x for x in lines if x.startswith("COPY ")):
+    for line in (x for x in lines if x.startswith("COPY ") and "--from" not in x):
         for source in line.split()[1:-1]:
             if source not in ("requirements.lock", "README.md"):
                 assert (ROOT / source).exists(), source

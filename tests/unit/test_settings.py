@@ -26,7 +26,9 @@ def test_every_setting_stands_in_the_page_with_its_meaning():
 
 def test_the_environment_is_read(monkeypatch, tmp_path):
     monkeypatch.setenv("ZONEMILL_PORT", "9001")
+    monkeypatch.setenv("ZONEMILL_WEBHOOK_SECRET", "")  # set to nothing is not set: a compose file passes all on
     found = Settings(data_dir=tmp_path)
+    assert found.webhook_secret is None
     assert found.port == 9001
     assert found.url == f"sqlite:///{tmp_path}/zonemill.db"
 
