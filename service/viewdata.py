@@ -22,6 +22,7 @@ from service.viewfile import Chunk, write_view
 from service.viewmesh import GRID as MESH_GRID
 from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
 from service.viewpaths import AXIS_UNIT, Way, path_chunks, way_of
+from service.viewstock import stock_chunks
 from verify.model import NcProgram, Proof, ProofSetup
 from zones.remainder import explain
 from zones.view import turned_samples
@@ -49,8 +50,8 @@ def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32
     label[rest] = len(zones) + _entries(ready, scored, given_up, rest, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
     way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, report["steps"])
-    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, report,
-                 open_=report["state"] == "proved")
+    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, programs,
+                 report, open_=report["state"] == "proved")
 
 
 def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proof: Proof,
@@ -62,7 +63,8 @@ def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proo
     """
     way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, spindle_tool=spindle_tool)
     label = np.zeros(len(samples), np.int64)
-    return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, report, open_=True)
+    return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, programs, report,
+                 open_=True)
 
 
 def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: NDArray[np.bool_],
@@ -83,7 +85,8 @@ def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: 
 
 
 def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, way: Way, report: Mapping[str, Any], *, open_: bool) -> Files:
+          proof: Proof, setup: ProofSetup, way: Way, programs: Sequence[NcProgram], report: Mapping[str, Any], *,
+          open_: bool) -> Files:
     part, d = ready.part, ready.decomposition
     here = turned_samples(samples, look.rotation.T)
     judged = Judged(here, label, proof.residual - setup.stock_allowance, np.asarray(proof.program >= 0),
@@ -93,7 +96,10 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
                           axis=0))
     mesh, finer = mesh_chunks(facets, low)
     path, longer, steps, grid = path_chunks(way, low, open_=open_)
-    chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path, *finer, *longer]
+    stocks, of = stock_chunks(ready, look, programs, [_axis_of(way, k) for k in range(len(programs))])
+    own = dict(zip(way.names, of, strict=True))
+    steps = [s | {"stock": own[s["program"]]} for s in steps]
+    chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path, *stocks, *finer, *longer]
     head = {
         "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
         "state": report["state"], "withheld": not open_, "labels": report.get("labels", {}),
@@ -113,6 +119,12 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
         "counts": {"facets": len(facets.corners), "moves": len(way.end)},
     }
     return {VIEW_NAME: ("view", "", None, write_view(head, chunks))}
+
+
+def _axis_of(way: Way, program: int) -> NDArray[np.float64] | None:
+    """The tool axis that a program keeps, None where it keeps none."""
+    axis = way.axis[way.program == program]
+    return None if not len(axis) or np.ptp(axis, axis=0).max() > 1e-6 else axis[0]
 
 
 def _zone(z: Mapping[str, Any]) -> dict[str, Any]:

@@ -30,6 +30,7 @@ export class JobView {
   private stepBoxes: HTMLInputElement[] = [];
   private rapids = el("input", { type: "checkbox", id: "rapids" });
   private holder = el("input", { type: "checkbox", id: "holder", checked: true });
+  private stock = el("input", { type: "checkbox", id: "stock", checked: true });
   private measure = el("button", { type: "button", "aria-pressed": "false", onclick: () => this.setMeasuring(!this.measuring) }, "Measure");
   private measuring = false;
   private ruler: Vector3[] = [];
@@ -342,11 +343,16 @@ export class JobView {
       const next = by > 0 ? starts.find((t) => t > now + 0.05) : [...starts].reverse().find((t) => t < now - 0.5);
       this.setTime(next ?? (by > 0 ? h.seconds : 0), true);
     };
+    this.stock.addEventListener("change", () => {
+      this.picture.showStock(this.stock.checked);
+      this.setTime(this.seconds ?? h.seconds);
+    });
     fill(this.bar, this.play,
       el("button", { type: "button", "aria-label": "Step before", onclick: () => jump(-1) }, "«"),
       el("button", { type: "button", "aria-label": "Next step", onclick: () => jump(1) }, "»"),
       this.slider, this.speed,
-      el("button", { type: "button", "aria-label": "Put the tool away", title: "Put the tool away", onclick: () => this.setTime(null) }, "✕"), this.clock, this.programBox);
+      el("button", { type: "button", "aria-label": "Put the tool away", title: "Put the tool away", onclick: () => this.setTime(null) }, "✕"),
+      this.picture.hasStock ? el("span", { class: "stockbox" }, this.stock, el("label", { for: "stock" }, "Stock")) : null, this.clock, this.programBox);
     this.tell(null);
   }
 

@@ -9,13 +9,21 @@ export interface ColumnEntry extends Array<string | number> {
 }
 
 export interface ChunkEntry {
-  kind: "mesh" | "edges" | "path";
+  kind: "mesh" | "edges" | "path" | "stock";
   lod: number;
   label?: number;
   step?: number;
   at: number;
   size: number;
   columns: ColumnEntry[];
+  rotation?: number[];
+  x0_mm?: number;
+  y0_mm?: number;
+  step_mm?: number;
+  nx?: number;
+  ny?: number;
+  foot_mm?: number;
+  unit_mm?: number;
 }
 
 export interface ToolShape {
@@ -36,6 +44,7 @@ export interface ViewStep {
   start_s: number;
   end_s: number;
   axis: [number, number, number] | null;
+  stock: number | null;
 }
 
 export interface ViewFinding {

@@ -59,6 +59,14 @@ const colours = (page) => page.evaluate(() => {
   for (let i = 0; i < data.length; i += 4 * 37) seen.add((data[i] >> 4) * 256 + (data[i + 1] >> 4) * 16 + (data[i + 2] >> 4));
   return seen.size;
 });
+/** A number that tells pictures apart. */
+const picture = (page) => page.evaluate(() => {
+  window.zonemill.picture.timed();
+  const gl = document.querySelector(".stage canvas").getContext("webgl2");
+  const data = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+  gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, data);
+  return data.reduce((h, v) => (Math.imul(h, 31) + v) | 0, 7);
+});
 const figures = (page) => page.evaluate(() => ({ ...document.querySelector(".left").dataset, frame_ms: [1, 2, 3, 4, 5].map(() => Math.round(window.zonemill.frame())).sort((a, b) => a - b)[2], heap_mb: Math.round((performance.memory?.usedJSHeapSize ?? 0) / 1e6) }));
 
 async function upload() {
@@ -133,6 +141,11 @@ async function look() {
   const clock = await page.locator(".clock").textContent();
   assert(/X -?[\d.]+ Y -?[\d.]+ Z -?[\d.]+/.test(clock), `the tool is nowhere: ${clock}`);
   await page.screenshot({ path: stem("middle") });
+  // the stock is there, and without it something else is seen
+  const withStock = await picture(page);
+  await page.uncheck("#stock");
+  assert.notEqual(await picture(page), withStock, "no stock is drawn");
+  await page.check("#stock");
 
   await page.locator("summary", { hasText: "Section and measuring" }).click();
   await page.selectOption("#saxis", "1");
