@@ -8,7 +8,7 @@ import { legendOf } from "./legend";
 import { lookOf, type Look } from "./look";
 import { Picture, type Mode, type P3 } from "./scene";
 import type { ViewFinding, ViewHead } from "./viewfile";
-import { fileList, keyTable, needs, whereOf } from "./words";
+import { fileList, keyTable, needs, toolWords, whereOf } from "./words";
 
 export class JobView {
   readonly nodes: HTMLElement[];
@@ -242,7 +242,7 @@ export class JobView {
         const box = el("input", { type: "checkbox", id: `step-${i}`, onchange: () => this.showSteps() });
         this.stepBoxes[i] = box;
         add(list, el("li", {}, box, el("label", { for: box.id }, swatch(css(toolColour(Math.max(0, tools.indexOf(s.tool))))),
-          el("strong", {}, s.id), ` ${[s.zone ?? (operation ? "several zones" : ""), s.strategy, `T${s.tool}`].filter(Boolean).join(", ")}`),
+          el("strong", {}, s.id), ` ${[s.zone ?? (operation ? "several zones" : ""), s.strategy, operation ? `T${s.tool}` : toolWords(h, s.tool)].filter(Boolean).join(", ")}`),
           el("button", { type: "button", class: "link where", "aria-label": `Go to the start of ${s.id}`, onclick: () => this.setTime(s.start_s, true) }, duration(s.end_s - s.start_s))));
       }
       rows.push(el("div", { class: "operation" }, all, el("label", { for: all.id }, el("strong", {}, operation || "Program"), ` (${mine.length})`)), list);

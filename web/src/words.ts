@@ -1,7 +1,7 @@
 // What is said of jobs, findings and what stays.
 import { ask, type JobFiles } from "./api";
 import { el } from "./dom";
-import type { ViewFinding, ViewRest } from "./viewfile";
+import type { ViewFinding, ViewHead, ViewRest } from "./viewfile";
 
 export const STATE_WORDS: Record<string, string> = {
   queued: "waiting", running: "running", proved: "proved", unproved: "not proved", done: "done", failed: "failed",
@@ -44,4 +44,10 @@ export function keyTable(): HTMLElement {
   const rows: [string, string][] = [["arrows", "turn"], ["shift + arrows", "move"], ["+ −", "nearer, farther"], ["F 7 1 3", "all, top, front, side"],
     ["Z W D", "zones, walls, deviation"], ["N P", "next finding, the one before"], ["space", "play, pause"], [", .", "one second back, on"], ["M", "measure"], ["Esc", "put tool and ruler away"]];
   return el("table", { class: "keys" }, el("caption", {}, "Keys, while the picture has the focus"), el("tbody", {}, ...rows.map(([k, w]) => el("tr", {}, el("th", { scope: "row" }, el("kbd", {}, k)), el("td", {}, w)))));
+}
+
+/** "ball D3" of a T number; nothing where the setup has no such tool. */
+export function toolWords(h: ViewHead, number: number): string {
+  const t = h.tools.find((x) => x.number === number);
+  return t ? `${t.kind} D${t.diameter_mm}` : "";
 }
