@@ -42,8 +42,10 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.chain") -> int:
             print_json({"state": job["state"], "job": url + job["links"]["self"],
                         "links": {k: url + v for k, v in job["links"].items() if v},
                         "files": [str(out / n) for n in names], "error": job["error"]})
+            if names:
+                say(f"to look at it: zonemill view {out}")
             if keep:
-                say(f"serving on {url} until Ctrl-C")
+                say(f"serving on {url} until Ctrl-C; the page is {url}/")
                 wait_for_interrupt()
     return exit_code(job)
 
