@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -55,6 +56,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
                   separate_input_output_schemas=False, redirect_slashes=False)
     app.state.settings, app.state.engine, app.state.metrics = settings, Engine(settings, chain), Metrics()
     app.state.stopping, app.state.startup_error = threading.Event(), None
+    app.state.streams = Counter()
     app.state.post_rate = PostRate(settings.post_rate)
     problems.install(app)
     for module in (submissions, jobs, events, library, keys, capabilities, health, view):

@@ -12,7 +12,7 @@ import math
 import os
 import shutil
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -132,8 +132,11 @@ class Artifacts:
         """Where the blob of that hash lies."""
         return self.root / "blobs" / sha256[:2] / f"{sha256}.bin"
 
-    def put_blob(self, chunks: Iterable[bytes]) -> tuple[str, int]:
-        """Store bytes; returns their SHA-256 and their number. What is there already is left alone."""
+    def put_blob(self, chunks: Iterable[bytes], check: Callable[[Path], object] | None = None) -> tuple[str, int]:
+        """Store bytes; returns their SHA-256 and their number. What is there already is left alone.
+
+        check : looks at the file before it gets its place, and raises where it is not to have one
+        """
         digest, size = hashlib.sha256(), 0
         temporary = self.tmp / f"blob-{uuid.uuid4().hex}"
         try:
@@ -144,6 +147,8 @@ class Artifacts:
                     out.write(chunk)
                 out.flush()
                 os.fsync(out.fileno())
+            if check is not None:
+                check(temporary)
             target = self.blob(digest.hexdigest())
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(temporary, target)

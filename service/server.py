@@ -79,8 +79,10 @@ def _server(settings: Settings, chain: str = "service.chain") -> _Server:
                                   timeout_graceful_shutdown=5))
 
 
-def run_server(settings: Settings) -> None:
+def run_server(settings: Settings, chain: str = "service.chain") -> None:
     """Serve until SIGINT or SIGTERM; running jobs go back to the queue.
+
+    chain : see ``create_app``
 
     Raises
     ------
@@ -91,7 +93,7 @@ def run_server(settings: Settings) -> None:
     listener = _listen(settings.host, settings.port)
     host, port = listener.getsockname()[:2]
     log.info("serving", url=f"http://{host}:{port}", data=str(settings.data_dir), pid=os.getpid())
-    server = _server(settings)
+    server = _server(settings, chain)
     try:
         server.run(sockets=[listener])
     except KeyboardInterrupt:

@@ -48,6 +48,8 @@ class Settings(BaseSettings):
                          ] = "120/minute"
     max_queued: Annotated[int, Field(ge=1, description="Most jobs that wait; more are refused with 429.")] = 1000
     max_queued_each: Annotated[int, Field(ge=1, description="Most jobs of one principal that wait.")] = 200
+    max_streams_each: Annotated[int, Field(ge=1, description="Most event streams of a principal at a time, in one "
+                                                             "process.")] = 50
     min_free_mb: Annotated[int, Field(ge=0, description="Free disk of the data folder below which nothing is accepted "
                                                         "or started, MB.")] = 500
     retention_days: Annotated[float, Field(ge=0, description="Files of a job are removed so many days after its end; "

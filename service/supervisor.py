@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import selectors
 import signal
 import subprocess
@@ -26,6 +27,7 @@ from geometry.errors import CancelledError, ResourceError, error_from_dict
 ROOT = Path(__file__).resolve().parent.parent
 # Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
 ADDRESS_ROOM = 8_000_000_000
+_SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
 THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -105,8 +107,10 @@ def kill_tree(child: subprocess.Popen[bytes]) -> None:
 
 
 def _environment(threads: int) -> dict[str, str]:
+    """What a child gets: no setting of the service and no secret, for it reads files of strangers."""
+    kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k)}
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    return {**os.environ, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
+    return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
 
 
 def _watch(child: subprocess.Popen[bytes], reading: int, limits: Limits, on_progress: Callable[[str, float], None],

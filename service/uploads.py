@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from fastapi import Request
@@ -148,20 +149,22 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
-    """Store a STEP file and return its hash; its text is checked first.
+    """Store a STEP file and return its hash. Its text is checked first: others may have a use for the same bytes.
 
     Raises
     ------
     StepError
         Empty, no STEP file, cut off, or with references that lead nowhere.
     """
-    sha, _ = artifacts.put_blob(_chunks(file))
-    try:
-        check_text(artifacts.blob(sha))
-    except InputError:
-        artifacts.blob(sha).unlink(missing_ok=True)
-        raise
-    return sha
+    def check(path: Path) -> None:
+        try:
+            check_text(path)
+        except InputError as error:
+            named = tuple("part" if s == path.name else s for s in error.subjects)
+            raise type(error)(error.message, code=error.code, subjects=named, measured=error.measured,
+                              limit=error.limit, remedy=error.remedy) from None
+
+    return artifacts.put_blob(_chunks(file), check)[0]
 
 
 def _store_stock(artifacts: Artifacts, file: BinaryIO) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections import Counter
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
@@ -20,7 +21,7 @@ from sqlalchemy.engine import RowMapping
 from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
-from service.errors import NotFoundError, RequestError, UnauthorizedError
+from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
 from service.principals import Principal, Who
 from service.problems import responses
 from service.resources import event_data
@@ -36,7 +37,7 @@ STREAM: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,
-            responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError))
+            responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError, RateError))
 async def follow(request: Request, principal: Principal, who: Who, job_id: str,
                  last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=20)] = None) -> Response:
     """Progress of a job until it ends."""
@@ -45,8 +46,24 @@ async def follow(request: Request, principal: Principal, who: Who, job_id: str,
     seen = int(last) if last is not None and last.isascii() and last.isdecimal() else -1
     if row["state"] in FINAL_STATES and row["event_seq"] == seen:
         return Response(status_code=204)
-    return StreamingResponse(_stream(request, row, seen, who.key_id), media_type="text/event-stream",
+    streams: Counter[str] = request.app.state.streams
+    most = request.app.state.settings.max_streams_each
+    if streams[principal] >= most:
+        raise RateError(f"{most} event streams of yours are open", code="too_many_streams", limit=most,
+                        remedy="close some, or ask for the job now and then", retry_after_s=10)
+    stream = _counted(streams, principal, _stream(request, row, seen, who.key_id))
+    return StreamingResponse(stream, media_type="text/event-stream",
                              headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
+
+
+async def _counted(streams: Counter[str], principal: str, stream: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
+    """A stream that counts from its first event to its end, however it ends."""
+    streams[principal] += 1
+    try:
+        async for event in stream:
+            yield event
+    finally:
+        streams[principal] -= 1
 
 
 async def _stream(request: Request, row: RowMapping, seen: int, key_id: str | None) -> AsyncIterator[bytes]:

@@ -48,5 +48,20 @@ def test_who_comes_late_gets_the_end_and_who_had_it_gets_204(client, post, finis
         assert answer.status_code == 200 and "end" in answer.text
 
 
+def test_a_principal_has_so_many_streams_at_a_time(make_client, post):
+    client = make_client(max_streams_each=2)
+    job = post(client, "sleep").json()
+    streams = client.app.state.streams
+    streams["local"] = 2
+    answer = client.get(job["links"]["events"])
+    assert answer.status_code == 429 and answer.json()["code"] == "too_many_streams"
+    streams["local"] = 1
+    import threading
+    threading.Timer(0.5, lambda: client.delete(job["links"]["self"])).start()
+    with client.stream("GET", job["links"]["events"]) as stream:
+        assert "event: end" in "".join(stream.iter_text())
+    assert streams["local"] == 1  # what has ended counts no more
+
+
 def test_no_such_job(client):
     assert client.get("/v1/jobs/j0/events").json()["code"] == "no_such_job"

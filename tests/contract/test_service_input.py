@@ -57,6 +57,15 @@ def test_a_part_that_is_no_step_file(client, post, part, code):
     assert not list(client.app.state.engine.artifacts.tmp.iterdir())
 
 
+def test_a_refused_part_takes_no_file_from_who_has_a_use_for_the_same_bytes(client, post, finish):
+    busy, program = post(client, "sleep").json(), b"%\nG21\nM2\n%\n(as a part it is refused)\n"
+    waiting = post(client, path="/v1/verifications", program=program).json()
+    body = _is_problem(post(client, part=program), 422, "not_step")
+    assert "blob" not in str(body)
+    client.delete(busy["links"]["self"])
+    assert finish(client, waiting)["state"] == "proved"
+
+
 def test_a_body_over_the_limit_is_refused(client, post):
     body = _is_problem(post(client, part=STEP + b" " * 2_100_000), 413, "body_too_large")
     assert body["limit"] == 2_000_000

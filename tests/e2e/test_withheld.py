@@ -72,7 +72,7 @@ def test_an_older_proved_program_is_gone_when_the_job_is_no_longer_proved(part, 
 def test_over_http_the_answer_is_the_finding(part, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(FAKES))
     settings = Settings(data_dir=tmp_path / "data", workers=1, child_threads=1, poll_s=0.05, job_time_limit_s=120)
-    with TestClient(create_app(settings, chain="gouging_chain")) as client:
+    with TestClient(create_app(settings, chain="gouging_chain"), base_url="http://127.0.0.1") as client:
         files = {"part": ("p.step", part.read_bytes(), "model/step"),
                  "setup": ("s.json", json.dumps(SETUP), "application/json")}
         job = client.post("/v1/jobs", files=files).json()

@@ -181,7 +181,7 @@ def client(tmp_path_factory):
     configure("error", "console")
     settings = Settings(data_dir=tmp_path_factory.mktemp("data"), workers=1, child_threads=1, poll_s=0.05,
                         post_rate="10000/minute")
-    with TestClient(create_app(settings), raise_server_exceptions=False) as found:
+    with TestClient(create_app(settings), base_url="http://127.0.0.1", raise_server_exceptions=False) as found:
         yield found
 
 

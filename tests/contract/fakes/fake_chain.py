@@ -35,6 +35,8 @@ def _misbehave(what, progress):
             time.sleep(0.005)
     elif what == "killed":
         os.kill(os.getpid(), 9)
+    elif what == "look about":
+        raise errors.PartError(" ".join(sorted(os.environ)), code="environment", subjects=("x",))
     elif what == "full":
         raise OSError(errno.ENOSPC, "No space left on device")
     elif what == "bug":
