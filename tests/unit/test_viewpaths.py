@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.toolbody import ToolBody
-from service.viewpaths import COARSE, CUT, GRID, RAPID, START, path_chunks, thinned, way_of
+from service.viewpaths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
 from tests.hand_parts import as_part, box_mesh
 from verify.model import NcProgram, ProofSetup
 
@@ -120,3 +120,19 @@ def test_a_foreign_program_is_shown_by_its_tools(demo_tool):
     way = way_of([NcProgram("f.ngc", text)], part, [tool, replace(tool, id="T2", number=2)], ProofSetup(), np.eye(3))
     assert [s["id"] for s in way.steps] == ["T1", "T2"]
     assert set(way.tool[way.step == 1].tolist()) == {2}
+
+
+def test_a_tool_that_turns_keeps_its_axes():
+    n = 40
+    turn = np.linspace(0.0, 0.5, n + 1)
+    place = np.column_stack([np.linspace(0, 4, n + 1), np.zeros(n + 1), np.zeros(n + 1)])
+    axis = np.column_stack([np.sin(turn[1:]), np.zeros(n), np.cos(turn[1:])])
+    no = np.zeros(n, np.int64)
+    step = {"id": "T1", "zone": None, "operation": "", "strategy": "", "program": "p"}
+    way = Way(place[:-1], place[1:], axis, np.ones(n, np.bool_), np.arange(n) + 0.0, np.arange(n) + 1.0,
+              np.arange(n) + 1, no + 1, no, no, (step,), ("p",))
+    (first,), (then,), (step,), _ = path_chunks(way, np.zeros(3), open_=True)
+    assert step["axis"] is None
+    for chunk in (first, then):  # straight, yet nothing is left out: the tool turns all the way
+        got = chunk.columns["axis"].rows() / AXIS_UNIT
+        assert len(got) == n + 1 and np.allclose(got[1:], axis, atol=1e-4)
