@@ -22,9 +22,10 @@ from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 BOOL = NDArray[np.bool_]
 
-SHARE = 1.0 / 3.0
+SHARE = 0.5
 """Of the chordal tolerance of a job: what arcs and longer lines may leave the planned path by. Plans get the rest, half
-of it for the points they leave out: so chords of a circle are no farther from it than an arc may be from them."""
+of it for the points they leave out: so the chords of a planned circle are half as far from it as an arc may be from
+them, and what the plan has of noise does not part an arc."""
 
 LEAST_MOVES = 3
 """An arc stands for no fewer moves: there is one through any three points."""
@@ -298,20 +299,28 @@ def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F6
     With x along the chord and y to its left from its middle, c half of it and q = x² + y² - c², a point is at
     sqrt(r² + q - 2 h y) from the centre, r² = c² + h²: it is off by (q - 2 h y) / 2 r to first order.
     """
-    both = np.concatenate([which, which[moves]])
-    v = np.concatenate([p, 0.5 * (p[moves] + p[moves + 1])]) - middle[both]
-    x, y = (v * unit[both]).sum(axis=1), v[:, 1] * unit[both, 0] - v[:, 0] * unit[both, 1]
-    q = x * x + y * y - (half * half)[both]
     k = len(begins)
-    n = len(which)
-    square = np.bincount(which, y[:n] * y[:n], k)
-    h = 0.5 * np.bincount(which, q[:n] * y[:n], k) / np.maximum(square, 1e-30)
+    half2 = half * half
+
+    def coordinates(points: F64, of: I64) -> tuple[F64, F64]:
+        v, u = points - middle[of], unit[of]
+        y = v[:, 1] * u[:, 0] - v[:, 0] * u[:, 1]
+        return y, (v * v).sum(axis=1) - half2[of]
+
+    def between(y: F64, q: F64, of: I64, begin: I64) -> tuple[F64, F64]:
+        told = np.abs(y) > 1e-12
+        twice = np.where(told, 2.0 * y, 1.0)
+        a, b = (np.where(told, (q + sign * slack[of]) / twice, sign * np.inf) for sign in (-1.0, 1.0))
+        return np.maximum.reduceat(np.minimum(a, b), begin), np.minimum.reduceat(np.maximum(a, b), begin)
+
+    y, q = coordinates(p, which)
+    square = np.add.reduceat(y * y, begins)
+    h = 0.5 * np.add.reduceat(q * y, begins) / np.maximum(square, 1e-30)
     slack = 2.0 * np.hypot(half, h) * tolerance
-    told = np.abs(y) > 1e-12
-    ends = (q[told, None] + np.array([-1.0, 1.0]) * slack[both[told], None]) / (2.0 * y[told, None])
-    low, high = np.full(k, -np.inf), np.full(k, np.inf)
-    np.maximum.at(low, both[told], ends.min(axis=1))
-    np.minimum.at(high, both[told], ends.max(axis=1))
+    low, high = between(y, q, which, begins)
+    mine = which[moves]
+    more_low, more_high = between(*coordinates(0.5 * (p[moves] + p[moves + 1]), mine), mine, begins - np.arange(k))
+    low, high = np.maximum(low, more_low), np.minimum(high, more_high)
     common = np.isfinite(low) & np.isfinite(high) & (low <= high) & (square > 0.0)
     low, high = np.where(common, low, 1.0), np.where(common, high, 1.0)
     spare = 0.1 * (high - low)

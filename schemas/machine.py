@@ -65,8 +65,8 @@ class Machine(WireModel):
                     "empty where the machine has one alone. null: no such planes.")] = None
     arcs: Annotated[bool, Field(
         description="Cuts are written as arcs and helices in the XY plane, and as longer lines, where they stay within "
-                    "a third of quality.chordal_tolerance_mm of the planned path; the plan is made for the other two "
-                    "thirds. Steps that lean stay straight moves.")] = False
+                    "half of quality.chordal_tolerance_mm of the planned path; the plan is made for the other half. "
+                    "Steps that lean stay straight moves.")] = False
     travel_mm: Annotated[Triple | None, Field(
         description="What the moves of a program may span in X, Y and Z, mm, on Z with the gauge lengths of its tools "
                     "counted; where on the machine is for the work offset. null: not limited.")] = None

@@ -12,11 +12,11 @@ from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
 from toolpath.levels import thinned
 from toolpath.motion import Motion, Trajectory
 
-THIRD = 0.005 / 3.0
+HALF = 0.0025
 
 
-def turn(radius: float, begin: float, end: float, rise: float = 0.0, centre=(10.0, 8.0, 4.0), thin: float = THIRD):
-    """An arc, or a helix, as it is planned: mm and rad, thinned by a third of the chordal tolerance."""
+def turn(radius: float, begin: float, end: float, rise: float = 0.0, centre=(10.0, 8.0, 4.0), thin: float = 0.5 * HALF):
+    """An arc, or a helix, as it is planned: mm and rad, thinned by a quarter of the chordal tolerance."""
     a = np.linspace(begin, end, 4000)
     points = np.column_stack([centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a),
                               centre[2] + rise * np.linspace(0.0, 1.0, len(a))])
@@ -47,13 +47,13 @@ def cutting(*ways, **changes) -> Workplan:
         moves = (line(Motion.RAPID, *top), line(Motion.APPROACH, top[1], tuple(a), feed=240.0),
                  Trajectory(Motion.CUT, way, 600.0), line(Motion.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
                  line(Motion.RAPID, (b[0], b[1], b[2] + 1.0), (b[0], b[1], CLEAR)))
-        steps.append(replace(step(k, BALL, "zlevel", trajectories=moves), chordal_tolerance=2.0 * THIRD))
+        steps.append(replace(step(k, BALL, "zlevel", trajectories=moves), chordal_tolerance=HALF))
     return plan(*steps, labels={"order": "4711"}, comments=(), **changes)
 
 
 def round_plan() -> Workplan:
     """All shapes as arcs and lines."""
-    return fitted(cutting(*SHAPES.values()), THIRD)
+    return fitted(cutting(*SHAPES.values()), HALF)
 
 
 def round_clamped() -> Workplan:

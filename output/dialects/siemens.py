@@ -30,8 +30,8 @@ class Siemens(Dialect):
     def __init__(self, switches: Switches) -> None:
         super().__init__(switches)
         if switches.swivel is not None:
-            self.needs += ("CYCLE800 with direction 0 under TRAORI has to turn the coordinates and to move no axis: try it "
-                           "without a part first",)
+            self.needs += ("CYCLE800 with direction 0 under TRAORI has to turn the coordinates and to move no axis: "
+                           "try it without a part first",)
 
     def number(self, value: int) -> str:
         """Without a point at the end."""

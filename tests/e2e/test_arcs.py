@@ -44,7 +44,7 @@ def job(tmp_path_factory):
     finally:
         programs.fitted = fitted
     ((work, tolerance),) = seen
-    assert tolerance == pytest.approx(CHORDAL / 3.0)
+    assert tolerance == pytest.approx(0.5 * CHORDAL)
     return report, folder / "out", work
 
 
@@ -62,7 +62,7 @@ def test_the_program_is_within_its_share_of_the_plan(job, monkeypatch):
     _, out, work = job
     monkeypatch.setattr(motion, "CHORD", 1e-6)
     p = read_program((out / "program.linuxcnc.ngc").read_text())
-    most = CHORDAL / 3.0 + 2e-4  # and the grid
+    most = 0.5 * CHORDAL + 2e-4  # and the grid
     for step in work.steps:
         planned = [t.points for t in step.trajectories if t.motion is Motion.CUT]
         mine = np.flatnonzero((p.tool == step.tool.number) & ~np.isnan(p.feed))
@@ -72,6 +72,6 @@ def test_the_program_is_within_its_share_of_the_plan(job, monkeypatch):
     assert len(np.unique(p.line)) < written
 
 
-def test_the_plan_keeps_the_other_two_thirds(job):
+def test_the_plan_keeps_the_other_half(job):
     _, _, work = job
-    assert [s.chordal_tolerance for s in work.steps] == pytest.approx([CHORDAL * 2.0 / 3.0] * len(work.steps))
+    assert [s.chordal_tolerance for s in work.steps] == pytest.approx([0.5 * CHORDAL] * len(work.steps))
