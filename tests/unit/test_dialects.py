@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError, ProgramError, VerificationError
+from output.arcs import fitted
 from output.dialects import DIALECTS, Switches
 from output.kinematics import RotaryMachine, said_limits
 from output.linuxcnc import write_linuxcnc
 from output.walker import write_program
+from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny
 from toolpath.motion import Motion
@@ -38,6 +40,8 @@ JOBS = {
     "restart": replace(plan(), restart=True), "3+2": TURNED, "five axes": clamped(),
     "head": clamped("head-table-BC"), "restart on five axes": replace(clamped(), restart=True),
     "speeds": faster(plan()), "speeds on five axes": faster(clamped()),
+    "arcs": round_plan(), "arcs of a clamping": fitted(round_clamped(), HALF),
+    "arcs and restart": replace(round_plan(), restart=True),
     "fresh cutters": replace(plan(), steps=tuple(replace(s, fresh=k > 1) for k, s in enumerate(plan().steps))),
 }
 
@@ -228,6 +232,8 @@ def test_a_move_left_out_or_put_in_is_found():
     ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "only while M128"),
     ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 TURN F999", "cannot read"),
     ("heidenhain", "L X+5 M140", "unknown word"),
+    ("heidenhain", "CP IPA+370 DR+", "less than a turn"), ("heidenhain", "CP IPA+30 DR-", "less than a turn"),
+    ("heidenhain", "CP PA+30 DR+", "cannot read"), ("heidenhain", "CP IPA+30 Z+1 DR+", "has not stated"),
     ("heidenhain", "CYCL DEF 7.0 DATUM SHIFT", "cannot read"), ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
 ])
 def test_what_is_not_known_is_refused_with_its_line(dialect, line, said):
@@ -482,7 +488,7 @@ def test_programs_of_joints():
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-@pytest.mark.parametrize("job", ["restart", "restart on five axes"])
+@pytest.mark.parametrize("job", ["restart", "restart on five axes", "arcs and restart"])
 def test_a_program_can_be_started_at_every_step(job, dialect):
     """From each label on, after whatever the header states, the moves are those of the whole program from there."""
     work = JOBS[job]

@@ -9,6 +9,7 @@ import pytest
 from output.dialects.base import Dialect, Switches
 from output.linuxcnc import write_linuxcnc
 from output.walker import write_program
+from tests.arc_plans import round_plan
 from tests.synthetic_plan import clamped, plan
 from verify.dialects import CONTROLS
 from verify.dialects import __name__ as home
@@ -56,7 +57,7 @@ class SixthReader(Control):
         return self.WORDS.get(text, [text] if text else [])
 
 
-@pytest.mark.parametrize("work", [plan(), clamped()], ids=["three axes", "five axes"])
+@pytest.mark.parametrize("work", [plan(), clamped(), round_plan()], ids=["three axes", "five axes", "arcs"])
 def test_a_sixth_control_is_written_read_and_held_against_the_first(work, monkeypatch):
     monkeypatch.setitem(CONTROLS, "sixth", SixthReader)
     monkeypatch.setattr(f"{home}.DIALECTS", ("linuxcnc", *CONTROLS))
