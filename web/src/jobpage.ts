@@ -1,6 +1,7 @@
 // One job: progress while it runs, then the picture with all that belongs to it.
 import { FINAL, ask, follow, get, type Job, type JobFiles } from "./api";
 import { el, fill } from "./dom";
+import { dryCheck } from "./drycheck";
 import { head, showRefusal } from "./frame";
 import { JobView } from "./jobview";
 import { readView } from "./viewfile";
@@ -57,9 +58,9 @@ async function show(app: HTMLElement, main: HTMLElement, title: HTMLElement, job
   const files = await get<JobFiles>(`/v1/jobs/${job.id}/files`);
   const view = files.items.find((f) => f.name === "view.bin");
   if (!view) {
-    fill(main, el("div", { class: "refusal" }, el("h2", {}, "This job has no picture"),
-      el("p", {}, job.kind === "zones" ? "A dry check leaves zones and remainder as a list; post the part as a job to see it."
-        : "It was made by an earlier version. Post the same part and setup again."),
+    if (job.kind === "zones") fill(main, await dryCheck(job, files));
+    else fill(main, el("div", { class: "refusal" }, el("h2", {}, "This job has no picture"),
+      el("p", {}, "It was made by an earlier version. Post the same part and setup again."),
       fileList(files), el("p", {}, el("a", { href: "/" }, "All jobs"))));
     return;
   }

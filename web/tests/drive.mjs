@@ -102,8 +102,16 @@ async function upload() {
   assert(await colours(page) > 8, "nothing is drawn");
   await page.screenshot({ path: join(shots, "uploaded.png") });
   const said = await figures(page);
+  // the dry check of the same part, from the same form
   await page.goto(new URL("/", url).href);
   await page.getByText("Step block 7").waitFor();
+  await page.setInputFiles("#part", part);
+  await page.setInputFiles("#setupfile", setup);
+  await page.getByText("is in the fields").waitFor();
+  await page.click("button[value=dry]");
+  await page.getByText("are in reach").waitFor();
+  await accessible(page, "dry check");
+  await page.screenshot({ path: join(shots, "dry.png") });
   await browser.close();
   return { progress: [...seen].length, ...said };
 }
