@@ -37,6 +37,7 @@ log = structlog.get_logger(__name__)
 
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
 READY_EVERY_S = 1.0
+MERCY_S = 3600.0
 
 
 class Engine:
@@ -62,6 +63,7 @@ class Engine:
         self._cluster: Any = None
         self._thread: threading.Thread | None = None
         self._futures: dict[str, Any] = {}
+        self._stumbled = -math.inf
         self._ready: dict[str, str] = {}
         self._ready_at, self._ready_lock = -math.inf, threading.Lock()
 
@@ -106,7 +108,10 @@ class Engine:
         if self._thread is not None:
             self._thread.join(timeout=10)
         if self._cluster is not None:
-            self.jobs.disown()
+            try:
+                self.jobs.disown()
+            except DBAPIError:
+                log.exception("the database is away; running jobs are taken up when their leases have run out")
             self._await_idle()
         for part in (self._client, self._cluster):
             if part is not None:
@@ -228,7 +233,7 @@ class Engine:
         while not self._stop.is_set():
             try:
                 self._reap()
-                self.jobs.give_up(self.settings.max_attempts)
+                self.jobs.give_up(self.settings.max_attempts, self._mercy_s())
                 self.jobs.miss_deadlines()
                 check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
                 while self.jobs.running() < self.capacity() and self._submit():
@@ -238,11 +243,17 @@ class Engine:
                 self._stop.wait(timeout=1.0)
             except Exception:
                 log.exception("dispatcher stumbled")  # database or scheduler away: the next round tries again
+                self._stumbled = time.monotonic()
             self._wake.wait(timeout=self.settings.poll_s)
             self._wake.clear()
 
+    def _mercy_s(self) -> float:
+        """Holders could not renew while the database was away: for one lease after that theirs count for longer."""
+        away = time.monotonic() - self._stumbled < self.settings.lease_s
+        return MERCY_S if away else 0.0
+
     def _submit(self) -> bool:
-        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts)
+        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts, self._mercy_s())
         if row is None:
             return False
         key = f"{row['id']}-{row['attempt']}"

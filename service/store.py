@@ -205,10 +205,13 @@ class JobStore:
         with self.engine.connect() as c:
             return list(c.execute(query).mappings())
 
-    def claim(self, owner: str, lease_s: float, max_attempts: int) -> RowMapping | None:
-        """Take the oldest job that waits, or whose holder went silent; None when there is none."""
+    def claim(self, owner: str, lease_s: float, max_attempts: int, mercy_s: float = 0.0) -> RowMapping | None:
+        """Take the oldest job that waits, or whose holder went silent; None when there is none.
+
+        mercy_s : how long a lease must have run out, s: while the database was away nobody could renew his
+        """
         now = time.time()
-        expired = sa.and_(jobs.c.state == "running", jobs.c.lease_until < now)
+        expired = sa.and_(jobs.c.state == "running", jobs.c.lease_until < now - mercy_s)
         oldest = (sa.select(jobs.c.id).where(sa.or_(jobs.c.state == "queued", expired), jobs.c.attempt < max_attempts)
                   .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
         change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired))
@@ -284,12 +287,13 @@ class JobStore:
                 state="failed", stage="failed", finished=now, error_json=json.dumps(error.as_dict()),
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
-    def give_up(self, max_attempts: int) -> int:
-        """Fail the jobs whose holder went silent in their last attempt."""
+    def give_up(self, max_attempts: int, mercy_s: float = 0.0) -> int:
+        """Fail the jobs whose holder went silent in their last attempt; mercy_s as for ``claim``."""
         error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
                               code="attempts_exhausted", measured=max_attempts, limit=max_attempts,
                               remedy="look into the log of the service; the job may need more memory than there is")
-        gone = sa.and_(jobs.c.state == "running", jobs.c.lease_until < time.time(), jobs.c.attempt >= max_attempts)
+        gone = sa.and_(jobs.c.state == "running", jobs.c.lease_until < time.time() - mercy_s,
+                       jobs.c.attempt >= max_attempts)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(gone).values(
                 state="failed", stage="failed", finished=time.time(), error_json=json.dumps(error.as_dict()),

@@ -27,6 +27,8 @@ from service.supervisor import Limits, supervise
 
 log = structlog.get_logger(__name__)
 
+PATIENCE_S = 120.0  # beyond it another attempt finds the result that is there
+
 
 @dataclass(frozen=True)
 class WorkConfig:
@@ -101,7 +103,7 @@ def _bug(error: Exception, job_id: str, attempt: int) -> InternalError:
 
 def _record(write: Callable[[], bool], patience_s: float) -> bool:
     """Write the end of a job, again and again while the database is away; whoever claims it later finds the result."""
-    until = time.monotonic() + patience_s
+    until = time.monotonic() + max(patience_s, PATIENCE_S)
     while True:
         try:
             return write()

@@ -29,8 +29,8 @@ def fake_path():
 @pytest.fixture(scope="session")
 def postgres_port():
     """Port of a PostgreSQL for all tests that want one."""
-    with postgres_server() as port:
-        yield port
+    with postgres_server() as server:
+        yield server.port
 
 
 @pytest.fixture

@@ -41,29 +41,47 @@ def _programs() -> Path | None:
     return folders[-1] if folders else None
 
 
+class Postgres:
+    """A PostgreSQL whose superuser is zonemill, in a folder and on a port of its own."""
+
+    def __init__(self, programs: Path) -> None:
+        # PostgreSQL refuses to run as root, and nobody cannot enter pytest's folders.
+        self.folder = Path(subprocess.check_output(["mktemp", "-d"], text=True).strip())
+        self.user = "nobody" if os.geteuid() == 0 else None
+        if self.user:
+            shutil.chown(self.folder, self.user)
+        self.programs, self.port = programs, free_port()
+        made = subprocess.run([programs / "initdb", "-D", self.folder / "db", "-A", "trust", "-U", "zonemill"],
+                              user=self.user, capture_output=True, text=True, cwd=self.folder)
+        assert made.returncode == 0, made.stderr
+        self.server: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Run it until ``stop``."""
+        command = [self.programs / "postgres", "-D", self.folder / "db", "-p", str(self.port), "-k", self.folder,
+                   "-h", "127.0.0.1"]
+        self.server = subprocess.Popen(command, user=self.user, cwd=self.folder, stderr=subprocess.DEVNULL)
+        until_open(self.port, self.server)
+        time.sleep(1.0)
+
+    def stop(self, how: signal.Signals = signal.SIGINT) -> None:
+        """SIGINT: connections are dropped and all is written; SIGQUIT: at once, the next start has to recover."""
+        assert self.server is not None
+        self.server.send_signal(how)
+        self.server.wait(timeout=20)
+
+
 @contextmanager
-def postgres_server() -> Iterator[int]:
-    """A PostgreSQL whose superuser is zonemill; yields its port. Skips the test where there is none."""
+def postgres_server() -> Iterator[Postgres]:
+    """A PostgreSQL that runs. Skips the test where there is none."""
     pytest.importorskip("psycopg", reason="psycopg is not installed")
     programs = _programs()
     if programs is None:
         pytest.skip("PostgreSQL is not installed")
-    # PostgreSQL refuses to run as root, and nobody cannot enter pytest's folders.
-    folder = Path(subprocess.check_output(["mktemp", "-d"], text=True).strip())
-    user = "nobody" if os.geteuid() == 0 else None
-    if user:
-        shutil.chown(folder, user)
-    port = free_port()
-    made = subprocess.run([programs / "initdb", "-D", folder / "db", "-A", "trust", "-U", "zonemill", "--no-sync"],
-                          user=user, capture_output=True, text=True, cwd=folder)
-    assert made.returncode == 0, made.stderr
-    server = subprocess.Popen([programs / "postgres", "-D", folder / "db", "-p", str(port), "-k", folder, "-h",
-                               "127.0.0.1"], user=user, cwd=folder, stderr=subprocess.DEVNULL)
+    found = Postgres(programs)
+    found.start()
     try:
-        until_open(port, server)
-        time.sleep(1.0)
-        yield port
+        yield found
     finally:
-        server.send_signal(signal.SIGINT)  # fast shutdown: connections of the pool are dropped
-        server.wait(timeout=20)
-        shutil.rmtree(folder, ignore_errors=True)
+        found.stop()
+        shutil.rmtree(found.folder, ignore_errors=True)

@@ -11,7 +11,7 @@ import httpx
 import pytest
 
 from service.server import background, settings_with
-from tests.contract.servers import free_port, until_open
+from tests.contract.servers import free_port, postgres_server, until_open
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
@@ -87,6 +87,30 @@ def test_a_job_runs_on_the_cluster_and_is_cancelled_there(cluster, postgres, tmp
         finish(client, waiting, until=("queued",))
         assert time.monotonic() - started < 1.0
         assert finish(client, waiting)["state"] == "proved"
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGQUIT])
+def test_a_database_that_goes_and_comes_back_loses_no_job(fake_path, tmp_path, post, finish, how):
+    """In order (SIGINT) and at once, without writing what it has in hand (SIGQUIT), while a job runs and one waits."""
+    with postgres_server() as database:
+        url = f"postgresql+psycopg://zonemill@127.0.0.1:{database.port}/postgres"
+        settings = settings_with({"data_dir": tmp_path / "data", "port": 0, "database_url": url, "workers": 1,
+                                  "lease_s": 4, "poll_s": 0.05})
+        with background(settings, "fake_chain") as base, httpx.Client(base_url=base, trust_env=False) as client:
+            running, waiting = post(client, "nap").json(), post(client, "").json()
+            finish(client, running, until=("queued",))
+            database.stop(how)
+            answer = client.get(running["links"]["self"])
+            assert answer.status_code == 503 and answer.json()["code"] == "database_unavailable"
+            assert client.get("/readyz").json()["checks"]["database"] == "does not answer"
+            assert client.get("/healthz").status_code == 200
+            time.sleep(3.0)  # the job ends meanwhile
+            database.start()
+            _until_ready(client)
+            for job in (running, waiting):
+                ended = finish(client, client.get(job["links"]["self"]).json(), patience=30)
+                assert (ended["state"], ended["attempt"]) == ("proved", 1)
+            assert client.get("/readyz").status_code == 200
 
 
 def test_two_apis_and_two_workers_lose_nothing_when_one_of_each_is_killed(cluster, post, finish):

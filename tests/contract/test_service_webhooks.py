@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -135,6 +136,24 @@ def test_an_ended_job_is_told_once_signed_with_its_labels_and_figures(receiver, 
     assert post(client, setup=setup, key="k", headers=ada, webhook_url=url).json()["id"] == job["id"]
     time.sleep(1.2)
     assert len(there.got) == 1
+
+
+def test_the_receiver_of_the_documentation_believes_what_is_genuine_and_nothing_else(receiver, hooked, post, bearer):
+    text = (Path(__file__).resolve().parents[2] / "docs" / "http.md").read_text()
+    words: dict = {}
+    exec(text.split("```python\n")[1].split("```")[0], words)
+    there = receiver(200)
+    client = hooked(there, webhook_secret_before="o" * 40)
+    post(client, "", headers=bearer(client, "ada"), webhook_url=f"http://127.0.0.1:{there.port}")
+    ((_, headers, body, _),) = there.wait(1)
+    seen: set = set()
+    for secret in (secret_of(MASTER, "bob"), secret_of("p" * 40, "ada")):
+        assert not words["is_genuine"](headers, body, secret, seen)
+    old = {**headers, "webhook-timestamp": str(int(headers["webhook-timestamp"]) - 400)}
+    for changed, sent in ((headers, body + b" "), (old, body), ({**headers, "webhook-id": "msg_x"}, body)):
+        assert not words["is_genuine"](changed, sent, secret_of(MASTER, "ada"), seen)
+    assert words["is_genuine"](headers, body, secret_of(MASTER, "ada"), seen)
+    assert not words["is_genuine"](headers, body, secret_of(MASTER, "ada"), seen)  # a second time is a replay
 
 
 @pytest.mark.parametrize("do", ["gouge", "open", "cancelled"])

@@ -176,6 +176,14 @@ def test_an_expired_lease_is_claimed_again_until_attempts_run_out(store):
     assert store.get(job)["state"] == "failed" and "attempts_exhausted" in store.get(job)["error_json"]
 
 
+def test_a_lease_that_ran_out_while_nobody_could_renew_it_counts_for_longer(store):
+    job = store.create(new())[0]["id"]
+    store.claim("first", -1.0, 3)
+    assert store.claim("second", 30, 3, mercy_s=60) is None and store.give_up(1, mercy_s=60) == 0
+    assert store.renew(job, "first", 30) and store.claim("second", 30, 3) is None
+    assert store.renew(job, "first", -61) and store.claim("second", 30, 3, mercy_s=60)["attempt"] == 2
+
+
 def test_who_lost_the_job_can_no_longer_write(store):
     job = store.create(new())[0]["id"]
     store.claim("first", -1.0, 3)
