@@ -88,7 +88,8 @@ def test_over_http_the_answer_is_the_finding(part, tmp_path, monkeypatch):
         assert report["machined"] is None
         listed = client.get(job["links"]["files"]).json()
         names = {f["name"] for f in listed["items"]}
-        assert names == {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf"}
+        assert names == {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf",
+                         "view.bin"}
         assert "gouge" in listed["withheld"]
         for name in PROGRAMS:
             answer = client.get(f"{job['links']['files']}/{name}")

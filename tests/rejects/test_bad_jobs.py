@@ -43,7 +43,8 @@ class Bad:
     late: bool = False
 
 # what is delivered of a job that is not proved
-WITHOUT_PROGRAMS = {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf"}
+WITHOUT_PROGRAMS = {"report.json", "zones.json", "preview.png", "deviation.png", "sheet.html", "sheet.pdf",
+                    "view.bin"}
 
 
 def tools(*given, **fields):
