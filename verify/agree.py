@@ -182,6 +182,8 @@ def _along(points: F64, way: F64, limit: float) -> float:
 
     Ends at the first that is farther than the limit.
     """
+    if (abreast := _abreast(points, way)) <= limit:
+        return abreast
     at, far = 0, 0.0
     for p in points:
         best, place = np.inf, at
@@ -197,6 +199,21 @@ def _along(points: F64, way: F64, limit: float) -> float:
         if far > limit:
             return far
     return far
+
+
+def _abreast(points: F64, way: F64) -> float:
+    """The same, where each point is looked for among the few pieces of the way that are as far along it: no less."""
+    gone, length = (np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))) for x in (points, way))
+    if len(way) < 2 or not (gone[-1] > 0.0 and length[-1] > 0.0):
+        return np.inf
+    place = np.searchsorted(length, gone * (length[-1] / gone[-1])) - 1
+    near = np.full(len(points), np.inf)
+    for beside in (-2, -1, 0, 1, 2):
+        k = np.clip(place + beside, 0, len(way) - 2)
+        d = way[k + 1] - way[k]
+        share = np.clip(((points - way[k]) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-30), 0.0, 1.0)
+        np.minimum(near, np.linalg.norm(points - way[k] - share[:, None] * d, axis=1), out=near)
+    return float(near.max())
 
 
 def _differ(a: _Rows, i: int, b: _Rows, j: int, how: str) -> None:
