@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import CamError
 from geometry.keyed import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
@@ -43,8 +44,16 @@ def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32
     scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
     zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
     given_up, rest : (n,) bool, samples the plan gave up, and those that stay uncut
-    report   : whose places are in the setup frame; of a job that is not proved no program is given away
+    report   : whose places are in the setup frame; of a job that is not proved no program is given away.
+               Where the file cannot be made its notes say so
     """
+    return _or_none(report, lambda: _plan_view(ready, look, scored, zone, given_up, rest, proof, programs, setup,
+                                               report))
+
+
+def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
+               rest: NDArray[np.bool_], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+               report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
     label[rest] = len(zones) + _entries(ready, scored, given_up, rest, len(entries))
@@ -61,10 +70,21 @@ def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proo
 
     samples : of the proof, in the frame of ``look``; report : whose places are in the setup frame
     """
-    way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, spindle_tool=spindle_tool)
-    label = np.zeros(len(samples), np.int64)
-    return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, programs, report,
-                 open_=True)
+    def made() -> Files:
+        way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, spindle_tool=spindle_tool)
+        label = np.zeros(len(samples), np.int64)
+        return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, programs, report, open_=True)
+
+    return _or_none(report, made)
+
+
+def _or_none(report: Mapping[str, Any], made: Callable[[], Files]) -> Files:
+    """The file, or none and a note in the report: no job is lost for its picture."""
+    try:
+        return made()
+    except CamError as error:
+        report["proof"]["notes"].append(f"{VIEW_NAME} could not be made: {error.message}")
+        return {}
 
 
 def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: NDArray[np.bool_],

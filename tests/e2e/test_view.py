@@ -11,6 +11,20 @@ from tests.e2e.test_withheld import FAKES, PROGRAMS, call, part  # noqa: F401
 pytestmark = pytest.mark.timeout(900)
 
 
+def test_a_program_that_takes_too_long_to_be_shown_is_proved_all_the_same(part, tmp_path):  # noqa: F811
+    # a dwell-free day of cutting: seconds in ms do not fit the file, and the proof is not to be lost for that
+    from service.chain import verify_program
+    from service.convert import parse_setup
+    from tests.e2e.test_withheld import SETUP
+
+    slow = "G21 G17 G90 G94 G64 P0.001\nG54\nT1 M6\nG43 H1\nS1000 M3\nG0 Z20\nX0 Y0\nG1 Z10 F0.0002\nG0 Z20\nM2\n"
+    report = verify_program(part, parse_setup(json.dumps(SETUP)), slow, lambda _stage, _share: None,
+                            out=tmp_path / "out")
+    assert not (tmp_path / "out" / "view.bin").exists()
+    assert any("view.bin could not be made" in note for note in report["proof"]["notes"])
+    assert "view.bin" not in [f["name"] for f in report["files"]]
+
+
 def area_of(head, chunks, lod):
     """mm² by label at a level of detail."""
     out = {}
