@@ -75,6 +75,10 @@ async function upload() {
   await page.goto(url);
   await page.waitForSelector(".newjob");
   await accessible(page, "list");
+  await page.setViewportSize({ width: 390, height: 844 });
+  await fits(page, 390);
+  await page.screenshot({ path: join(shots, "form-390.png"), fullPage: true });
+  await page.setViewportSize({ width: 1280, height: 800 });
   await page.setInputFiles("#part", part);
   await page.setInputFiles("#setupfile", setup);
   await page.getByText("is in the fields").waitFor();
