@@ -10,6 +10,7 @@ import gzip
 import hashlib
 import io
 import re
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -149,7 +150,7 @@ def _format_hint(data: bytes) -> str:
     if data[:2] == b"\x1f\x8b":
         try:
             inner = gzip.GzipFile(fileobj=io.BytesIO(data)).read(64)
-        except (OSError, EOFError):
+        except (OSError, EOFError, zlib.error):  # a damaged archive is still one
             inner = b""
         return "unpack the gzip file first" + (", there is a STEP file inside" if _START in inner else "")
     if data[:2] == b"PK":

@@ -137,7 +137,8 @@ async def _half_a_character(request: Request, error: Exception) -> JSONResponse:
 async def _unexpected(request: Request, error: Exception) -> JSONResponse:
     log.exception("bug in a route", path=request.url.path, exc_info=error)
     return problem_response(request, InternalError("a bug in the service; the log has the details under this request "
-                                                   "id", code="bug", remedy="please report it with the request id"))
+                                                   "id", code="bug", remedy="please report it with the request id"),
+                            {"Connection": "close"})  # the server closes it when a route broke
 
 
 def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:
