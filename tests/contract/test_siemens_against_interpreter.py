@@ -1,7 +1,7 @@
 """Siemens programs before the Sinumerik interpreter of others: ``pip install nc-gcode-interpreter`` (0.1.9).
 
-Skipped where that is not there. It knows words, cycles by their form and the state they leave, but neither kinematics nor frames, and no label that
-stands alone in a line, as a control does.
+Skipped where that is not there. It knows words, cycles by their form and the state they leave, but neither kinematics
+nor frames, and no label that stands alone in a line, as a control does.
 """
 
 from dataclasses import replace
