@@ -11,6 +11,7 @@ from pydantic.json_schema import models_json_schema
 from schemas.jobs import JobEvent
 from schemas.problem import Problem
 from schemas.setup import Setup
+from service.samples import add_samples
 
 TEMPLATE = "#/components/schemas/{model}"
 
@@ -27,6 +28,7 @@ def document(app: FastAPI) -> dict[str, Any]:
     for unused in ("HTTPValidationError", "ValidationError"):
         schemas.pop(unused, None)
     found["components"]["schemas"] = dict(sorted(schemas.items()))
+    add_samples(found)
     return found
 
 

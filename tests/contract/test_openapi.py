@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from schemas.setup import Setup
 from service.app import create_app
+from service.errors import ERROR_TABLE
 from service.openapi import as_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +36,8 @@ def test_the_setup_of_a_submission_is_typed(document):
 def test_every_reference_leads_somewhere_and_every_schema_is_used(document):
     text = yaml.safe_dump(document)
     schemas = document["components"]["schemas"]
-    used = {line.rsplit("/", 1)[1].strip("'\" ") for line in text.splitlines() if "$ref" in line}
+    lines = [line for line in text.splitlines() if "$ref" in line and "/schemas/" in line]
+    used = {line.rsplit("/", 1)[1].strip("'\" ") for line in lines}
     assert used <= set(schemas)
     assert set(schemas) - used <= {"JobEvent"}
 
@@ -48,6 +51,34 @@ def test_errors_are_problems_and_operations_are_named(document):
                 if status >= "400" and path != "/readyz":
                     assert list(answer["content"]) == ["application/problem+json"], (path, method, status)
     assert len(set(names)) == len(names)
+
+
+def test_every_operation_and_every_problem_has_an_example_that_fits_its_schema(document):
+    import jsonschema
+
+    def fits(value, schema):
+        jsonschema.validate(value, {**schema, "components": document["components"]},
+                            cls=jsonschema.Draft202012Validator)
+
+    problems = document["components"]["examples"]
+    for path, item in document["paths"].items():
+        for method, operation in item.items():
+            for status, answer in operation["responses"].items():
+                for media, content in answer.get("content", {}).items():
+                    where = (path, method, status, media)
+                    if media == "application/problem+json":
+                        named = [e["$ref"].rsplit("/", 1)[1] for e in content["examples"].values()]
+                        assert named, where
+                        for name in named:
+                            assert problems[name]["value"]["status"] == int(status), where
+                    elif status < "300":
+                        assert content["example"], where
+                        if media == "application/json":
+                            fits(content["example"], content["schema"])
+    assert {p["value"]["type"].split(":")[3] for p in problems.values()} == {row.slug for row in ERROR_TABLE.values()}
+    for each in problems.values():
+        fits(each["value"], {"$ref": "#/components/schemas/Problem"})
+    Setup.model_validate(document["components"]["schemas"]["Setup"]["examples"][0])
 
 
 def test_every_field_says_its_unit_or_has_a_description(document):
