@@ -2,7 +2,8 @@
 
 Stock that stands higher over a pass than the flutes reach is first walked off above it. Then, in this order of trying
 1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
-   more stock than a layer; down to a deeper level in air, or along the pass itself, never steeper than the ramp angle.
+   more stock than a layer; down to a deeper level in air, there or beside its start, or along the pass itself, never
+   steeper than the ramp angle.
 2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
 3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
    top is in air, or a free place close beside it is.
@@ -16,7 +17,7 @@ clearance beside a wall.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from dataclasses import field as fresh
 
@@ -26,9 +27,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
-from toolpath.levels import Line, dense, pieces_where, thinned
+from toolpath.levels import Line, dense, pieces_where, stretch, thinned
 from toolpath.motion import Motion, Trajectory
-from toolpath.pacing import Pace, paced
+from toolpath.pacing import GUARD, Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.walked import Depths, still_to_walk
@@ -202,7 +203,7 @@ class Linker:
             return False
         entry, cut, joined = way
         if joined:
-            self._paced(Motion.CONNECT, np.vstack([self._here(), entry]))
+            self._joined(np.vstack([self._here(), entry]))
         else:
             self._come_down(entry[0])
             if len(entry) > 1:
@@ -243,6 +244,29 @@ class Linker:
         for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
             self._feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
 
+    def _joined(self, way: F64) -> None:
+        """Go along a way (n, 3), mm, to the next pass: as far as it is in air as fast as links go.
+
+        Its first stretch, and one before stock, may touch what the stock's lattice does not show.
+        """
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+        guard = max(GUARD * self.field.tool.diameter, 2.0 * self.stock.lattice.step)
+        if s[-1] > 4.0 * guard and self.motions.link_feed > self.motions.feed:
+            at = np.linspace(0.0, s[-1], math.ceil(2.0 * s[-1] / self.stock.lattice.step) + 1)
+            points = np.column_stack([np.interp(at, s, way[:, c]) for c in range(3)])
+            met = np.flatnonzero(self.stock.overlap(points, self.field.tool) > AIR_TOLERANCE)
+            last = float(at[met[0]] if len(met) else s[-1]) - guard
+            if last > 2.0 * guard:
+                self._feed(Motion.CONNECT, stretch(way, s, 0.0, guard), self.motions.feed)
+                self._feed(Motion.CONNECT, stretch(way, s, guard, last), self.motions.link_feed)
+                way = stretch(way, s, last, float(s[-1]))
+        self._paced(Motion.CONNECT, way)
+
+    def _nothing_stands(self, way: F64) -> bool:
+        """Whether no stock that the lattice shows is met along a way (n, 3), mm."""
+        points = dense(way, 0.5 * self.stock.lattice.step)
+        return float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
+
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
 
@@ -261,8 +285,7 @@ class Linker:
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
             if int(known.sum()) > MOST_AGAIN:
                 continue
-            points = dense(way, 0.5 * self.stock.lattice.step)
-            if (float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
+            if (self._nothing_stands(way)
                     and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
                 self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
                 self.gone.cut(way)
@@ -303,15 +326,43 @@ class Linker:
             return entry, points, True
         if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return np.vstack([entry, start]), points, True
+        aside = self._down_aside(points, z)
+        if aside is not None:
+            return aside, points, True
         ramp = self._ramp(points, closed, over)
         if ramp is None or int(self._known_down(ramp, points).sum()) > MOST_AGAIN:
             return None  # what is known of a way down can be left out only where it is come to from above
         return entry, ramp, True
 
+    def _down_aside(self, points: F64, z: float) -> F64 | None:
+        """From here across at height z, mm, to beside the start of a pass, down there in air, and onto it.
+
+        A way down along the pass is as long as its slope is flat, and is walked twice. None where this is longer, or
+        where the tool is not free in air.
+        """
+        here, start, m = self._here(), points[0], self.motions
+        sooner = 2.0 * (z - start[2]) / (math.tan(m.ramp_angle) * RAMP_SHARE * m.feed)
+        for q in self._beside_start(points):
+            way = np.array([here, [*here[:2], z], [*q[:2], z], q])
+            way = way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]]
+            length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+            if length / m.link_feed + float(np.linalg.norm(start - q)) / m.feed > sooner:
+                continue
+            if (self._nothing_stands(way) and self._free_move(here[:2], q[:2], z)
+                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MOST_AGAIN):
+                return np.vstack([way[1:], start])
+        return None
+
     def _from_air(self, points: F64) -> Way | None:
-        start, tool = points[0], self.field.tool
-        if bool(self.stock.in_air(start[None, :], tool)[0]):
+        start = points[0]
+        if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return start[None, :], points, False
+        q = next(self._beside_start(points), None)
+        return None if q is None else (np.vstack([q, start]), points, False)
+
+    def _beside_start(self, points: F64) -> Iterator[F64]:
+        """Places (3,) in air, as high as the start of a pass (n, 3), mm, that lead onto it straight; nearest first."""
+        start, tool = points[0], self.field.tool
         ahead = points[1, :2] - start[:2]
         ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
         left = np.array([-ahead[1], ahead[0]])
@@ -325,8 +376,7 @@ class Linker:
                         t = np.linspace(0.0, 1.0, n)[:, None]
                         lane = q + t * (start - q)
                         if self._lane(lane, 1.5 * self.motions.step_down):
-                            return np.vstack([q, start]), points, False
-        return None
+                            yield q
 
     def _lane(self, tips: F64, most: float) -> bool:
         """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not

@@ -249,13 +249,39 @@ def test_the_next_pass_beside_is_reached_without_a_lift():
 
 def test_a_deeper_level_is_reached_down_a_ramp_along_the_pass():
     link = linker(tool(4.0, 0.0), step_down=1.0)
-    link.add(loop(8, 3.2))
+    link.add(loop(4, 3.2))
     before = len(link.trajectories)
-    link.add(loop(8, 2.4))
+    link.add(loop(4, 2.4))
     new = link.trajectories[before:]
     assert all(t.motion is not Motion.RAPID for t in new)
     assert steepest_cut(link) <= RAMP
     assert new[-1].points[0, 2] == pytest.approx(3.2) and new[-1].points[-1, 2] == pytest.approx(2.4)
+
+
+def test_a_deeper_level_is_reached_beside_the_pass_where_that_is_in_air():
+    """The pass before was come to from outside the stock: there the tool goes down, as fast as links go, and in."""
+    link = linker(tool(4.0, 0.0), step_down=1.0)
+    link.add(loop(8, 3.2))
+    before = len(link.trajectories)
+    link.add(loop(8, 2.4))
+    new = link.trajectories[before:]
+    assert [t.motion for t in new] == [Motion.CONNECT] * 3 + [Motion.CUT]
+    assert [t.feed for t in new] == [800, 3000, 800, 800]
+    down = new[1].points
+    assert down[0, 2] == 3.2 and down[-1, 2] == 2.4 and steepest_cut(link) < 1e-9
+    outside = down[np.flatnonzero(np.diff(down[:, 2]) < 0.0)[0]]
+    assert not (np.abs(outside[:2] - 15.0) < 15.0 + 2.0).all()  # clear of the stock where it goes down
+    assert np.hypot(*(down[-1, :2] - outside[:2])) > 0.0 and new[-1].points[0, 2] == 2.4
+
+
+def test_ways_through_air_to_a_pass_beside_are_as_fast_as_links_and_slow_before_stock():
+    link = linker(tool(4.0, 0.0), top=3.0)
+    link.add(straight(-5, 35, 10, 3.0))
+    link.add(Line(straight(-5, 35, 18, 3.0).points[::-1], False))
+    ways = [(t.feed, float(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum())) for t in link.trajectories
+            if t.motion is Motion.CONNECT]
+    assert [feed for feed, _ in ways] == [800, 3000, 800]
+    assert sum(far for _, far in ways) == pytest.approx(8.0) and ways[0][1] == pytest.approx(0.4)
 
 
 def test_no_link_goes_through_a_wall():
