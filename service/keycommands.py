@@ -27,10 +27,12 @@ def create(principal: Annotated[str, typer.Option(help="Whose key it is; jobs be
            as_json: AsJson = False) -> None:
     """Make a key and print it; it is told this once and cannot be shown again."""
     with reported(as_json):
-        from service.console import print_json
+        from service.console import print_json, say
         from service.resources import key_resource
 
-        text, row = _store(data).make(principal, [s.strip() for s in scopes.split(",")], days or None, note)
+        store = _store(data)
+        text, row = store.make(principal, [s.strip() for s in scopes.split(",")], days or None, note)
+        say(f"made in {store.engine.url.render_as_string(hide_password=True)}; the service has to use this database")
         print_json({"key": text, **key_resource(row).model_dump()})
 
 

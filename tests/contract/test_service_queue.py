@@ -83,7 +83,7 @@ def test_a_job_that_finds_the_disk_full_waits_for_another_attempt(make_client, p
 def test_an_upload_that_finds_the_disk_full_is_no_bug(make_client, post, monkeypatch):
     client = make_client()
 
-    def full(_):
+    def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(client.app.state.engine.artifacts, "put_blob", full)

@@ -137,6 +137,7 @@ def test_keys_are_made_listed_and_revoked(files, monkeypatch):
     data = ("--data", files / "data")
     made = call("keys", "create", "--principal", "mes", "--scopes", "submit, read", "--note", "night shift", *data)
     key = json.loads(made.stdout)
+    assert "zonemill.db" in made.stderr
     assert made.exit_code == 0 and key["key"].startswith(f"zm_{key['id']}_") and key["scopes"] == ["submit", "read"]
     assert key["expires_at"] and (files / "data").stat().st_mode & 0o077 == 0
     secret = key["key"].rsplit("_", 1)[-1]
