@@ -46,7 +46,8 @@ def test_figures_by_face_and_files(part, tmp_path):
     report = json.loads(got.stdout)
     Verification.model_validate(report)
     assert got.exit_code == 0 and json.loads((tmp_path / "out" / "report.json").read_text()) == report
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.json", "deviation.png", "machined.stl", "view.bin"}
+    there = {p.name for p in (tmp_path / "out").iterdir()}
+    assert there == {"report.json", "deviation.png", "machined.stl", "view.bin"}
     assert [f["name"] for f in report["files"]] == ["deviation.png", "machined.stl", "view.bin"]
     floor = floor_of(report)
     assert floor["area_mm2"] == pytest.approx(8 * 12, rel=0.01) and floor["coverage"] == pytest.approx(0.5, abs=0.01)
