@@ -103,14 +103,14 @@ def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
 
 
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
-    """A step of 17 kB and two small ones for 20 kB: three programs, run one after the other on one blank."""
-    machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 20}
+    """A step of 14 kB and two small ones for 16 kB: three programs, run one after the other on one blank."""
+    machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16}
     report = chain.plan(part, parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine})), tmp_path, quiet)
     assert report["state"] == "proved" and report["coverage"] == 1.0
     names = [f["name"] for f in report["files"] if f["kind"] == "program"]
     ends = ("linuxcnc.ngc", "heidenhain.h")
     assert names == sorted(f"program{k}.{end}" for k in ("", ".part2", ".part3") for end in ends)
-    assert all((tmp_path / n).stat().st_size <= 20_000 for n in names)
+    assert all((tmp_path / n).stat().st_size <= 16_000 for n in names)
     steps = [s["id"] for s in report["steps"]]
     told = [s for n in names if n.endswith("ngc") for s in steps if f"({s} " in (tmp_path / n).read_text()]
     assert sorted(told) == steps
