@@ -33,9 +33,9 @@ def in_turn(ready: Prepared) -> bool:
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:
     """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.bands``).
 
-    They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor bend
-    holds near by, as the proof asks it (``verify.slender``), down to what holds the lowest; what has single places over
-    it the proof finds.
+    They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor
+    bend holds near by, as the proof asks it (``verify.slender``), down to what holds the lowest; what has single places
+    over it the proof finds.
 
     unheld : walls that a proof found without support, known as walls or not
     """
