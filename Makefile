@@ -54,7 +54,7 @@ check: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/unit/test_docstrings.py tests/unit/test_dependencies.py
 
-test: $(STAMP)
+test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
 
 test-slow: $(STAMP)
@@ -76,7 +76,7 @@ bench: $(BENCH_STAMP)
 docs: $(STAMP)
 	$(BIN)/python -m pytest -q tests/unit/test_docs.py
 
-demo: $(STAMP)
+demo: $(STAMP) page
 	$(BIN)/zonemill demo --out $(OUT)
 
 serve: $(STAMP) page
