@@ -38,6 +38,7 @@ from output.grid import GridArc, pieces, to_grid  # noqa: E402
 from output.model import Workplan  # noqa: E402
 from service import chain, programs  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
+from tests.arc_plans import off  # noqa: E402
 from toolpath.levels import thinned  # noqa: E402
 from toolpath.motion import Motion  # noqa: E402
 from verify import motion  # noqa: E402
@@ -45,17 +46,6 @@ from verify.program import Program  # noqa: E402
 from verify.reader import read_program  # noqa: E402
 
 _MOVE = re.compile(r"^(?:G[0123] )?[XYZ][-0-9.]", re.MULTILINE)
-
-
-def off(points: F64, way: F64) -> float:
-    """mm, the farthest of points (n, 3) from a polyline (m, 3): every point against every piece."""
-    a, d = way[:-1], np.diff(way, axis=0)
-    size = np.maximum((d * d).sum(axis=1), 1e-30)
-    worst = 0.0
-    for p in points:
-        share = np.clip(((p - a) * d).sum(axis=1) / size, 0.0, 1.0)[:, None]
-        worst = max(worst, float(np.linalg.norm(p - a - share * d, axis=1).min()))
-    return worst
 
 
 def between(way: F64) -> F64:
