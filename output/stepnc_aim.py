@@ -276,7 +276,7 @@ class _Aim:
         add = self.file.add
         workingstep = add(f"MACHINING_WORKINGSTEP({quoted(step_title(step))},'machining','','')")
         operation = add(f"FREEFORM_MILLING_OPERATION({quoted(operation_words(step))},"
-                        f"'{'roughing' if step.operation == 'roughing' else 'finishing'}','',"
+                        f"'{'finishing' if step.operation == 'finishing' else 'roughing'}','',"
                         f"{quoted(_purpose(step))})")
         add(f"MACHINING_OPERATION_RELATIONSHIP('','machining',#{workingstep},#{operation})")
         self._feature(step, workingstep)

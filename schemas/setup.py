@@ -158,6 +158,9 @@ class Operations(WireModel):
     """What to do and where."""
 
     roughing: Annotated[bool, Field(description="Take the stock off in layers first.")] = True
+    semi_finishing: Annotated[bool, Field(
+        description="After its layers a tool also goes over what stands between them, so that leaning walls and floors "
+                    "keep even stock: uneven by no more than a quarter of its deepest layer.")] = False
     finishing: Annotated[bool, Field(description="Finish the zones.")] = True
     faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all that are in reach.")] = None
     exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave alone.")] = []
@@ -175,6 +178,8 @@ class Operations(WireModel):
     def _check(self) -> Operations:
         if not (self.roughing or self.finishing):
             raise ValueError("operations.roughing and operations.finishing are both false: nothing to do")
+        if self.semi_finishing and not self.roughing:
+            raise ValueError("operations.semi_finishing goes over what layers leave, and operations.roughing is false")
         if both := sorted(set(self.faces or ()) & set(self.exclude_faces)):
             raise ValueError(f"faces {', '.join(both)} stand in operations.faces and in exclude_faces")
         return self

@@ -337,7 +337,7 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
-                        rates=rates_of(ready.setup))
+                        rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing)
 
 
 def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:

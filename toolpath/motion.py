@@ -92,7 +92,7 @@ class Workingstep:
     name      : for people and for STEP-NC, for example 'S07 Z3 zlevel T1 F12 F13'
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
-    operation : 'roughing' or 'finishing'
+    operation : 'roughing', 'semi_finishing' or 'finishing'
     strategy  : 'layers', 'zlevel', 'floor', 'zigzag', 'one_way', 'spiral', 'isoparametric'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature

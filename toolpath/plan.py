@@ -94,7 +94,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
                 tell(len(job.zones))
                 continue
             if settings.roughing:
-                steps.extend(job.layer(plane, following()))
+                steps.extend(job.layer(plane, len(steps) + first_step))
             if not settings.finishing:
                 tell(len(job.zones))
                 continue
@@ -135,17 +135,19 @@ class _ToolJob:
         return plane == -math.inf or any(
             bool(((z[:, 2] >= plane) & (z[:, 2] < top)).any()) for z in (self.checks[a.id].points for a in self.zones))
 
-    def layer(self, plane: float, step_id: str) -> list[Workingstep]:
-        """The layers of a band that ends at a height of contact, mm, as one workingstep, or none."""
+    def layer(self, plane: float, number: int) -> list[Workingstep]:
+        """The layers of a band that ends at a height of contact, mm, and what follows to leave even stock.
+
+        number : of the first of the workingsteps, of which there are two at most
+        """
         if self.layers is None:
             self.layers = _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under)
-        made = self.layers.down_to(plane - self.under, step_id)
-        if made is None:
-            return []
-        self.layered.append(made)
+        made = self.layers.down_to(plane - self.under, number)
+        self.layered.extend(made)
         for f in self.begun:
-            f.measure(made)
-        return [made]
+            for step in made:
+                f.measure(step)
+        return made
 
     def finish(self, zone: ZoneArea, plane: float, step_id: str) -> list[Workingstep]:
         """The finish of a zone down to a height, mm."""
@@ -174,7 +176,7 @@ class _Layers:
         # the finish of a floor has the whole front in what is left on it
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
         bottom, top, step = float(tips[:, 2].min()) + low, stock.highest, 0.85 * cut.step_down
-        self.swept, self.left = top, list[tuple[float, NDArray[np.bool_]]]()
+        self.swept, self.above, self.left = top, top, list[tuple[float, NDArray[np.bool_]]]()
         if top <= bottom:
             return
         heights = layers.layer_heights(top, bottom, step)
@@ -184,31 +186,56 @@ class _Layers:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
         self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
 
-    def down_to(self, lowest: float, step_id: str) -> Workingstep | None:
-        """One workingstep of the layers from ``lowest`` mm up that were not walked before; None where none is."""
+    def down_to(self, lowest: float, number: int) -> list[Workingstep]:
+        """The layers from ``lowest`` mm up that were not walked before, as one workingstep, and where even stock is to
+        stay another of those between them; number : of the first."""
         field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
-        pace = Pace(cut.feed, cut.link_feed, partial(cut.feed_under, tool), cut.step_down)
-        linker = Linker(field, self.stock, motions_of(cut, settings), self.depths, settings.found, pace, cut.engaged)
+        linker = self._linker()
         chord = 0.5 * settings.chordal_tolerance
+        between: list[tuple[float, NDArray[np.bool_]]] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
             z, below = self.left.pop(0)
-            if self.bounded:
-                Clearing(linker, z, below, self.allowance, 0.8 * tool.radius, settings.climb, settings.either_way,
-                         layers.STOCK_WORTH, 0.1 * lat.step).walk()
-            for lines in layers.layer(field, self.stock, z, below, self.allowance, 0.8 * tool.radius):
-                for line in nearest_order(lines, linker.at, False):
-                    linker.add(turned(line, settings), 0.1 * lat.step)
+            between.extend((h, below) for h in layers.between(self.above, z, cut.step_down))
+            self.above = z
+            self._walk(linker, z, below)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
             rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen)
             for line in nearest_order(rims, linker.at, False):
                 linker.add(turned(line, settings))
+        made = self._step(number, "roughing", linker)
+        if not settings.semi_finishing:
+            return made
+        linker = self._linker()
+        for z, below in between:
+            self._walk(linker, z, below)
+        return made + self._step(number + len(made), "semi_finishing", linker)
+
+    def _linker(self) -> Linker:
+        cut, tool = self.cut, self.field.tool
+        pace = Pace(cut.feed, cut.link_feed, partial(cut.feed_under, tool), cut.step_down)
+        return Linker(self.field, self.stock, motions_of(cut, self.settings), self.depths, self.settings.found, pace,
+                      cut.engaged)
+
+    def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_]) -> None:
+        """Go over the stock that stands above a height, mm, in an area, down to it."""
+        settings, side, fine = self.settings, 0.8 * self.field.tool.radius, 0.1 * self.field.lattice.step
+        if self.bounded:
+            Clearing(linker, z, area, self.allowance, side, settings.climb, settings.either_way, layers.STOCK_WORTH,
+                     fine).walk()
+        for lines in layers.layer(self.field, self.stock, z, area, self.allowance, side):
+            for line in nearest_order(lines, linker.at, False):
+                linker.add(turned(line, settings), fine)
+
+    def _step(self, number: int, operation: str, linker: Linker) -> list[Workingstep]:
+        """What a linker walked as a workingstep; none where that is nothing."""
         if not linker.passes:
-            return None
-        ids = " ".join(z.id for z in self.zones)
-        return step_of(step_id, f"{step_id} layers {tool.id} {ids}", None, self.zones, "roughing", "layers", tool, cut,
-                       0.8 * tool.radius, linker.finish(), settings)
+            return []
+        step_id, tool, ids = f"S{number:02d}", self.field.tool, " ".join(z.id for z in self.zones)
+        kind = "layers" if operation == "roughing" else "between layers"
+        return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "layers", tool,
+                        self.cut, 0.8 * tool.radius, linker.finish(), self.settings)]
 
 
 def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:

@@ -88,6 +88,7 @@ class PlanSettings:
     rates           : what the machine does, for times
     planes          : heights of contact, descending, above which all is finished before any tool goes below
                       (``toolpath.bands``)
+    semi_finishing  : between the layers too, so that they leave even stock
     """
 
     scallop_height: float
@@ -106,3 +107,4 @@ class PlanSettings:
     found: Counterexamples = NONE
     rates: Rates = RATES
     planes: tuple[float, ...] = ()
+    semi_finishing: bool = False

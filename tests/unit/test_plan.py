@@ -18,6 +18,7 @@ from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
+from toolpath.strategies.layers import EVEN
 from toolpath.strategies.zigzag import Pattern
 from toolpath.walked import OVERLAP, Depths, Walked
 from zones.machinable import Form
@@ -373,3 +374,38 @@ def test_a_short_neck_beside_a_wide_block_never_meets_what_stands_there():
     assert deep <= 0.02, where
     assert min(z.bottom for z in c.zones) < c.stock_before.highest - 4.5  # deeper than the neck is long
     assert len(c.zones) == 2 and all(len(z.left) == 0 for z in c.plan.zones)
+
+
+def above_part(c: Case, **changes) -> np.ndarray:
+    """Stock along the normal over all samples of the zones that look up, mm, once the layers are done."""
+    lat = c.stock_before.lattice
+    stock = StockMap(lat, c.stock_before.top.copy(), c.stock_before.cover.copy(), c.stock_before.part)
+    checks = [Target(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
+    cut = {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
+    plan_job(c.zones, checks, c.fields, cut, stock, replace(c.settings, finishing=False, **changes))
+    mine = np.concatenate([z.samples for z in c.zones if z.form is not Form.LEVEL])
+    points, normals = c.samples.points[mine], c.samples.normals[mine]
+    up = normals[:, 2] > 0.3
+    return (stock.top[lat.cells(points[up, :2])] - points[up, 2]) * normals[up, 2]
+
+
+@pytest.mark.parametrize("name", ["dome", "valley"])
+def test_semi_finishing_leaves_even_stock(name):
+    """A layer leaves stairs as high as it is deep; layers between them a quarter of that and what is left at walls."""
+    c = case(name)
+    deepest = STEP_DOWN * max(f.tool.diameter for f in c.fields.values())
+    allowed = EVEN * deepest + 0.1 * deepest
+    before, after = above_part(c), above_part(c, semi_finishing=True)
+    assert np.quantile(after, 0.99) <= allowed < 1.1 * np.quantile(before, 0.99)
+    assert np.ptp(np.quantile(after, [0.3, 0.99])) < 0.5 * np.ptp(np.quantile(before, [0.3, 0.99]))
+
+
+def test_semi_finishing_is_a_workingstep_after_the_layers_of_its_tool():
+    c = case("corner")
+    done = replanned(c, semi_finishing=True).plan.steps
+    kinds = [(s.tool.id, s.operation) for s in done]
+    assert len({s.id for s in done}) == len(done)
+    tool, _ = next(k for k in kinds if k[1] == "semi_finishing")
+    first = kinds.index((tool, "semi_finishing"))
+    assert kinds[first - 1] == (tool, "roughing") and (tool, "finishing") in kinds[first:]
+    assert all(s.operation != "semi_finishing" for s in replanned(c).plan.steps)

@@ -108,6 +108,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (setup(fixtures=[{"box_mm": [[0, 0, 2], [1, 1, 1]]}]), "above the first"),
     (setup(placement={"z_axis": [0, 0, 0]}), "zero length"), (setup(placement={"x_axis": [0, 1, 1]}), "right angles"),
     (setup(operations={"roughing": False, "finishing": False}), "nothing to do"),
+    (setup(operations={"roughing": False, "semi_finishing": True}), "goes over what layers leave"),
     (setup(operations={"faces": ["F1"], "exclude_faces": ["F1"]}), "F1"),
     (setup(operations={"faces": ["12"]}), "pattern"),
     (setup(material="cheese"), "Inconel 718"), (setup(material="lib:x"), "no entry 'x'"),

@@ -12,6 +12,7 @@ from toolpath.stock import SURE_RIM, StockMap
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
+EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis where it is evened out
 
 
 def layer_heights(top: float, bottom: float, step: float) -> list[float]:
@@ -22,6 +23,21 @@ def layer_heights(top: float, bottom: float, step: float) -> list[float]:
         out.append(z)
         z -= step
     return [*out, bottom]
+
+
+def between(upper: float, lower: float, step: float) -> list[float]:
+    """Heights between two layers, mm, descending, no farther apart than ``EVEN`` of the deepest layer ``step``.
+
+    A layer leaves a stair where a face leans: over the height h below the layer above, h tan(lean) of stock beside it,
+    h sin(lean) along the normal. Layers walked in between leave no more than that of the height between them.
+
+    >>> between(0.0, -2.0, 2.0)
+    [-0.5, -1.0, -1.5]
+    >>> between(0.0, -0.5, 2.0)
+    []
+    """
+    count = int(np.ceil((upper - lower) / (EVEN * step) - 1e-9))
+    return [upper - k * (upper - lower) / count for k in range(1, count)]
 
 
 def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], allowance: float,
