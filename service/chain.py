@@ -210,7 +210,8 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     found = told.along(view.id)
     settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
     if turned:
-        stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before])
+        lowest = float(ready.blank.corners(view.rotation)[0, 2]) - ready.blank.beyond
+        stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before], lowest)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,

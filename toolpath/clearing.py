@@ -142,7 +142,7 @@ class Clearing:
 
     def _in_stock(self, line: Line) -> list[Line]:
         r = self._tool.radius
-        wanted = self.linker.stock.overlap(line.points, self._tool) > self.worth
+        wanted = self.linker.stock.overlap(line.points, self._tool, least=0.0) > self.worth
         return pieces_where(line, wanted, 0.6 * r, 3.0 * r)
 
     def _piece(self, ways: Inwards, line: Line, when: float, step: float, finer: int) -> None:

@@ -71,7 +71,7 @@ def skims(stock: StockMap, line: Line, tool: ToolBody, most: float, found: Count
     over = np.ones(len(way.points), np.bool_) if whole else over_limit(stock, way.points, tool, most, found)
     deep, out = SURE * SKIN_SHARE * tool.radius, []
     for piece in pieces_where(way, over, BEYOND * tool.radius, tool.radius):
-        count = int(max(float(stock.overlap(piece.points, tool).max()), 0.0) / deep)
+        count = int(float(stock.overlap(piece.points, tool, least=0.0).max()) / deep)
         for k in range(count, 0, -1):
             raised = Line(piece.points + np.array([0.0, 0.0, k * deep]), piece.closed)
             out.append(raised if k % 2 else raised.reversed())

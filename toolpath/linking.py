@@ -254,7 +254,7 @@ class Linker:
         if s[-1] > 4.0 * guard and self.motions.link_feed > self.motions.feed:
             at = np.linspace(0.0, s[-1], math.ceil(2.0 * s[-1] / self.stock.lattice.step) + 1)
             points = np.column_stack([np.interp(at, s, way[:, c]) for c in range(3)])
-            met = np.flatnonzero(self.stock.overlap(points, self.field.tool) > AIR_TOLERANCE)
+            met = np.flatnonzero(self.stock.overlap(points, self.field.tool, least=0.0) > AIR_TOLERANCE)
             last = float(at[met[0]] if len(met) else s[-1]) - guard
             if last > 2.0 * guard:
                 self._feed(Motion.CONNECT, stretch(way, s, 0.0, guard), self.motions.feed)
@@ -265,7 +265,7 @@ class Linker:
     def _nothing_stands(self, way: F64) -> bool:
         """Whether no stock that the lattice shows is met along a way (n, 3), mm."""
         points = dense(way, 0.5 * self.stock.lattice.step)
-        return float(self.stock.overlap(points, self.field.tool).max()) <= AIR_TOLERANCE
+        return float(self.stock.overlap(points, self.field.tool, least=0.0).max()) <= AIR_TOLERANCE
 
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
@@ -382,7 +382,7 @@ class Linker:
         """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
         too much of the cutter in it."""
         tool = self.field.tool
-        return (float(self.stock.overlap(tips, tool).max()) <= most
+        return (float(self.stock.overlap(tips, tool, least=0.0).max()) <= most
                 and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length
                 and within(self.stock, tips, tool, self.engaged, self.found))
 
@@ -497,8 +497,9 @@ class Linker:
         lane = np.column_stack([here[:2] + t * (start - here)[:2], np.full(n, level)])
         level = max(level, float(self.field.tips(lane[:, :2]).max()))
         lane[:, 2] = level
-        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM), self.stock.under_end(lane, tool))
-        level += max(float(stands.max()), 0.0) + OVER
+        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM, least=0.0),
+                            self.stock.under_end(lane, tool, least=0.0))
+        level += float(stands.max()) + OVER
         if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane or level >= m.rapid_floor:
             return None
         lane[:, 2] = level

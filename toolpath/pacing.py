@@ -55,7 +55,7 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
     guard = max(GUARD * tool.diameter, 2.0 * stock.lattice.step)
     at = np.linspace(0.0, s[-1], max(2, math.ceil(ASKED * s[-1] / guard) + 1))
     way = np.column_stack([np.interp(at, s, points[:, c]) for c in range(3)])
-    busy = stock.overlap(way, tool, SURE_RIM) > AIR_TOLERANCE
+    busy = stock.overlap(way, tool, SURE_RIM, least=0.0) > AIR_TOLERANCE
     if not busy.any():
         return [(False, points, pace.feed)]
     feeds = np.full(len(at), pace.air)
@@ -73,7 +73,7 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
 
 def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
     """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not."""
-    depth = np.ceil(np.maximum(stock.overlap(way, tool), 0.0) / pace.layer * DEPTHS - 1e-9).astype(np.int64)
+    depth = np.ceil(stock.overlap(way, tool, least=0.0) / pace.layer * DEPTHS - 1e-9).astype(np.int64)
     turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
     turn[turn == 0] = round(math.pi / ANGLE)  # what is skimmed counts as none, and may be in all of the front
     kinds, place = np.unique(np.column_stack([depth, turn]), axis=0, return_inverse=True)

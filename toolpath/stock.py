@@ -52,7 +52,7 @@ class StockMap:
         self.lattice, self.top = lattice, np.ascontiguousarray(top)
         self.cover = ndimage.maximum_filter(self.top, 3) if cover is None else np.ascontiguousarray(cover)
         self.part = np.full_like(self.top, -np.inf) if part is None else np.ascontiguousarray(part)
-        self._pooled = _pooled(self.top)  # never too low: lowered as it is looked at
+        self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)  # never too low: lowered as looked at
         self._ceilings: tuple[Ceilings, Ceilings] | None = None  # of stock, and of stock that is not part
 
     @classmethod
@@ -145,17 +145,21 @@ class StockMap:
     def copied(self) -> StockMap:
         """The same stock, to be cut on its own."""
         out = copy.copy(self)
-        out.top, out.cover, out._pooled = self.top.copy(), self.cover.copy(), self._pooled.copy()
+        out.top, out.cover = self.top.copy(), self.cover.copy()
+        out._pooled, out._covered = self._pooled.copy(), self._covered.copy()
         return out
 
     def become(self, other: StockMap) -> None:
         """Take over what a copy of this has come to."""
-        self.top, self.cover, self._pooled, self._ceilings = other.top, other.cover, other._pooled, other._ceilings
+        self.top, self.cover, self._ceilings = other.top, other.cover, other._ceilings
+        self._pooled, self._covered = other._pooled, other._covered
 
-    def left_by(self, others: Sequence[tuple[StockMap, F64]]) -> None:
+    def left_by(self, others: Sequence[tuple[StockMap, F64]], lowest: float) -> None:
         """Lower the stock to what other maps of it, seen along other axes, have left.
 
         others : StockMaps, each with the rotation (3, 3) from the frame of this one into its own
+        lowest : mm, below which the blank has nothing in this frame. The part may begin higher: a corner of the blank
+                 that stands lower than that is still in the way of tools along other axes
 
         A place is gone where it lies above one of the others. ``cover`` stays a bound: another's cover counts as far
         round a place as a cell reaches, and the way to the next place asked. ``top`` is lowered by theirs, node by
@@ -166,14 +170,14 @@ class StockMap:
             return
         lat, turns = self.lattice, np.array([turn for _, turn in others], dtype=np.float64)
         frames = np.array([[m.lattice.x0, m.lattice.y0, m.lattice.step] for m, _ in others])
-        floor = float(self.part[np.isfinite(self.part)].min(initial=self.highest)) - lat.step
         reach = HALF_DIAGONAL * lat.step
         # a place as far as that from another falls on a node of theirs no farther than so many and one
         wide = [ndimage.maximum_filter(m.cover, 2 * int((reach + lat.step) / m.lattice.step) + 3) for m, _ in others]
         for heights, theirs, rise in ((self.cover, wide, reach), (self.top, [m.top for m, _ in others], 0.0)):
-            sink(heights.copy(), lat.x0, lat.y0, lat.step, floor, turns, _stacked(theirs), frames, rise, heights)
+            sink(heights.copy(), lat.x0, lat.y0, lat.step, lowest - lat.step, turns, _stacked(theirs), frames, rise,
+                 heights)
         np.minimum(self.top, self.cover, out=self.top)
-        self._pooled, self._ceilings = _pooled(self.top), None
+        self._pooled, self._covered, self._ceilings = _pooled(self.top), _pooled(self.cover), None
 
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
@@ -214,29 +218,30 @@ class StockMap:
                       shell.levels, out)
         return out
 
-    def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8) -> F64:
+    def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8, *, least: float = -np.inf) -> F64:
         """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.
 
-        rim : lattice steps added to the radius looked at; -0.8 overlooks the walls a cutter touches, 0.7 sees
-              everything that may be there
+        rim   : lattice steps added to the radius looked at; -0.8 overlooks the walls a cutter touches, 0.7 sees
+                everything that may be there
+        least : mm, what less than that comes out as: who asks only for stock is told sooner with 0
         """
         out = np.empty(len(tips))
         lat = self.lattice
-        overlaps(self.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
-                 rim * lat.step, 0.0, out)
+        overlaps(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
+                 tool.corner_radius, rim * lat.step, 0.0, least, out)
         return out
 
-    def under_end(self, tips: F64, tool: ToolBody) -> F64:
+    def under_end(self, tips: F64, tool: ToolBody, *, least: float = -np.inf) -> F64:
         """(n,) float64, mm: the most that may stand under the end of the cutter at tips (n, 3), slivers included.
 
         The end is what cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its
-        radius. See ``cover``.
+        radius. See ``cover``; least as in ``overlap``.
         """
         reach = tool.radius - 0.5 * tool.corner_radius
         out, lat = np.empty(len(tips)), self.lattice
         half = HALF_DIAGONAL * lat.step
-        overlaps(self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
-                 reach + half - tool.radius, half, out)
+        overlaps(self.cover, self._covered, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
+                 tool.corner_radius, reach + half - tool.radius, half, least, out)
         return out
 
     def above(self, z: float) -> F64:
@@ -274,8 +279,10 @@ class StockMap:
         The cutting part touches nothing that the nodes show, and with its end takes no more than a skin of what
         may stand between them.
         """
-        air = self.overlap(tips, tool, SURE_RIM) <= AIR_TOLERANCE
-        return np.asarray(air & (self.under_end(tips, tool) <= SKIN * tool.diameter))
+        air = self.overlap(tips, tool, SURE_RIM, least=0.0) <= AIR_TOLERANCE
+        if air.any():
+            air[air] = self.under_end(tips[air], tool, least=0.0) <= SKIN * tool.diameter
+        return air
 
     @property
     def highest(self) -> float:

@@ -22,6 +22,13 @@ from toolpath.walked import Depths
 TOP = 4.0
 
 
+def stand(stock, beyond, height, before=np.inf):
+    """Let stock stand to a height between two places along X."""
+    x = stock.lattice.x0 + stock.lattice.step * np.arange(stock.lattice.nx)
+    top = np.where((x > beyond) & (x < before), height, stock.top)
+    stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
+
+
 def linker(body=None, top=TOP, post=False, step_down=1.0):
     """A plate 30 x 30 with its top at 0, stock up to ``top``, a post in the middle if asked for."""
     mesh = box_mesh([0, 0, -2], [30, 30, 0])
@@ -327,10 +334,8 @@ def test_a_shank_is_not_led_into_what_stands_beside_the_way_across():
     """Between two trenches 10 mm apart a rib of stock stands that the cutter gets over, and the shank does not."""
     body = replace(tool(2.0, 0.0, neck=3.0), shank_diameter=8.0)
     link = linker(body, top=0.5)
-    link.stock.top[:] = link.stock.cover[:] = -1.0
-    x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
-    link.stock.top[:, (x > 12.0) & (x < 13.0)] = link.stock.cover[:, (x > 12.0) & (x < 13.0)] = 5.0
-    link.stock._pooled[:] = 5.0
+    stand(link.stock, -np.inf, -1.0)
+    stand(link.stock, 12.0, 5.0, before=13.0)
     assert link.add(straight(2, 7, 10, 0.5)) and link.add(straight(18, 23, 10, 0.5))
     for t in link.trajectories:
         if t.motion is not Motion.RAPID:
@@ -342,8 +347,7 @@ def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     slow, fast = linker(top=-1.0), linker(top=-1.0)
     fast.pace = Pace(800, 3000, lambda depth, angle: 800, 1.0)
     for link in (slow, fast):
-        x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
-        link.stock.top[:, x > 15.0] = link.stock.cover[:, x > 15.0] = 1.5
+        stand(link.stock, 15.0, 1.5)
         assert link.add(straight(3, 27, 10, 1.0))
     ways = [[t for t in link.trajectories if t.motion in (Motion.CUT, Motion.CONNECT)] for link in (slow, fast)]
     assert [t.motion for t in ways[1]] == [Motion.CONNECT, Motion.CUT]
@@ -352,7 +356,8 @@ def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     begin = ways[1][1].points[0, 0]
     rim = math.sqrt(4.0 - 1.5**2)  # of the ball where stock 0.5 above its tip meets it
     assert fast.depths.were_cut(ways[0][0].points).all()  # it is known as it was asked for
-    first = x[x > 15.0][0]
+    lat = fast.stock.lattice
+    first = next(x for x in lat.x0 + lat.step * np.arange(lat.nx) if x > 15.0)
     assert first - rim - 2.0 * GUARD * 4.0 < begin <= first - rim - 0.75 * GUARD * 4.0
 
 
@@ -449,9 +454,7 @@ def test_what_was_walked_as_it_stands_is_not_walked_again_while_the_rest_is_in_t
     """Stock stands in the way of the shank over half of a line that is asked for round after round."""
     body = replace(ball(2.0, neck=3.0), shank_diameter=6.0)
     link = linker(body, top=-1.0)
-    x = link.stock.lattice.x0 + link.stock.lattice.step * np.arange(link.stock.lattice.nx)
-    link.stock.top[:, x > 18.0] = link.stock.cover[:, x > 18.0] = 8.0
-    link.stock._pooled[:] = 8.0
+    stand(link.stock, 18.0, 8.0)
     assert not link.add(straight(5, 25, 10, 1.0))
     passes, skipped = link.passes, len(link.skipped)
     assert passes == 1 and skipped

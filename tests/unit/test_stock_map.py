@@ -178,7 +178,7 @@ SLOT = np.array([[6.5, -3.0, 1.0], [6.5, 15.0, 1.0], [9.0, 15.0, 1.0], [9.0, -3.
 def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_the_truth():
     first, other, turn = leaning_maps(SLOT)
     whole = other.copied()
-    other.left_by([(first, turn.T)])
+    other.left_by([(first, turn.T)], -9.0)
     assert (other.cover <= whole.cover).all() and (other.top <= other.cover + 1e-12).all()
 
     def stands(points):  # in the frame of the part: the block without the slot
@@ -209,12 +209,61 @@ def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_th
 def test_nothing_is_lowered_by_a_whole_block_and_everything_by_one_that_is_gone():
     first, other, turn = leaning_maps(np.array([[50.0, 50.0, 9.0], [51.0, 50.0, 9.0]]))
     before = other.cover.copy()
-    other.left_by([])
+    other.left_by([], -9.0)
     np.testing.assert_array_equal(other.cover, before)
-    other.left_by([(first, turn.T)])
+    other.left_by([(first, turn.T)], -9.0)
     inner = np.s_[5:-5, 5:-5]
     stood = np.isfinite(before[inner])
     np.testing.assert_allclose(other.cover[inner][stood], before[inner][stood], atol=1.0)
     first.top[:], first.cover[:] = -np.inf, -np.inf
-    other.left_by([(first, turn.T)])
+    other.left_by([(first, turn.T)], -9.0)
     assert not np.isfinite(other.cover).any() and other.highest == -np.inf
+
+
+def test_what_stands_lower_than_the_part_along_one_axis_is_still_there_along_another():
+    """A corner of the block lies under the part, seen from the far side: those who came after took it for gone."""
+    lower, upper = np.array([-1.0, -1.0, -2.0]), np.array([13.0, 13.0, 6.0])
+    middle = box_mesh([5.0, 5.0, 0.0], [7.0, 7.0, 5.0])
+    above = StockMap.box(TriangleTree(middle), lower, upper, STEP)
+    maps, turns = [above], [np.eye(3)]
+    for axis in ([-0.6, -0.6, 0.5], [0.6, 0.6, 0.4]):
+        turn = access_rotation(np.array(axis) / np.linalg.norm(axis))
+        mesh = replace(middle, vertices=middle.vertices @ turn.T)
+        stock = StockMap.block(TriangleTree(mesh), np.array([lower, upper]), turn, STEP)
+        corners = np.array([[x, y, z] for x in (-1.0, 13.0) for y in (-1.0, 13.0) for z in (-2.0, 6.0)]) @ turn.T
+        stock.left_by([(m, t @ turn.T) for m, t in zip(maps, turns, strict=True)], corners[:, 2].min())
+        maps.append(stock)
+        turns.append(turn)
+    points = np.random.default_rng(3).uniform(lower, upper, (50_000, 3))
+    for stock, turn in zip(maps, turns, strict=True):
+        seen = points @ turn.T
+        assert (stock.cover[stock.lattice.cells(seen[:, :2])] >= seen[:, 2]).all()
+    lowest = float((middle.vertices @ turns[1].T)[:, 2].min())
+    assert ((points @ turns[1].T)[:, 2] < lowest - 1.0).sum() > 1000
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: b.kind)
+def test_how_far_stock_stands_above_a_cutter_is_that_of_every_node_in_the_disc(body):
+    """Squares of nodes are passed over by their highest, which is lowered as it is looked at and by no cut."""
+    stock = StockMap.around(TriangleTree(PART), PART.bounds, 1.0, STEP)
+    lat, rng = stock.lattice, np.random.default_rng(5)
+    at = np.stack(np.meshgrid(lat.x0 + STEP * np.arange(lat.nx), lat.y0 + STEP * np.arange(lat.ny)), axis=-1)
+    tips = rng.uniform([-4.0, -4.0, -1.0], [16.0, 16.0, 8.0], (400, 3))
+    for cut in (None, PATH, PATH - [0.0, 1.0, 0.3]):
+        if cut is not None:
+            stock.cut(cut, body)
+        for rim in (-0.8, 0.0, 0.7):
+            inner = max(body.radius + rim * STEP, 0.35 * body.radius)
+            slow = np.full(len(tips), -np.inf)
+            for k, (x, y, z) in enumerate(tips):
+                rho = np.hypot(at[..., 0] - x, at[..., 1] - y)
+                disc = rho <= inner
+                if disc.any():
+                    under = bottom(np.minimum(rho[disc], body.radius), body)
+                    slow[k] = (stock.top[disc] - z - under).max()
+            np.testing.assert_allclose(stock.overlap(tips, body, rim), slow, atol=1e-9)
+            np.testing.assert_allclose(stock.overlap(tips, body, rim, least=0.0), np.maximum(slow, 0.0), atol=1e-9)
+        held = stock.copied()
+        np.testing.assert_array_equal(stock.under_end(tips, body, least=0.0),
+                                      np.maximum(held.under_end(tips, body), 0.0))
+        assert (np.isfinite(slow) & (slow > 0.0)).sum() > 50 < (slow < 0.0).sum()

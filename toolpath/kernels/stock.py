@@ -54,35 +54,44 @@ def stamp(top, cover, x0, y0, step, points, radius, corner):
 
 
 @njit(cache=True, nogil=True)
-def overlap(top, x0, y0, step, tip, radius, corner, margin, half):
-    """How far the stock stands above the cutter's bottom at a tip (3,), mm: greatest over the disc; <= 0 is air.
+def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, half, least, out):
+    """How far the stock stands above the cutter's bottom at tips (n, 3), mm: greatest over the disc; <= 0 is air.
 
-    margin : mm added to the radius of the disc that is looked at. Below zero it leaves out the rim, where a node
-             cannot tell a wall the cutter touches from stock
-    half   : mm round a node that its height stands for: 0 for a point, half a diagonal for a cell
+    heights : (ny, nx) float64, of the stock at the nodes, or the most in the cells round them
+    pooled  : no lower than the highest of each square of ``side`` nodes a side; lowered to it where it is looked at
+    margin  : mm added to the radius of the disc that is looked at. Below zero it leaves out the rim, where a node
+              cannot tell a wall the cutter touches from stock
+    half    : mm round a node that its height stands for: 0 for a point, half a diagonal for a cell
+    least   : mm; what is less comes out as this, and squares that hold no more are not looked at
     """
-    ny, nx = top.shape
+    ny, nx = heights.shape
+    rows, cols = pooled.shape
     inner = max(radius + margin, 0.35 * radius)
     n_r = int(np.ceil(inner / step))
-    jc, ic = int(np.rint((tip[0] - x0) / step)), int(np.rint((tip[1] - y0) / step))
-    worst = -np.inf
-    for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
-        for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
-            if top[i, j] - tip[2] <= worst:  # the bottom is nowhere lower than the tip
-                continue
-            rho = np.sqrt((x0 + j * step - tip[0]) ** 2 + (y0 + i * step - tip[1]) ** 2)
-            if rho <= inner:
-                over = top[i, j] - tip[2] - _bottom(min(rho - half, radius), radius, corner)
-                if over > worst:
-                    worst = over
-    return worst
-
-
-@njit(cache=True, nogil=True)
-def overlaps(top, x0, y0, step, tips, radius, corner, margin, half, out):
-    """``overlap`` for tips (n, 3)."""
     for k in range(len(tips)):
-        out[k] = overlap(top, x0, y0, step, tips[k], radius, corner, margin, half)
+        x, y, z = tips[k]
+        jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+        i0, i1 = max(ic - n_r, 0), min(ic + n_r, ny - 1)
+        j0, j1 = max(jc - n_r, 0), min(jc + n_r, nx - 1)
+        worst = least
+        if i1 >= i0 and j1 >= j0:
+            for row in range(i0 // side, min(i1 // side, rows - 1) + 1):
+                for col in range(j0 // side, min(j1 // side, cols - 1) + 1):
+                    if pooled[row, col] - z <= worst:  # the bottom is nowhere lower than the tip
+                        continue
+                    highest = -np.inf
+                    for i in range(row * side, min((row + 1) * side, ny)):
+                        dy = y0 + i * step - y
+                        for j in range(col * side, min((col + 1) * side, nx)):
+                            h = heights[i, j]
+                            highest = max(highest, h)
+                            if h - z <= worst:
+                                continue
+                            rho = np.sqrt((x0 + j * step - x) ** 2 + dy * dy)
+                            if rho <= inner:
+                                worst = max(worst, h - z - _bottom(min(rho - half, radius), radius, corner))
+                    pooled[row, col] = highest
+        out[k] = worst
 
 
 @njit(cache=True, nogil=True)

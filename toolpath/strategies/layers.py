@@ -64,7 +64,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
         for lines in rings(field, z, active, start, side_step):
             kept: list[Line] = []
             for line in lines:
-                wanted = stock.overlap(line.points, tool) > STOCK_WORTH
+                wanted = stock.overlap(line.points, tool, least=0.0) > STOCK_WORTH
                 kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
             if kept:
                 yield kept
@@ -88,7 +88,7 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
         skip = np.zeros_like(skip)
     out: list[Line] = []
     for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~skip, tolerance):
-        seen = stock.overlap(line.points, tool, SURE_RIM if unseen else 0.0) > STOCK_WORTH
+        seen = stock.overlap(line.points, tool, SURE_RIM if unseen else 0.0, least=0.0) > STOCK_WORTH
         wanted = seen & ~skip[lat.cells(line.points[:, :2])]
         out.extend(pieces_where(line, wanted, 0.5 * tool.radius, 2.0 * tool.radius))
     return out
