@@ -37,7 +37,9 @@ log = structlog.get_logger(__name__)
 
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
 READY_EVERY_S = 1.0
-MERCY_S = 3600.0
+MERCY_S = 1e9  # no lease counts as run out
+STEP_S = 1.0  # how far the clock has to jump to have been set
+SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 5.0, 10.0
 
 
 class Engine:
@@ -60,10 +62,13 @@ class Engine:
         self._lock: IO[str] | None = None
         self._courier: Courier | None = None
         self._client: Any = None
+        self._loop: Any = None
         self._cluster: Any = None
         self._thread: threading.Thread | None = None
         self._futures: dict[str, Any] = {}
         self._stumbled = -math.inf
+        self._clock = time.time() - time.monotonic()
+        self._slots, self._slots_at = 0, -math.inf
         self._ready: dict[str, str] = {}
         self._ready_at, self._ready_lock = -math.inf, threading.Lock()
 
@@ -89,7 +94,8 @@ class Engine:
             self.artifacts.sweep()
             if left := self.jobs.release():
                 log.info("jobs of an earlier run taken up again", jobs=left)
-        self._open_client()
+        if embedded:
+            self._look()
         self._thread = threading.Thread(target=self._dispatch, name="dispatcher", daemon=True)
         self._thread.start()
         if self.settings.webhooks_on:
@@ -116,6 +122,8 @@ class Engine:
         for part in (self._client, self._cluster):
             if part is not None:
                 part.close(timeout=10)
+        if self._loop is not None:
+            self._loop.stop(timeout=5)
         if self._lock is not None:
             self._lock.close()
         log.info("engine closed")
@@ -182,8 +190,8 @@ class Engine:
             return dict(self._ready)
 
     def capacity(self) -> int:
-        """Jobs that can run at a time."""
-        return sum(self._client.nthreads().values()) if self._client is not None else 0
+        """Jobs that can run at a time, as the dispatcher last saw; 0 when it has not seen the scheduler for a while."""
+        return self._slots if time.monotonic() - self._slots_at < SLOTS_KNOWN_S else 0
 
     def _check_engine(self) -> None:
         if self._stop.is_set() or self._thread is None or not self._thread.is_alive():
@@ -214,14 +222,26 @@ class Engine:
                              remedy="stop it, or give this one its own --data") from None
 
     def _open_client(self) -> None:
+        """Connect to the scheduler, or start the embedded cluster.
+
+        Raises
+        ------
+        OSError
+            The scheduler does not answer.
+        """
         import dask
 
         # Before the import: distributed sets up its own logging by this key when it is imported.
         dask.config.set({"distributed.scheduler.allowed-failures": 2, "logging": {"distributed": "error"}})
         from distributed import Client, LocalCluster
+        from distributed.utils import LoopRunner
 
         if self.settings.scheduler is not None:
-            self._client = Client(self.settings.scheduler, set_as_default=False)
+            if self._loop is None:  # one for all clients: each that got no answer would leave the thread of its own
+                self._loop = LoopRunner()
+                self._loop.start()
+            self._client = Client(self.settings.scheduler, set_as_default=False, timeout=SCHEDULER_WAIT_S,
+                                  loop=self._loop.loop)
             return
         # Both dashboard addresses: without them Dask listens on 0.0.0.0.
         self._cluster = LocalCluster(processes=False, n_workers=1, threads_per_worker=self.settings.workers,
@@ -229,14 +249,38 @@ class Engine:
                                      worker_dashboard_address="127.0.0.1:0")
         self._client = Client(self._cluster, set_as_default=False)
 
+    def _look(self) -> int:
+        """Ask the scheduler how many jobs can run at a time.
+
+        A client that lost its scheduler gives up for good after a while, so one that gets no answer is thrown away and
+        the next look makes another. What its tasks do they write into the database themselves.
+        """
+        try:
+            if self._client is None:
+                self._open_client()
+            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=SCHEDULER_WAIT_S)
+        except Exception:
+            self._slots = 0
+            if self.settings.scheduler is not None:
+                self._drop_client()
+            raise
+        self._slots, self._slots_at = sum(found.values()), time.monotonic()
+        return self._slots
+
+    def _drop_client(self) -> None:
+        client, self._client = self._client, None
+        self._futures.clear()
+        if client is not None:
+            threading.Thread(target=_close_quietly, args=(client,), name="closer", daemon=True).start()
+
     def _dispatch(self) -> None:
         while not self._stop.is_set():
             try:
                 self._reap()
-                self.jobs.give_up(self.settings.max_attempts, self._mercy_s())
+                self.jobs.give_up(self.settings.max_attempts, self.settings.lease_s, self._mercy_s())
                 self.jobs.miss_deadlines()
                 check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
-                while self.jobs.running() < self.capacity() and self._submit():
+                while self._look() > self._running() and self._submit():
                     pass
             except UnavailableError as error:
                 log.warning("nothing is started", reason=error.message)
@@ -248,12 +292,23 @@ class Engine:
             self._wake.clear()
 
     def _mercy_s(self) -> float:
-        """Holders could not renew while the database was away: for one lease after that theirs count for longer."""
-        away = time.monotonic() - self._stumbled < self.settings.lease_s
-        return MERCY_S if away else 0.0
+        """For how long leases that have run out still count, s.
+
+        Holders could not renew while the database was away, and leases are times of the day: for one lease after it
+        came back, and after the clock was set, none counts as run out, so that holders that live can renew.
+        """
+        clock = time.time() - time.monotonic()
+        if abs(clock - self._clock) > STEP_S:
+            log.warning("the clock was set", by_s=round(clock - self._clock, 1))
+            self._clock, self._stumbled = clock, time.monotonic()
+        return MERCY_S if time.monotonic() - self._stumbled < self.settings.lease_s else 0.0
+
+    def _running(self) -> int:
+        return self.jobs.running(self.settings.lease_s, self._mercy_s())
 
     def _submit(self) -> bool:
-        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts, self._mercy_s())
+        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts, self._mercy_s(),
+                              self._slots)
         if row is None:
             return False
         key = f"{row['id']}-{row['attempt']}"
@@ -277,6 +332,13 @@ class Engine:
             log.error("task lost", job=job_id, attempt=attempt, error=str(future.exception()))
             if self.jobs.take_over(job_id, int(attempt), self.owner, self.settings.lease_s):
                 self.jobs.finish(job_id, self.owner, "failed", error=error)
+
+
+def _close_quietly(client: Any) -> None:
+    try:
+        client.close(timeout=10)
+    except Exception as error:
+        log.info("a client of the scheduler did not close in order", error=type(error).__name__)
 
 
 def _outcome(name: str, check: Callable[[], Any], otherwise: str) -> str:

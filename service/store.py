@@ -23,6 +23,9 @@ from schemas.jobs import FINAL_STATES
 from service.db import jobs, labels
 from service.errors import KeyConflictError, NotFoundError, RateError
 
+FAR_LEASES = 10  # no holder asks for so many at once
+CLAIM_LOCK = 0x7A6F6E66  # a number of our own among PostgreSQL's advisory locks
+
 
 @dataclass(frozen=True)
 class NewJob:
@@ -205,20 +208,26 @@ class JobStore:
         with self.engine.connect() as c:
             return list(c.execute(query).mappings())
 
-    def claim(self, owner: str, lease_s: float, max_attempts: int, mercy_s: float = 0.0) -> RowMapping | None:
+    def claim(self, owner: str, lease_s: float, max_attempts: int, mercy_s: float = 0.0,
+              slots: int | None = None) -> RowMapping | None:
         """Take the oldest job that waits, or whose holder went silent; None when there is none.
 
         mercy_s : how long a lease must have run out, s: while the database was away nobody could renew his
+        slots : none is taken when so many run already; services that claim at the same time wait for each other, for a
+            job that was taken and finds no worker would lose an attempt
         """
         now = time.time()
-        expired = sa.and_(jobs.c.state == "running", jobs.c.lease_until < now - mercy_s)
+        expired = sa.and_(jobs.c.state == "running", _silent(now, lease_s, mercy_s))
         oldest = (sa.select(jobs.c.id).where(sa.or_(jobs.c.state == "queued", expired), jobs.c.attempt < max_attempts)
                   .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
-        change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired))
+        room = sa.true() if slots is None else _count_running(now, lease_s, mercy_s).scalar_subquery() < slots
+        change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired), room)
                   .values(state="running", stage="starting", progress=0.0, attempt=jobs.c.attempt + 1,
                           event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s, started=now)
                   .returning(jobs))
         with self.engine.begin() as c:
+            if slots is not None and c.dialect.name == "postgresql":
+                c.execute(sa.select(sa.func.pg_advisory_xact_lock(CLAIM_LOCK)))
             return c.execute(change).mappings().one_or_none()
 
     def take_over(self, job_id: str, attempt: int, owner: str, lease_s: float) -> bool:
@@ -287,12 +296,12 @@ class JobStore:
                 state="failed", stage="failed", finished=now, error_json=json.dumps(error.as_dict()),
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
-    def give_up(self, max_attempts: int, mercy_s: float = 0.0) -> int:
-        """Fail the jobs whose holder went silent in their last attempt; mercy_s as for ``claim``."""
+    def give_up(self, max_attempts: int, lease_s: float, mercy_s: float = 0.0) -> int:
+        """Fail the jobs whose holder went silent in their last attempt; lease_s and mercy_s as for ``claim``."""
         error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
                               code="attempts_exhausted", measured=max_attempts, limit=max_attempts,
                               remedy="look into the log of the service; the job may need more memory than there is")
-        gone = sa.and_(jobs.c.state == "running", jobs.c.lease_until < time.time() - mercy_s,
+        gone = sa.and_(jobs.c.state == "running", _silent(time.time(), lease_s, mercy_s),
                        jobs.c.attempt >= max_attempts)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(gone).values(
@@ -340,11 +349,10 @@ class JobStore:
         with self.engine.connect() as c:
             return {state: count for state, count in c.execute(query.group_by(jobs.c.webhook_state))}
 
-    def running(self) -> int:
-        """How many jobs run under a lease that has not run out."""
-        query = sa.select(sa.func.count()).where(jobs.c.state == "running", jobs.c.lease_until >= time.time())
+    def running(self, lease_s: float = 1e9, mercy_s: float = 0.0) -> int:
+        """How many jobs run under a lease that has not run out; lease_s and mercy_s as for ``claim``."""
         with self.engine.connect() as c:
-            return int(c.execute(query).scalar_one())
+            return int(c.execute(_count_running(time.time(), lease_s, mercy_s)).scalar_one())
 
     def counts(self) -> dict[str, int]:
         """Number of jobs by state."""
@@ -359,6 +367,16 @@ class JobStore:
     def _change(self, where: sa.ColumnElement[bool], **values: Any) -> bool:
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(where).values(**values)).rowcount == 1
+
+
+def _silent(now: float, lease_s: float, mercy_s: float) -> sa.ColumnElement[bool]:
+    """Whether the holder went silent: the lease has run out, or ends so far ahead that the clock was set back since."""
+    return sa.or_(jobs.c.lease_until < now - mercy_s, jobs.c.lease_until > now + FAR_LEASES * lease_s + mercy_s)
+
+
+def _count_running(now: float, lease_s: float, mercy_s: float) -> sa.Select[Any]:
+    return sa.select(sa.func.count()).select_from(jobs).where(jobs.c.state == "running",
+                                                              sa.not_(_silent(now, lease_s, mercy_s)))
 
 
 def _ended() -> sa.ColumnElement[bool]:

@@ -107,6 +107,14 @@ def test_keys_room_and_deadlines(store):
             store.get(job_id)
 
 
+def test_services_that_claim_at_the_same_time_take_no_more_than_there_are_slots(store):
+    for k in range(12):
+        store.create(new(key=f"k{k}"))
+    for wanted in (2, 4, 6):
+        together(lambda owner, slots=wanted: store.claim(owner, 30, 3, slots=slots), *"abcdefgh")
+        assert store.running(30) == wanted
+
+
 def test_the_library_and_the_keys(url):
     library, keys = LibraryStore(connect(url)), KeyStore(connect(url))
     versions = []

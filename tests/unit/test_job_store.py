@@ -172,16 +172,33 @@ def test_an_expired_lease_is_claimed_again_until_attempts_run_out(store):
     for attempt in (1, 2, 3):
         assert store.claim("o", -1.0, 3)["attempt"] == attempt
     assert store.claim("o", 30, 3) is None
-    assert store.give_up(3) == 1
+    assert store.give_up(3, 30) == 1
     assert store.get(job)["state"] == "failed" and "attempts_exhausted" in store.get(job)["error_json"]
 
 
 def test_a_lease_that_ran_out_while_nobody_could_renew_it_counts_for_longer(store):
     job = store.create(new())[0]["id"]
     store.claim("first", -1.0, 3)
-    assert store.claim("second", 30, 3, mercy_s=60) is None and store.give_up(1, mercy_s=60) == 0
+    assert store.claim("second", 30, 3, mercy_s=60) is None and store.give_up(1, 30, mercy_s=60) == 0
     assert store.renew(job, "first", 30) and store.claim("second", 30, 3) is None
     assert store.renew(job, "first", -61) and store.claim("second", 30, 3, mercy_s=60)["attempt"] == 2
+
+
+def test_a_lease_that_ends_far_ahead_was_given_before_the_clock_was_set_back(store, monkeypatch):
+    job = store.create(new())[0]["id"]
+    true = time.time
+    monkeypatch.setattr(time, "time", lambda: true() + 3600)
+    assert store.claim("dead", 30, 3)["id"] == job
+    monkeypatch.setattr(time, "time", true)
+    assert store.claim("other", 30, 3, mercy_s=1e9) is None  # who lives can renew meanwhile
+    assert store.running(30) == 0 and store.running(30, 1e9) == 1
+    assert store.claim("other", 30, 3)["attempt"] == 2
+
+
+def test_no_more_are_claimed_than_there_are_slots(store):
+    ids = [store.create(new(key=f"k{k}"))[0]["id"] for k in range(3)]
+    assert [store.claim("o", 30, 3, slots=2) is not None for _ in range(3)] == [True, True, False]
+    assert store.finish(ids[0], "o", "proved") and store.claim("o", 30, 3, slots=2)["id"] == ids[2]
 
 
 def test_who_lost_the_job_can_no_longer_write(store):

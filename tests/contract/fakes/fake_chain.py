@@ -8,6 +8,8 @@ import time
 
 import geometry.errors as errors
 
+NAPS = {"sleep": 400, "nap": 40, "short nap": 15}  # twentieths of a second
+
 
 def _report(setup, state, findings):
     files = [{"name": "program.linuxcnc.ngc", "kind": "nc", "access": "A1", "dialect": "linuxcnc", "sha256": "0" * 64}]
@@ -21,8 +23,8 @@ def _report(setup, state, findings):
 
 
 def _misbehave(what, progress):
-    if what in ("sleep", "nap"):
-        steps = 400 if what == "sleep" else 40
+    if what in NAPS:
+        steps = NAPS[what]
         for i in range(steps):
             progress("asleep", i / steps)
             time.sleep(0.05)
