@@ -1,10 +1,11 @@
 """How long a whole LinuxCNC controller takes for programs, and how long the proof says it does.
 
-Run from the root of the checkout: ``python benchmarks/machining_time.py [PROGRAM ...] [--override N] [--kins KINS]``.
-Programs run on ``shared/tools/linuxcnc_run.sh`` beside the checkout in real time, feeds N times as fast; without any
-PROGRAM the patterns below do, a minute together. Ours is ``verify.duration`` with what that controller does: 500 mm/s,
-5000 mm/s² and 360 deg/s. What it takes for a program that hardly moves is taken off its time; the time it takes to
-change tools stays.
+Run from the root of the checkout: ``python benchmarks/machining_time.py [PROGRAM ...] [--jobs] [--override N]
+[--kins KINS]``. Programs run on ``shared/tools/linuxcnc_run.sh`` beside the checkout in real time, feeds N times as
+fast; without any PROGRAM the patterns below do, a minute together. ``--jobs`` plans and proves three whole jobs of
+small parts from a box, on three axes, 3+2 and five, and runs their programs, ten minutes each at N = 1. Ours is
+``verify.duration`` with what that controller does: 500 mm/s, 5000 mm/s² and 360 deg/s. What it takes for a program that
+hardly moves is taken off its time; the time it takes to change tools stays.
 """
 
 from __future__ import annotations
@@ -55,6 +56,22 @@ def patterns() -> dict[str, str]:
     return {name: f"{BEGIN}{lines}\nM2\n%\n" for name, lines in made.items()}
 
 
+def jobs(folder: Path) -> dict[str, str]:
+    """Programs of three whole jobs, by name."""
+    from benchmarks.stepnc_family import MACHINES, small
+    from service import chain
+    from service.convert import parse_setup
+
+    made = {}
+    for seed, machine in enumerate(MACHINES):
+        part, setup = small(seed, folder)
+        setup |= {"stock": {"kind": "box", "margin_mm": 0.6, "uncertainty_mm": 0.2}, "machine": MACHINES[machine]}
+        report = chain.plan(part, parse_setup(setup), folder / machine, lambda _stage, _share: None)
+        (program,) = (folder / machine).glob("program*.ngc")
+        made[f"small:{seed} on {machine}, {len(report['steps'])} steps"] = program.read_text()
+    return made
+
+
 def on_the_controller(text: str, override: float, kins: str) -> float:
     """Seconds from the start to the end; ends this process with code 2 where the controller does not run it."""
     with tempfile.TemporaryDirectory() as scratch:
@@ -86,6 +103,7 @@ def main() -> None:
     """Print a row a program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("programs", nargs="*", type=Path)
+    parser.add_argument("--jobs", action="store_true")
     parser.add_argument("--override", type=float, default=1.0)
     parser.add_argument("--kins", choices=("xyzac", "xyzbc"), default="xyzac")
     args = parser.parse_args()
@@ -94,6 +112,9 @@ def main() -> None:
         sys.exit(2)
     made = patterns()
     start = on_the_controller(made.pop("nothing"), args.override, args.kins)
+    if args.jobs:
+        with tempfile.TemporaryDirectory() as folder:
+            made = jobs(Path(folder))
     print("| program | at its feeds s | ours s | controller s | ours off |\n|---|---|---|---|---|", flush=True)
     for name, text in ({str(p): p.read_text() for p in args.programs} or made).items():
         took = on_the_controller(text, args.override, args.kins) - start

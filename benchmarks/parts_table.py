@@ -45,18 +45,28 @@ class Job:
 
 
 class Stages:
-    """Seconds by stage, from the progress of the chain."""
+    """Seconds by stage, from the progress of the chain: by the clock, and of the processors.
+
+    The latter counts every thread and what other processes have been waited for; on a machine that does other work as
+    well it is the one to compare.
+    """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self._stage, self._since = "", time.perf_counter()
+        self.busy: dict[str, float] = {}
+        self._stage, self._since, self._used = "", time.perf_counter(), _processor_seconds()
 
     def __call__(self, stage: str, _fraction: float) -> None:
         if stage != self._stage:
-            now = time.perf_counter()
+            now, used = time.perf_counter(), _processor_seconds()
             if self._stage:
                 self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
-            self._stage, self._since = stage, now
+                self.busy[self._stage] = self.busy.get(self._stage, 0.0) + used - self._used
+            self._stage, self._since, self._used = stage, now, used
+
+
+def _processor_seconds() -> float:
+    return sum(os.times()[:4])
 
 
 def family_job(name: str, folder: Path) -> Job:

@@ -26,6 +26,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
@@ -76,7 +78,8 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
         "seconds": report["machining_time_s"], "time": report["time"],
         "cut_mm": report["proof"]["cutting_length_mm"],
         "engaged": [max((e[k] for e in engaged), default=0.0) for k in ("max", "p99")],
-        "steps": len(report["steps"]), "stages": {k: round(v, 1) for k, v in stages.seconds.items()}}
+        "steps": len(report["steps"]), "stages": {k: round(v, 1) for k, v in stages.seconds.items()},
+        "processor": {k: round(v, 1) for k, v in stages.busy.items()}}
 
 
 def run(part: str, axes: str, plan: str, limit: float | None, spacing: float | None) -> dict[str, Any]:
@@ -125,6 +128,26 @@ def table(rows: list[dict[str, Any]]) -> None:
                   f"{1 - now['time']['in_air_s'] / was['time']['in_air_s']:+.1%} saved\n")
 
 
+def growth(rows: list[dict[str, Any]]) -> None:
+    """How processor seconds of our plans grow with faces and with metres of cutting: exponents over jobs."""
+    newest = {(r["part"], r["axes"]): r for r in rows if r["plan"] == "ours" and r["state"] != "error"
+              and r.get("spacing") is None and "processor" in r}
+    if len(newest) < 3:
+        return
+    names = [*dict.fromkeys(k for r in newest.values() for k in r["processor"]), "all"]
+    print(f"\nExponents of processor seconds over {len(newest)} jobs, and what they miss at most:\n\n"
+          "| stage | seconds | with faces | with metres of cutting |\n|---|---|---|---|")
+    for name in names:
+        took = np.array([sum(r["processor"].values()) if name == "all" else r["processor"].get(name, 0.0)
+                         for r in newest.values()])
+        line = [f"{took.min():.1f} to {took.max():.1f}"]
+        for size in ("faces", "cut_mm"):
+            x, y = np.log([r[size] for r in newest.values()]), np.log(np.maximum(took, 0.1))
+            fit = np.polynomial.Polynomial.fit(x, y, 1).convert().coef
+            line.append(f"{fit[1]:.2f} (times {np.exp(np.abs(y - fit[0] - fit[1] * x).max()):.1f})")
+        print(f"| {name} | {' | '.join(line)} |")
+
+
 def main() -> None:
     """Run what is asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -149,7 +172,9 @@ def main() -> None:
             out.write(json.dumps(row) + "\n")
         print(f"{part}/{axes} {args.plan}: {row['state']} {row['wall']} s", flush=True)
     if kept.exists():
-        table([json.loads(line) for line in kept.read_text().splitlines()])
+        known = [json.loads(line) for line in kept.read_text().splitlines()]
+        table(known)
+        growth(known)
 
 
 if __name__ == "__main__":
