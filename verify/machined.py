@@ -1,12 +1,15 @@
-"""The machined part as a field of distances, from program texts: how it looks, and how much of it there is."""
+"""The machined part as a field of distances, from program texts: how it looks, how much there is, how it came about."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import InputError
 from geometry.mesh import F64
@@ -14,16 +17,105 @@ from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.arcs import CHORD
 from verify.blank import stock_bounds
-from verify.field import Field
+from verify.duration import minutes_of
+from verify.field import Field, run_field, stock_field
 from verify.material import machined
-from verify.model import ProofSetup
+from verify.model import ProofSetup, StockKind
 from verify.progress import Stages
 from verify.removal import BOW
-from verify.sequence import Given, check_numbers, moves_of, read_all
+from verify.sequence import Given, Reading, check_numbers, moves_of, read_all
 
 LEAST_STEP = 0.002
 MOST_STEP = 5.0
 READ = 0.1  # share of the work done when the programs are read
+LEVELS = 127  # of a distance as a whole number: the band, either way
+
+
+@dataclass(frozen=True, eq=False)
+class StockInTime:
+    """A field of stock on its way from the blank to what is left, in whole numbers of a 127th of the band.
+
+    origin, step : of ``Field``, mm
+    first  : (nx, ny, nz) int8, the blank; above zero where stock stands
+    part   : (nx, ny, nz) int8, the part on the same nodes
+    ended  : (k,) float64, s from the start of the job, at which each stretch of it ends
+    begins : (k + 1,) int64, where the changes of each stretch begin
+    node, value : (n,) int64 and int8, nodes of ``first.ravel()`` that a stretch lowered, and to what
+    """
+
+    origin: F64
+    step: float
+    first: NDArray[np.int8]
+    part: NDArray[np.int8]
+    ended: F64
+    begins: NDArray[np.int64]
+    node: NDArray[np.int64]
+    value: NDArray[np.int8]
+
+    def after(self, stretches: int) -> Field:
+        """The stock after so many stretches, 0 for the blank."""
+        values = self.first.ravel().copy()
+        upto = self.begins[stretches]
+        values[self.node[:upto]] = self.value[:upto]  # the last of several counts
+        return Field(self.origin, self.step, values.reshape(self.first.shape) * np.float32(self.step / LEVELS))
+
+
+def stock_in_time(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, *,
+                  stretches: int, nodes: int, threads: int | None = None) -> StockInTime:
+    """The stock from the blank on, stretch by stretch of the programs, to be looked at.
+
+    read     : the programs, as ``verify.sequence.read_all`` reads them; part, tools, setup : as it took them
+    stretches : most there are; each has as much of the time and of the moves together as any other
+    nodes    : about how many the grid has
+    threads  : as ``machined_stock``
+
+    Raises
+    ------
+    VerificationError
+        As ``verify.prove.prove``.
+
+    Notes
+    -----
+    The last field is that of ``machined_stock`` with the same step, but for whole numbers, half a 127th of a step.
+    """
+    threads = threads or min(2, os.cpu_count() or 1)
+    box = stock_bounds(part.mesh.bounds, setup)
+    step = float(np.cbrt(np.prod(box[1] - box[0]) / nodes))
+    for _ in range(4):
+        step = float(np.cbrt(np.prod(box[1] - box[0] + 4.5 * step) / nodes))
+    field = stock_field(part.mesh, setup, step, threads=threads)
+    alone = replace(setup, stock_kind=StockKind.PART_OFFSET, margin=0.0, uncertainty=0.0)
+    solid = stock_field(part.mesh, alone, step, box=box, threads=threads)
+    moves, _ = moves_of(read, tools)
+    number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
+    took = np.concatenate([np.zeros(0), *(60.0 * minutes_of(r.program, r.setup) for r in read)])
+    clock = np.cumsum(took)[np.isin(number, [t.number for t in tools])]
+    ends = _stretches(clock, stretches)
+    now = first = _levels(field)
+    node, value = [np.zeros(0, np.int64)], [np.zeros(0, np.int8)]
+    for a, b in pairwise([0, *ends]):
+        chosen = moves.feed.copy()
+        chosen[:a] = chosen[b:] = False
+        run_field(field, moves.only(chosen), tools, setup, bare=True, threads=threads)
+        before, now = now, _levels(field)
+        node.append(np.flatnonzero(now != before))
+        value.append(now.ravel()[node[-1]])
+    return StockInTime(field.origin, field.step, first, _levels(solid), clock[np.array(ends, np.int64) - 1],
+                       np.cumsum([len(x) for x in node]), np.concatenate(node), np.concatenate(value))
+
+
+def _levels(field: Field) -> NDArray[np.int8]:
+    return np.rint(field.values * (LEVELS / field.band)).astype(np.int8)
+
+
+def _stretches(clock: F64, most: int) -> list[int]:
+    """Where stretches of moves end; ``clock`` (m,) float64 is the time at which each move does."""
+    count = len(clock)
+    if not count:
+        return []
+    done = 0.5 * clock / max(float(clock[-1]), 1e-9) + 0.5 * np.arange(1, count + 1) / count
+    ends = np.searchsorted(done, np.arange(1, most) / most)
+    return sorted({*(int(e) for e in ends if e > 0), count})
 
 
 def machined_stock(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
