@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,7 +35,7 @@ ADDRESS_ROOM = 4e9
 
 
 def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, memory_limit: float,
-                what: str = "reader") -> bytes:
+                what: str = "reader", stop: threading.Event | None = None) -> bytes:
     """Run a command, feed it a request on stdin, and return what it left in its result file.
 
     command      : arguments; the child finds the name of its result file in ``ZONEMILL_CHILD_RESULT``
@@ -42,6 +43,7 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
     time_limit   : float, s of wall time
     memory_limit : float, bytes resident in the child and its descendants together
     what         : first word of the error codes
+    stop         : once set, the child is ended as if its time were over
 
     Returns bytes the child wrote before it exited with 0.
     Raises the typed error the child described (exit code 3), or ResourceError with code ``<what>_timeout``,
@@ -59,7 +61,7 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
             child = subprocess.Popen(list(command), stdin=stdin, stdout=out, stderr=subprocess.STDOUT,
                                      start_new_session=True, env=environment)
             try:
-                _watch(child, time_limit, memory_limit, what)
+                _watch(child, time_limit, memory_limit, what, stop)
             finally:
                 _kill_group(child)
         return _outcome(child.returncode, result, log, memory_limit, what)
@@ -77,7 +79,8 @@ def guard_child() -> Path:
     return Path(os.environ[RESULT_VARIABLE])
 
 
-def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, what: str) -> None:
+def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, what: str,
+           stop: threading.Event | None) -> None:
     deadline = time.monotonic() + time_limit
     handle = psutil.Process(child.pid)
     while True:
@@ -89,7 +92,7 @@ def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: floa
         used = _resident(handle)
         if used > memory_limit:
             raise _memory_error(what, used, memory_limit)
-        if time.monotonic() > deadline:
+        if time.monotonic() > deadline or (stop is not None and stop.is_set()):
             raise ResourceError(f"the {what} did not finish within {time_limit:g} s and was stopped",
                                 code=f"{what}_timeout", measured=time_limit, limit=time_limit,
                                 remedy="simplify the part, ask for a coarser chord, or raise the time limit")

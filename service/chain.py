@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import takewhile
@@ -45,11 +46,11 @@ from service.programs import (
     proof_frame,
     turning_of,
 )
-from service.scoring import score
+from service.scoring import Score, score
 from service.sheet import sheet_files
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
 from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
-from service.stepnc import stepnc_files
+from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces
 from service.viewdata import plan_view, verification_view
 from toolpath.deflection import effective_diameter
@@ -103,14 +104,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
     cautions = [*limited(setup), *thin_walls(ready)]
     ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
-    trimmed: Mapping[str, Sequence[Faces]] = {}
-    if setup.operations.finishing:
-        try:
-            trimmed = trimmed_faces(part_path, ready)
-        except CamError as refusal:  # the part itself is read, and other strategies do without
-            warning = f"no passes along the borders of faces: {refusal.message}"
-            ready = replace(ready, warnings=(*ready.warnings, warning))
-    scored = score(ready)
+    ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
     checks = scored.checks(ready)
     first, look = ready.views[0], proof_frame(ready)
     dense = look.into(scored.samples, first)
@@ -141,31 +135,45 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
-    report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
-                                        given_up, cautions)
-    progress("report", PROVED)
-    files: Files = {}
-    if report["state"] == "proved":
-        for p in written:
-            files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
-    files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-    _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
-    files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
-    _deviation(ready, look, dense, proof, report, out / MAP_NAME)
-    files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
-    if mesh is not None and programs:
-        figures, data = machined_part(mesh, programs, look.part, tool_bodies(setup), proof_setup(ready, look),
-                                      lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
-        report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
-        files[MESH_NAME] = ("machined", "", None, data)
-    if report["state"] == "proved":
-        files.update(stepnc_files(written, look.part, tool_bodies(setup), proof_setup(ready, look), out))
+    clean = written if proof.clean else []
+    with stepnc_under_way(clean, look.part, tool_bodies(setup), proof_setup(ready, look), out) as stepnc:
+        report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
+                                            given_up, cautions)
+        progress("report", PROVED)
+        files: Files = {}
+        if report["state"] == "proved":
+            for p in written:
+                files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
+        files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
+        _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
+        files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
+        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
+        files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
+        if mesh is not None and programs:
+            figures, data = machined_part(mesh, programs, look.part, tool_bodies(setup), proof_setup(ready, look),
+                                          lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
+            report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
+            files[MESH_NAME] = ("machined", "", None, data)
+        page = plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look), report)
+        if report["state"] == "proved":
+            files.update(stepnc())
     files.update(sheet_files(ready, written, report, files))
-    files.update(plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look),
-                           report))
+    files.update(page)
     deliver(out, report, files)
     progress("done", 1.0)
     return report
+
+
+def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
+    """The exact faces, which another process reads meanwhile, and the samples of the proof."""
+    with ThreadPoolExecutor(1) as pool:
+        faces = pool.submit(trimmed_faces, part_path, ready) if ready.setup.operations.finishing else None
+        scored = score(ready)
+    try:
+        return ready, faces.result() if faces is not None else {}, scored
+    except CamError as refusal:  # the part itself is read, and other strategies do without
+        warning = f"no passes along the borders of faces: {refusal.message}"
+        return replace(ready, warnings=(*ready.warnings, warning)), {}, scored
 
 
 def _carried(ready: Prepared, look: Look, written: Sequence[Program]) -> list[str]:

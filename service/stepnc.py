@@ -1,12 +1,24 @@
-"""STEP-NC of a proved job: written, read back and held against the program before any of it counts."""
+"""STEP-NC of a proved job: written, read back and held against the program before any of it counts.
+
+That takes a few times as long as the rest of a report, so for long programs it goes on in a process of its own while
+the rest is made (``stepnc_under_way``).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import json
+import os
+import pickle
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
-from geometry.errors import InputError, InternalError
+from geometry.child import run_limited
+from geometry.errors import InputError, InternalError, ResourceError
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from output.model import Workplan
@@ -22,6 +34,54 @@ Stream = Callable[[Workplan, Callable[[str], object]], None]
 FORMS: tuple[tuple[str, str, Stream], ...] = (
     ("stepnc", "stpnc", stream_stepnc_aim), ("stepnc-arm", "arm.stpnc", stream_stepnc_arm))
 """Kind and ending of the files of both forms, and what writes them."""
+LONG = 1_000_000  # characters of programs from which on another process is worth the seconds it takes to start
+TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
+
+
+@contextmanager
+def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+                     out: Path) -> Iterator[Callable[[], Files]]:
+    """``stepnc_files`` going on while something else is done: gives what waits for them.
+
+    Short programs are begun only then. Where the other process cannot do it, for want of memory or time, this one does.
+    If nobody waited, nothing of them stays.
+    """
+    job = (programs, part, tools, setup, out)
+    if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
+        yield partial(stepnc_files, *job)
+        return
+    stop, taken = threading.Event(), False
+
+    def wait() -> Files:
+        nonlocal taken
+        try:
+            files = _named(begun)
+        except ResourceError:
+            files = stepnc_files(*job)
+        taken = True
+        return files
+
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            begun = pool.submit(run_limited, [sys.executable, "-m", "service.stepnc_child"], pickle.dumps(job),
+                                time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, what="stepnc", stop=stop)
+            try:
+                yield wait
+            finally:
+                stop.set()
+    finally:
+        if not taken:
+            for place in (_beside(out, p.file_name("job", ending)) for p in programs for _, ending, _ in FORMS):
+                place.unlink(missing_ok=True)
+
+
+def _named(begun: Future[bytes]) -> Files:
+    """The files a child says it has written."""
+    return {name: (kind, "", None, Path(place)) for name, (kind, place) in json.loads(begun.result()).items()}
+
+
+def _beside(out: Path, name: str) -> Path:
+    return out / f"{name}.part"
 
 
 def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -44,7 +104,7 @@ def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBo
             (proved,) = read_all([program.given()], part, tools, setup, 0, _silent)
             for kind, ending, stream in FORMS:
                 name = program.file_name("job", ending)
-                path = out / f"{name}.part"
+                path = _beside(out, name)
                 files[name] = kind, "", None, path
                 with open(path, "w", encoding="ascii", newline="\n") as file:
                     stream(program.work, file.write)
@@ -71,4 +131,4 @@ def _silent(_share: float) -> None:
     """Nobody is told how far it is."""
 
 
-__all__ = ["FORMS", "stepnc_files"]
+__all__ = ["FORMS", "stepnc_files", "stepnc_under_way"]
