@@ -37,6 +37,7 @@ jobs = sa.Table(
     Column("progress", Float, nullable=False),
     Column("event_seq", Integer, nullable=False),
     Column("attempt", Integer, nullable=False),
+    Column("claims", Integer, nullable=False, server_default="0"),
     Column("lease_owner", String(80), nullable=True),
     Column("lease_until", Float, nullable=True),
     Column("artifact", String(64), nullable=True),

@@ -39,7 +39,7 @@ SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
 READY_EVERY_S = 1.0
 MERCY_S = 1e9  # no lease counts as run out
 STEP_S = 1.0  # how far the clock has to jump to have been set
-SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 5.0, 10.0
+SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 8.0, 10.0
 
 
 class Engine:
@@ -311,8 +311,8 @@ class Engine:
                               self._slots)
         if row is None:
             return False
-        key = f"{row['id']}-{row['attempt']}"
-        future = self._client.submit(run_job, row["id"], row["attempt"], self.work.as_dict(), key=key, pure=False,
+        key = f"{row['id']}-{row['claims']}"
+        future = self._client.submit(run_job, row["id"], row["claims"], self.work.as_dict(), key=key, pure=False,
                                      retries=0)
         self._futures[key] = future
         future.add_done_callback(lambda _: self.wake())
@@ -323,14 +323,14 @@ class Engine:
             del self._futures[key]
             if future.status != "error":
                 continue
-            job_id, _, attempt = key.rpartition("-")
+            job_id, _, claim = key.rpartition("-")
             if isinstance(future.exception(), DBAPIError):
-                log.warning("the database was away; the job is taken up again", job=job_id, attempt=attempt)
+                log.warning("the database was away; the job is taken up again", job=job_id, claim=claim)
                 continue  # its lease runs out
             error = ResourceError(f"the workers that ran the job were lost ({future.exception()!r})",
                                   code="worker_lost", remedy="look into the log of the workers")
-            log.error("task lost", job=job_id, attempt=attempt, error=str(future.exception()))
-            if self.jobs.take_over(job_id, int(attempt), self.owner, self.settings.lease_s):
+            log.error("task lost", job=job_id, claim=claim, error=str(future.exception()))
+            if self.jobs.take_over(job_id, int(claim), self.owner, self.settings.lease_s):
                 self.jobs.finish(job_id, self.owner, "failed", error=error)
 
 

@@ -1,7 +1,8 @@
 """Jobs in the database: every change is one guarded statement, so two writers cannot both win.
 
 States: queued -> running -> proved | unproved | done | failed, and cancelled from queued or running. A running job
-belongs to the holder of its lease; a job whose lease has run out may be claimed again while attempts are left.
+belongs to the holder of its lease; a job whose lease has run out may be claimed again while attempts are left. A claim
+hands it to the workers; an attempt counts from the moment a worker starts it, so that waiting for one costs none.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from service.db import jobs, labels
 from service.errors import KeyConflictError, NotFoundError, RateError
 
 FAR_LEASES = 10  # no holder asks for so many at once
+WORKER = "worker-"  # how the names of holders begin that have started an attempt
 CLAIM_LOCK = 0x7A6F6E66  # a number of our own among PostgreSQL's advisory locks
 
 
@@ -213,8 +215,7 @@ class JobStore:
         """Take the oldest job that waits, or whose holder went silent; None when there is none.
 
         mercy_s : how long a lease must have run out, s: while the database was away nobody could renew his
-        slots : none is taken when so many run already; services that claim at the same time wait for each other, for a
-            job that was taken and finds no worker would lose an attempt
+        slots : none is taken when so many run already; services that claim at the same time wait for each other
         """
         now = time.time()
         expired = sa.and_(jobs.c.state == "running", _silent(now, lease_s, mercy_s))
@@ -222,18 +223,29 @@ class JobStore:
                   .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
         room = sa.true() if slots is None else _count_running(now, lease_s, mercy_s).scalar_subquery() < slots
         change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired), room)
-                  .values(state="running", stage="starting", progress=0.0, attempt=jobs.c.attempt + 1,
-                          event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s, started=now)
+                  .values(state="running", stage="starting", progress=0.0, claims=jobs.c.claims + 1,
+                          event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s)
                   .returning(jobs))
         with self.engine.begin() as c:
             if slots is not None and c.dialect.name == "postgresql":
                 c.execute(sa.select(sa.func.pg_advisory_xact_lock(CLAIM_LOCK)))
             return c.execute(change).mappings().one_or_none()
 
-    def take_over(self, job_id: str, attempt: int, owner: str, lease_s: float) -> bool:
-        """Make ``owner`` the holder of that attempt; False when the attempt is no longer running."""
+    def start(self, job_id: str, claim: int, owner: str, lease_s: float, max_attempts: int) -> bool:
+        """Begin an attempt of what was claimed; False when it was claimed again since, ended, or has none left.
+
+        claim : which claim it was, as ``row["claims"]`` says. The same one may start again: that of a worker that died.
+        """
+        now = time.time()
         return self._change(
-            sa.and_(jobs.c.id == job_id, jobs.c.attempt == attempt, jobs.c.state == "running"),
+            sa.and_(jobs.c.id == job_id, jobs.c.claims == claim, jobs.c.state == "running",
+                    jobs.c.attempt < max_attempts),
+            attempt=jobs.c.attempt + 1, lease_owner=owner, lease_until=now + lease_s, started=now)
+
+    def take_over(self, job_id: str, claim: int, owner: str, lease_s: float) -> bool:
+        """Make ``owner`` the holder of that claim; False when it was claimed again since, or ended."""
+        return self._change(
+            sa.and_(jobs.c.id == job_id, jobs.c.claims == claim, jobs.c.state == "running"),
             lease_owner=owner, lease_until=time.time() + lease_s)
 
     def renew(self, job_id: str, owner: str, lease_s: float) -> bool:
@@ -275,9 +287,10 @@ class JobStore:
 
         Only for the sole owner of the database. Holders see that they lost the job and stop their children.
         """
+        begun = sa.case((jobs.c.lease_owner.startswith(WORKER), 1), else_=0)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(jobs.c.state == "running").values(
-                state="queued", stage="queued", progress=0.0, attempt=jobs.c.attempt - 1, lease_owner=None,
+                state="queued", stage="queued", progress=0.0, attempt=jobs.c.attempt - begun, lease_owner=None,
                 lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
     def put_back(self, job_id: str, owner: str) -> bool:

@@ -22,7 +22,7 @@ from geometry.errors import CamError, CancelledError, InternalError, ResourceErr
 from service.artifacts import Artifacts, artifact_key
 from service.db import connect
 from service.storage import STORAGE_FULL, is_full, storage_full
-from service.store import JobStore
+from service.store import WORKER, JobStore
 from service.supervisor import Limits, supervise
 
 log = structlog.get_logger(__name__)
@@ -58,13 +58,14 @@ class Unshown(str):
         return "'(not shown)'"
 
 
-def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
-    """Run one attempt of a job to its end; returns what became of it, for the log only."""
+def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
+    """Run one attempt of a claimed job to its end; returns what became of it, for the log only."""
     config = WorkConfig(**{**data, "limits": Limits(**data["limits"])})
-    store, owner = JobStore(connect(config.url)), f"worker-{uuid.uuid4().hex}"
-    if not store.take_over(job_id, attempt, owner, config.lease_s):
+    store, owner = JobStore(connect(config.url)), f"{WORKER}{uuid.uuid4().hex}"
+    if not store.start(job_id, claim, owner, config.lease_s, config.max_attempts):
         return "superseded"
     row, key, summary = store.get(job_id), None, None
+    attempt = row["attempt"]
     failure: CamError | None = None
     try:
         state, key, summary = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
@@ -76,7 +77,7 @@ def run_job(job_id: str, attempt: int, data: dict[str, Any]) -> str:
         failure = storage_full() if is_full(error) else _bug(error, job_id, attempt)
     if failure is not None:
         log.warning("job failed", job=job_id, attempt=attempt, error=failure.as_dict())
-        if failure.code == STORAGE_FULL and row["attempt"] < config.max_attempts:
+        if failure.code == STORAGE_FULL and attempt < config.max_attempts:
             return "put back" if _record(lambda: store.put_back(job_id, owner), config.lease_s) else "superseded"
         state = "failed"
     ended = _record(lambda: store.finish(job_id, owner, state, artifact=key, error=failure, summary=summary),

@@ -237,7 +237,7 @@ class Service:
             return False
         return True
 
-    def until_ready(self, patience_s: float = 90.0) -> float:
+    def until_ready(self, patience_s: float = 300.0) -> float:
         """Wait for it; returns how long that took, s."""
         began = time.monotonic()
         while not self.is_ready():
@@ -297,7 +297,7 @@ class Client:
         self.seen: dict[str, list[tuple[float, dict[str, Any]]]] = collections.defaultdict(list)
         self.turn = 0
 
-    def ask(self, method: str, path: str, patience_s: float = 120.0, **more: Any) -> httpx.Response:
+    def ask(self, method: str, path: str, patience_s: float = 300.0, **more: Any) -> httpx.Response:
         """One request, again and again, at one API process after the other, until somebody answers it."""
         until = time.monotonic() + patience_s
         while True:
@@ -332,7 +332,7 @@ class Client:
                 self.seen[job_id].append((time.monotonic(), job))
         return {job_id: changes[-1][1] for job_id, changes in self.seen.items()}
 
-    def until_running(self, count: int, patience_s: float = 60.0) -> list[str]:
+    def until_running(self, count: int, patience_s: float = 300.0) -> list[str]:
         """Wait until so many run; returns their ids."""
         until = time.monotonic() + patience_s
         while True:

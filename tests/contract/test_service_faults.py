@@ -154,7 +154,7 @@ class Round:
         fault(self.service, self.nth, self.rng)
         over = time.monotonic()
         ready = over + self.service.until_ready() - over
-        ended = self.client.until_ended(patience_s=180.0)
+        ended = self.client.until_ended(patience_s=400.0)
         return {"outage": over - began, "ready": ready, "hit": max([ended[i] - over for i in hit], default=0.0),
                 "all": max(ended.values()) - over}
 
@@ -175,7 +175,7 @@ class Round:
 
     def check_mail(self):
         """Each job told its end once: what comes again, after a crash between answer and row, is the same message."""
-        wanted, until = set(self.client.jobs.values()), time.monotonic() + 40
+        wanted, until = set(self.client.jobs.values()), time.monotonic() + 120
         while wanted - {job for _, job, _ in self.service.mailbox.got} and time.monotonic() < until:
             time.sleep(0.1)
         mine = [m for m in self.service.mailbox.got if m[1] in wanted]
