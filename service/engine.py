@@ -254,16 +254,22 @@ class Engine:
 
         A client that lost its scheduler gives up for good after a while, so one that gets no answer is thrown away and
         the next look makes another. What its tasks do they write into the database themselves.
+
+        Raises
+        ------
+        UnavailableError
+            It does not answer.
         """
         try:
             if self._client is None:
                 self._open_client()
             found = self._client.sync(self._client.scheduler.ncores, callback_timeout=SCHEDULER_WAIT_S)
-        except Exception:
+        except Exception as error:
             self._slots = 0
             if self.settings.scheduler is not None:
                 self._drop_client()
-            raise
+            raise UnavailableError(f"the scheduler does not answer ({type(error).__name__})",
+                                   code="scheduler_unavailable") from None
         self._slots, self._slots_at = sum(found.values()), time.monotonic()
         return self._slots
 
@@ -274,6 +280,7 @@ class Engine:
             threading.Thread(target=_close_quietly, args=(client,), name="closer", daemon=True).start()
 
     def _dispatch(self) -> None:
+        idle = ""
         while not self._stop.is_set():
             try:
                 self._reap()
@@ -282,8 +289,11 @@ class Engine:
                 check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
                 while self._look() > self._running() and self._submit():
                     pass
+                idle = ""
             except UnavailableError as error:
-                log.warning("nothing is started", reason=error.message)
+                if error.message != idle:  # said once, for it may last all night
+                    log.warning("nothing is started", reason=error.message)
+                idle = error.message
                 self._stop.wait(timeout=1.0)
             except Exception:
                 log.exception("dispatcher stumbled")  # database or scheduler away: the next round tries again
