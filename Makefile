@@ -11,7 +11,7 @@ PORT ?= 8000
 # uv installs into a given interpreter; plain pip is called by the interpreter itself.
 INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 
-.PHONY: setup check types test test-slow soak golden bench docs demo serve lock clean
+.PHONY: setup check types test test-slow soak clients audit golden bench docs demo serve lock clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -58,11 +58,20 @@ test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
 
 test-slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m "slow and not soak"
+	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
 
-# What takes longer than CI waits; each test prints its figures. SOAK_COUNT=50 for a quick look.
+# What takes longer than CI waits; each test prints its figures. K chooses among them, SOAK_COUNT=50, FAULT_REPEAT=5 and
+# LOAD_MINUTES=2 are for a quick look.
 soak: $(STAMP)
-	$(BIN)/python -m pytest -q -s -m soak
+	$(BIN)/python -m pytest -q -s -m soak $(if $(K),-k "$(K)")
+
+# Clients in four languages: generated, compiled, each runs a whole job; skips, with the reason, what is not installed.
+clients: $(STAMP)
+	$(BIN)/python -m pytest -q -rs tests/contract/test_clients.py
+
+# Known vulnerabilities of dependencies, where advisories can be reached.
+audit: $(STAMP)
+	$(BIN)/python .ci/audit.py build/audit
 
 # Rewrites the expected files; the diff is what gets reviewed.
 golden: $(STAMP)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from fastapi import FastAPI
@@ -28,8 +29,43 @@ def document(app: FastAPI) -> dict[str, Any]:
     for unused in ("HTTPValidationError", "ValidationError"):
         schemas.pop(unused, None)
     found["components"]["schemas"] = dict(sorted(schemas.items()))
+    _plain(found)
     add_samples(found)
     return found
+
+
+def _plain(node: Any) -> None:
+    """Say things the way that generators of clients understand; the meaning stays.
+
+    Numbers name their precision, or Go gets 32 bits and 0.002 mm is no longer that. "X or null" is a list of two types,
+    or Java gets a class for each such field. A default that is a list of objects or stands beside a reference is told
+    in words, or Java gets code that does not compile.
+    """
+    if isinstance(node, dict):
+        kinds = node.get("anyOf", ())
+        if len(kinds) == 2 and kinds[1] == {"type": "null"} and _is_plain(kinds[0]):
+            rest = dict(node.pop("anyOf")[0])
+            rest |= {"enum": [*rest["enum"], None]} if "enum" in rest else {}
+            for key, value in {**rest, "type": [rest["type"], "null"]}.items():
+                node.setdefault(key, value)
+        if "number" in (node.get("type"), *_listed(node.get("type"))):
+            node.setdefault("format", "double")
+        if node.get("default") and ("$ref" in node.get("items", ()) or any("$ref" in k for k in node.get("anyOf", ()))):
+            told = json.dumps(node.pop("default"))
+            node["description"] = f"{node.get('description', '').rstrip('. ')}. Default: {told}".removeprefix(". ")
+        for value in list(node.values()):
+            _plain(value)
+    elif isinstance(node, list):
+        for value in node:
+            _plain(value)
+
+
+def _is_plain(kind: dict[str, Any]) -> bool:
+    return isinstance(kind.get("type"), str) and "const" not in kind
+
+
+def _listed(kind: Any) -> list[str]:
+    return kind if isinstance(kind, list) else []
 
 
 def as_yaml(data: dict[str, Any]) -> str:
