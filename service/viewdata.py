@@ -23,13 +23,14 @@ from service.viewfile import Chunk, write_view
 from service.viewmesh import GRID as MESH_GRID
 from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
 from service.viewpaths import AXIS_UNIT, Way, path_chunks, way_of
-from service.viewstock import stock_chunks
+from service.viewstock import stock_chunk
 from verify.model import NcProgram, Proof, ProofSetup
+from verify.sequence import Reading, read_all
 from zones.remainder import explain
 from zones.view import turned_samples
 
 VIEW_NAME = "view.bin"
-VIEW_VERSION = 1
+VIEW_VERSION = 2
 ARC = 10  # chords of a quarter circle in the profile of a tool
 EDGE_SPACING = 0.4  # mm
 NO_HOLDER = 30.0  # mm of shank that are drawn where no holder is known
@@ -58,8 +59,9 @@ def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int3
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
     label[rest] = len(zones) + _entries(ready, scored, given_up, rest, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
-    way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, report["steps"])
-    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, programs,
+    read = read_all(programs, look.part, tool_bodies(ready.setup), setup, 0, lambda _share: None)
+    way = way_of(read, programs, look.rotation, report["steps"])
+    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, read,
                  report, open_=report["state"] == "proved")
 
 
@@ -71,9 +73,10 @@ def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proo
     samples : of the proof, in the frame of ``look``; report : whose places are in the setup frame
     """
     def made() -> Files:
-        way = way_of(programs, look.part, tool_bodies(ready.setup), setup, look.rotation, spindle_tool=spindle_tool)
+        read = read_all(programs, look.part, tool_bodies(ready.setup), setup, spindle_tool, lambda _share: None)
+        way = way_of(read, programs, look.rotation)
         label = np.zeros(len(samples), np.int64)
-        return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, programs, report, open_=True)
+        return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, read, report, open_=True)
 
     return _or_none(report, made)
 
@@ -105,7 +108,7 @@ def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: 
 
 
 def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, way: Way, programs: Sequence[NcProgram], report: Mapping[str, Any], *,
+          proof: Proof, setup: ProofSetup, way: Way, read: Sequence[Reading], report: Mapping[str, Any], *,
           open_: bool) -> Files:
     part, d = ready.part, ready.decomposition
     here = turned_samples(samples, look.rotation.T)
@@ -116,10 +119,10 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
                           axis=0))
     mesh, finer = mesh_chunks(facets, low)
     path, longer, steps, grid = path_chunks(way, low, open_=open_)
-    stocks, of = stock_chunks(ready, look, programs, [_axis_of(way, k) for k in range(len(programs))])
-    own = dict(zip(way.names, of, strict=True))
-    steps = [s | {"stock": own[s["program"]]} for s in steps]
-    chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path, *stocks, *finer, *longer]
+    chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path]
+    if len(way.end):
+        chunks.append(stock_chunk(read, look.part, tool_bodies(ready.setup), setup, look, open_=open_))
+    chunks += [*finer, *longer]
     head = {
         "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
         "state": report["state"], "withheld": not open_, "labels": report.get("labels", {}),
@@ -139,12 +142,6 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
         "counts": {"facets": len(facets.corners), "moves": len(way.end)},
     }
     return {VIEW_NAME: ("view", "", None, write_view(head, chunks))}
-
-
-def _axis_of(way: Way, program: int) -> NDArray[np.float64] | None:
-    """The tool axis that a program keeps, None where it keeps none."""
-    axis = way.axis[way.program == program]
-    return None if not len(axis) or np.ptp(axis, axis=0).max() > 1e-6 else axis[0]
 
 
 def _zone(z: Mapping[str, Any]) -> dict[str, Any]:

@@ -72,7 +72,7 @@ class Column:
 class Chunk:
     """A table with words about it.
 
-    kind    : 'mesh', 'edges', 'path' or 'stock'
+    kind    : 'mesh', 'edges', 'path' or 'field'
     about   : what else the head says of it, for example {'label': 3, 'lod': 0}
     columns : by name, in the order they are stored
     """

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.part import Part
-from geometry.toolbody import ToolBody
 from service.viewfile import Chunk, Column
 from verify.duration import minutes_of
-from verify.model import NcProgram, ProofSetup
+from verify.model import NcProgram
 from verify.reader import FEED
-from verify.sequence import Reading, read_all
+from verify.sequence import Reading
 
 GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: places, and how far a drawn way may be off in the two levels
 COARSE = 0.25  # mm, grid and thinning of what is not proved
@@ -74,15 +72,14 @@ class Way:
         return float(self.begun[rows[near]] + share[near] * (self.ended[rows[near]] - self.begun[rows[near]]))
 
 
-def way_of(programs: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, rotation: F64,
-           planned: Sequence[dict[str, Any]] = (), spindle_tool: int = 0) -> Way:
+def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation: F64,
+           planned: Sequence[dict[str, Any]] = ()) -> Way:
     """The way of the tool through programs.
 
-    programs, part, tools, setup, spindle_tool : as the proof took them, and errors as it raises them
+    readings : of the programs, as ``verify.sequence.read_all`` gives them
     rotation : (3, 3) float64, from the setup frame to that of the proof, no unit
     planned  : the steps of the report, whose ids stand in comments of the programs; without, a step is a tool
     """
-    readings = read_all(programs, part, tools, setup, spindle_tool, lambda _share: None)
     known = {s["id"]: s for s in planned}
     steps: list[dict[str, Any]] = []
     parts, clock = [], 0.0

@@ -11,6 +11,7 @@ from geometry.toolbody import ToolBody
 from service.viewpaths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
 from tests.hand_parts import as_part, box_mesh
 from verify.model import NcProgram, ProofSetup
+from verify.sequence import read_all
 
 TEXT = """G21 G17 G90 G94 G64 P0.001
 G54
@@ -67,9 +68,14 @@ def test_a_circle_needs_few_rows():
     assert 12 <= len(rows) <= 120 and farthest(place, rows) <= 0.1
 
 
+def read_way(program, part, tools, steps=()):
+    readings = read_all([program], part, tools, ProofSetup(), 0, lambda _share: None)
+    return way_of(readings, [program], np.eye(3), steps)
+
+
 @pytest.fixture(scope="module")
 def way(demo_tool):
-    return way_of([NcProgram("p.ngc", TEXT)], demo_tool[0], [demo_tool[1]], ProofSetup(), np.eye(3), STEPS)
+    return read_way(NcProgram("p.ngc", TEXT), demo_tool[0], [demo_tool[1]], STEPS)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +123,7 @@ def test_of_one_that_is_not_proved_a_picture(way):
 def test_a_foreign_program_is_shown_by_its_tools(demo_tool):
     part, tool = demo_tool
     text = TEXT.replace("M2", "T2 M6\nG43 H2\nS900 M3\nG0 Z20\nX0 Y0\nG1 Z8 F50\nG0 Z20\nM2")
-    way = way_of([NcProgram("f.ngc", text)], part, [tool, replace(tool, id="T2", number=2)], ProofSetup(), np.eye(3))
+    way = read_way(NcProgram("f.ngc", text), part, [tool, replace(tool, id="T2", number=2)])
     assert [s["id"] for s in way.steps] == ["T1", "T2"]
     assert set(way.tool[way.step == 1].tolist()) == {2}
 

@@ -7,7 +7,8 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER, STEPS, UNCUT, toolColour, wallColour, zoneColour, type RGB } from "./colours";
 import { PART_FRAGMENT, PART_VERTEX, WAY_FRAGMENT, WAY_VERTEX } from "./shaders";
-import { Stock, type Course } from "./stock";
+import type { Course } from "./states";
+import { Stock } from "./stock";
 import type { ChunkEntry, Table, ViewHead } from "./viewfile";
 
 
@@ -197,8 +198,8 @@ export class Picture {
   chunk(entry: ChunkEntry, t: Table): void {
     if (entry.kind === "mesh") this.addPart(entry, t);
     else if (entry.kind === "edges") this.addEdges(t);
-    else if (entry.kind === "stock") this.addStock(entry, t);
-    else this.addWay(entry, t);
+    else if (entry.kind === "field") this.addStock(entry, t);
+    else if (entry.kind === "path") this.addWay(entry, t);
     this.ask();
   }
 
@@ -413,12 +414,12 @@ export class Picture {
 
   // --- the stock in time
 
-  private stocks: Stock[] = [];
+  private stock: Stock | null = null;
   private stockFed = false;
   private stockOn = true;
 
   get hasStock(): boolean {
-    return this.head!.chunks.some((c) => c.kind === "stock");
+    return this.head!.chunks.some((c) => c.kind === "field");
   }
 
   showStock(on: boolean): void {
@@ -426,34 +427,31 @@ export class Picture {
   }
 
   private addStock(entry: ChunkEntry, t: Table): void {
-    const stock = new Stock(entry, t, this.shared.section!, 0.05 + 1.2 * (this.head!.withheld ? this.head!.path_grid_mm : 0));
-    stock.mesh.visible = false;
-    this.stocks.push(stock);
-    this.scene.add(stock.mesh);
+    this.stock = new Stock(entry, t, this.shared.section!);
+    this.stock.mesh.visible = false;
+    this.scene.add(this.stock.mesh);
   }
 
-  /** Gives every grid the ways that run on it; once all of these are there. */
-  private feedStock(): void {
+  /** The ways that cut; once all of these are there. */
+  private feedStock(stock: Stock): void {
     const head = this.head!;
-    this.stocks.forEach((stock, k) => {
-      const courses: Course[] = [];
-      head.steps.forEach((s, i) => {
-        const w = this.ways.get(i);
-        const tool = head.tools.find((x) => x.number === s.tool);
-        if (s.stock === k && w && tool) courses.push({ place: w.place, time: w.time, kind: w.kind, tool });
-      });
-      stock.follow(courses);
+    const courses: Course[] = [];
+    head.steps.forEach((s, i) => {
+      const w = this.ways.get(i);
+      const tool = head.tools.find((x) => x.number === s.tool);
+      if (w && tool) courses.push({ place: w.place, time: w.time, kind: w.kind, axis: w.axis, fixed: s.axis ?? [0, 0, 1], tool });
     });
+    stock.follow(courses);
     this.stockFed = true;
   }
 
-  private cutStock(seconds: number | null, step: number | null): void {
-    const own = seconds === null || step === null || !this.stockOn ? null : this.head!.steps[step]!.stock;
-    if (own !== null && !this.stockFed) this.feedStock();
-    this.stocks.forEach((stock, k) => {
-      stock.mesh.visible = k === own;
-      if (k === own) stock.time(seconds!);
-    });
+  private cutStock(seconds: number | null): void {
+    const { stock } = this;
+    if (!stock) return;
+    stock.mesh.visible = seconds !== null && this.stockOn;
+    if (!stock.mesh.visible) return;
+    if (!this.stockFed) this.feedStock(stock);
+    stock.time(seconds!);
   }
 
   // --- the tool in time -------------------------------------------------------------------------------------------
@@ -490,7 +488,7 @@ export class Picture {
     this.shared.now!.value = seconds ?? Infinity;
     const here = seconds === null ? null : this.at(seconds);
     this.tool.visible = here !== null;
-    this.cutStock(seconds, here ? here.step : null);
+    this.cutStock(here ? seconds : null);
     if (here) {
       const number = this.head!.steps[here.step]!.tool;
       if (number !== this.toolShown) this.makeTool(number);

@@ -9,7 +9,7 @@ export interface ColumnEntry extends Array<string | number> {
 }
 
 export interface ChunkEntry {
-  kind: "mesh" | "edges" | "path" | "stock";
+  kind: "mesh" | "edges" | "path" | "field";
   lod: number;
   label?: number;
   step?: number;
@@ -17,13 +17,10 @@ export interface ChunkEntry {
   size: number;
   columns: ColumnEntry[];
   rotation?: number[];
-  x0_mm?: number;
-  y0_mm?: number;
+  origin_mm?: [number, number, number];
   step_mm?: number;
-  nx?: number;
-  ny?: number;
-  foot_mm?: number;
-  unit_mm?: number;
+  shape?: [number, number, number];
+  levels?: number;
 }
 
 export interface ToolShape {
@@ -44,7 +41,6 @@ export interface ViewStep {
   start_s: number;
   end_s: number;
   axis: [number, number, number] | null;
-  stock: number | null;
 }
 
 export interface ViewFinding {
