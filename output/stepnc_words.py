@@ -145,7 +145,7 @@ def stock_box(plan: Workplan) -> tuple[list[float], list[float]]:
 
 def header_words(plan: Workplan, first: str) -> list[str]:
     """Description lines of the file header."""
-    return [first, *setup_words(plan)]
+    return [first, *setup_words(plan), *plan.figures]
 
 
 def setup_words(plan: Workplan) -> list[str]:

@@ -358,7 +358,9 @@ def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
                "Start at a label only when all steps before it have been cut: no way was proved through their stock"]
     texts = [
         f"Program {plan.name}, zonemill {plan.version}, {d.title}, {_axes_words(plan)}",
-        f"Part sha256 {plan.part_sha256[:16]}, setup sha256 {plan.setup_sha256[:16]}",
+        f"Part sha256 {plan.part_sha256}",
+        f"Setup sha256 {plan.setup_sha256}",
+        *plan.figures,
         *(f"Label {key}: {value}" for key, value in sorted(plan.labels.items())),
         f"Material {plan.material}",
         f"Units mm and mm/min. Work offset {zero}. Program zero is the origin of the setup frame",

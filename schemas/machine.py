@@ -44,7 +44,8 @@ class Machine(WireModel):
     restart_points: Annotated[bool, Field(
         description="Every step of a program begins behind a label as after a tool change, tool, length, zero, speed, "
                     "coolant and tool centre point control stated again, so that the program can be started there. On "
-                    "a 5-axis machine the axes go back to 0 between steps.")] = False
+                    "a 5-axis machine the axes go back to 0 between steps. false: only steps that change the tool "
+                    "begin so, and there are no labels.")] = True
     max_program_kb: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Largest program a control takes, 1000 bytes. A larger one is parted, at a change of "
                                   "the tool where it can be, into programs that run one after the other: "

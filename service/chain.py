@@ -45,6 +45,7 @@ from service.programs import (
     programs_of,
     proof_frame,
     turning_of,
+    with_figures,
 )
 from service.scoring import Score, score
 from service.sheet import sheet_files
@@ -130,15 +131,18 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
-    if proof.clean:  # of every control's program one was simulated; the others are the same, or nothing is delivered
-        stated = replace(stated, notes=(*stated.notes, *_carried(ready, look, written)))
     late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
-    clean = written if proof.clean else []
+    report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
+                                        given_up, cautions)
+    if report["state"] == "proved":
+        # of every control's program one was simulated, before its figures were known; what is delivered is the same
+        final = with_figures(written, report)
+        report["proof"]["notes"] += _carried(ready, look, written, final)
+        written = final
+    clean = written if report["state"] == "proved" else []
     with stepnc_under_way(clean, look.part, tool_bodies(setup), proof_setup(ready, look), out) as stepnc:
-        report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
-                                            given_up, cautions)
         progress("report", PROVED)
         files: Files = {}
         if report["state"] == "proved":
@@ -176,10 +180,11 @@ def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Map
         return replace(ready, warnings=(*ready.warnings, warning)), {}, scored
 
 
-def _carried(ready: Prepared, look: Look, written: Sequence[Program]) -> list[str]:
-    """Hold the programs of further controls against those that are proved; returns notes."""
+def _carried(ready: Prepared, look: Look, written: Sequence[Program], final: Sequence[Program]) -> list[str]:
+    """Hold the programs as they are delivered, of all controls, against those that are proved; returns notes."""
     tools, setup = tool_bodies(ready.setup), proof_setup(ready, look)
-    return [note for p in written for note in carried(p.given(), p.twins(), look.part, tools, setup)]
+    return [note for p, f in zip(written, final, strict=True)
+            for note in carried(p.given(), [f.given(), *f.twins()], look.part, tools, setup)]
 
 
 def _untold(told: Learned, more: Learned, side: Side) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from output.arcs import SHARE as ARCS
 from output.arcs import fitted
 from output.clamping import SWING, home_of
 from output.dialects import DIALECTS, Switches
+from output.figures import AWAITED, filled
 from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from output.parting import parts_of
+from output.text import decimal
 from output.walker import write_program
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
@@ -90,13 +93,42 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     index = [view.id for view in ready.views].index(access)
-    work, out = replace(work, restart=machine.restart_points, number_words=f"access {access} part 999"), []
+    work, out = replace(work, restart=machine.restart_points, number_words=f"access {access} part 999",
+                        figures=AWAITED), []
     limit = machine.max_program_kb
     for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):
         part = replace(part, number=program_number(index, k), number_words=f"access {access} part {k + 1}")
         texts = {d: write_program(part, control) for d, control in dialects.items()}
         out.append(Program(access, part, texts.pop(first), f"{end}.part{k + 1}" if k else end, turn, first, texts))
     return out
+
+
+def with_figures(written: Sequence[Program], report: Mapping[str, Any]) -> list[Program]:
+    """Proved programs with the figures of their proof in the headers, to be read once more before they count.
+
+    report : of the job
+    """
+    told = figures_of(report)
+    out = []
+    for p in written:
+        texts = {d: filled(text, DIALECTS[d](Switches()), told) for d, _, text in p.files()}
+        out.append(replace(p, work=replace(p.work, figures=told), text=texts.pop(p.dialect), others=texts))
+    return out
+
+
+def figures_of(report: Mapping[str, Any]) -> tuple[str, ...]:
+    """What the header of a program says of the proof of its job."""
+    scallops = [z["scallop_mm"]["p99"] for z in report["zones"] if z["scallop_mm"]["p99"] is not None]
+    scallop = f"scallop p99 at most {decimal(max(scallops))} mm" if scallops else "no scallop to measure"
+    rest, time, proof = report["remainder"], report["time"], report["proof"]
+    area = decimal(sum(x["area_mm2"] for x in rest), 3)
+    return (f"Proof by zonemill {VERSION}, figures of the whole job: no findings",
+            "Filled in after it; no other line was changed since",
+            f"Coverage {100 * report['coverage']:.2f} %, of what is in reach {100 * report['reach_coverage']:.2f} %",
+            f"Gouge at most {decimal(report['gouge_max_mm'])} mm, {scallop}",
+            f"Error bound {decimal(proof['error_bound_mm'])} mm, {proof['samples']} samples",
+            f"Machining time {report['machining_time_s'] / 60:.1f} min, in cut {time['in_cut_s'] / 60:.1f} min",
+            f"Remainder {area} mm2 in {len(rest)} entries of report.json")
 
 
 def program_number(access: int, part: int) -> int:

@@ -214,7 +214,8 @@ def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Se
             report: Report = silent) -> list[str]:
     """Carry the proof of a program over to others that shall be the same.
 
-    proved  : a program without a finding;  twins : the others, in the same frame
+    proved  : a program without a finding;  twins : the others, in the same frame; one may be its own text with other
+              comments
     part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
     report  : called with the share done, 0 to 1
 
@@ -239,7 +240,8 @@ def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Se
             raise InternalError(f"{twin.name} is not the program that was proved: {told}", code="programs_differ",
                                 subjects=(proved.name, twin.name), measured=told,
                                 remedy="please report it with part and setup; nothing is delivered")
-        notes += [f"{twin.name}: {note}" for note in other.program.notes]
+        if twin.dialect != proved.dialect:  # else the proof has noted them
+            notes += [f"{twin.name}: {note}" for note in other.program.notes]
     return notes
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ cq = pytest.importorskip("cadquery")
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
 SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0},
          "operations": {"finishing": False}, "access": [{"work_offset": "G59.1"}],
-         "machine": {"dialects": ["siemens", "linuxcnc", "fanuc", "haas", "heidenhain"], "restart_points": True}}
+         "machine": {"dialects": ["siemens", "linuxcnc", "fanuc", "haas", "heidenhain"]}}
 NAMES = {d: f"program.{d}.{ending}" for d, ending in DIALECT_ENDINGS.items()}
 
 
@@ -56,6 +57,29 @@ def test_all_five_are_delivered_and_listed(job):
     assert {d: f["name"] for d, f in listed.items()} == NAMES
     for f in listed.values():
         assert hashlib.sha256((out / f["name"]).read_bytes()).hexdigest() == f["sha256"]
+
+
+def test_headers_say_what_the_report_says(job):
+    """Hashes whole, and the figures of the proof, in every control's program and both forms of STEP-NC."""
+    out, report = job
+    for name in (*NAMES.values(), "job.stpnc", "job.arm.stpnc"):
+        text = re.sub(r"[^a-z0-9.]", "", (out / name).read_text().lower().replace("pct", ""))
+        told = [*report["inputs"].values(), f"coverage{100 * report['coverage']:.2f}",
+                f"machiningtime{report['machining_time_s'] / 60:.1f}min",
+                f"{report['proof']['samples']}samples", f"in{len(report['remainder'])}entriesofreport.json"]
+        assert all(words in text for words in told), name
+        assert "notmadeyet" not in text
+
+
+def test_every_step_has_its_label_unless_the_setup_says_otherwise(part, job, tmp_path):
+    out, report = job
+    setup = {**SETUP, "machine": {**SETUP["machine"], "restart_points": False}}
+    chain.plan(part, parse_setup(json.dumps(setup)), tmp_path, quiet)
+    marks = {"siemens": r"^STEP_S\d+:", "heidenhain": r'^\d+ LBL "S\d+"'}
+    for d, name in NAMES.items():
+        mark = re.compile(marks.get(d, r"^N\d+$"), re.MULTILINE)
+        assert len(mark.findall((out / name).read_text())) == len(report["steps"])
+        assert not mark.findall((tmp_path / name).read_text())
 
 
 @pytest.mark.parametrize("dialect", ["siemens", "heidenhain", "haas"])

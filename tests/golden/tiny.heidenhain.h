@@ -2,43 +2,44 @@
 1 BLK FORM 0.1 Z X+0 Y+0 Z+0
 2 BLK FORM 0.2 X+30 Y+20 Z+15
 3 ; Program demo, zonemill 0.1.0, Heidenhain TNC, 3 axes
-4 ; Part sha256 abababababababab, setup sha256 cdcdcdcdcdcdcdcd
-5 ; Label order: 4711
-6 ; Material Ti-6Al-4V
-7 ; Units mm and mm/min. Work offset preset 1. Program zero is the origin of the setup frame
-8 ; XYZ is the tool tip: set every tool length in the tool table, TOOL CALL counts the length of the
-9 ; tool table
-10 ; Stock box X 0 to 30, Y 0 to 20, Z 0 to 15
-11 ; Clearance plane Z 25: above it rapids in XY are free
-12 ; Lowest Z of the tip 4.5
-13 ; Every step can be started at its label: it states tool, length, zero, speed and coolant again
-14 ; Start at a label only when all steps before it have been cut: no way was proved through their
-15 ; stock
-16 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm
-17 ; Machine zero of Z is taken to be the top of its travel
-18 ; Tools, all lengths in mm from the tip:
-19 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-20 LBL "S01"
-21 CYCL DEF 32.0 TOLERANCE
-22 CYCL DEF 32.1 T0.001
-23 CYCL DEF 247 DATUM SETTING ~
+4 ; Part sha256 abababababababababababababababababababababababababababababababab
+5 ; Setup sha256 cdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcd
+6 ; Label order: 4711
+7 ; Material Ti-6Al-4V
+8 ; Units mm and mm/min. Work offset preset 1. Program zero is the origin of the setup frame
+9 ; XYZ is the tool tip: set every tool length in the tool table, TOOL CALL counts the length of the
+10 ; tool table
+11 ; Stock box X 0 to 30, Y 0 to 20, Z 0 to 15
+12 ; Clearance plane Z 25: above it rapids in XY are free
+13 ; Lowest Z of the tip 4.5
+14 ; Every step can be started at its label: it states tool, length, zero, speed and coolant again
+15 ; Start at a label only when all steps before it have been cut: no way was proved through their
+16 ; stock
+17 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm
+18 ; Machine zero of Z is taken to be the top of its travel
+19 ; Tools, all lengths in mm from the tip:
+20 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+21 LBL "S01"
+22 CYCL DEF 32.0 TOLERANCE
+23 CYCL DEF 32.1 T0.001
+24 CYCL DEF 247 DATUM SETTING ~
     Q339=+1 ;DATUM NUMBER
-24 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-25 TOOL CALL 1 Z S12000
-26 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
-27 M3
-28 M8
-29 L Z+25 R0 FMAX
-30 L X+0 Y+0 R0 FMAX
-31 L Z+6 R0 FMAX
-32 L Z+5 R0 F200
-33 L X+10 R0 F600
-34 L Y+2.5
-35 L X+0 Z+4.5
-36 L Z+6
-37 L Z+25 R0 FMAX
-38 M5
-39 M9
-40 L Z+0 R0 FMAX M91
-41 M30
-42 END PGM demo MM
+25 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+26 TOOL CALL 1 Z S12000
+27 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+28 M3
+29 M8
+30 L Z+25 R0 FMAX
+31 L X+0 Y+0 R0 FMAX
+32 L Z+6 R0 FMAX
+33 L Z+5 R0 F200
+34 L X+10 R0 F600
+35 L Y+2.5
+36 L X+0 Z+4.5
+37 L Z+6
+38 L Z+25 R0 FMAX
+39 M5
+40 M9
+41 L Z+0 R0 FMAX M91
+42 M30
+43 END PGM demo MM
