@@ -11,6 +11,7 @@ export const UNCUT: RGB = [0.66, 0.66, 0.68];
 export const PALE: RGB = [0.87, 0.87, 0.85];
 export const CONNECTION: RGB = [1.0, 0.52, 0.0];
 export const REMAINDER: RGB = [0.86, 0.1, 0.14];
+export const STOCK: RGB = [0.8, 0.72, 0.58];
 export const OTHER: RGB = [0.72, 0.73, 0.75];
 const TOOLS: RGB[] = [
   [0.0, 0.33, 0.8], [0.0, 0.5, 0.22], [0.58, 0.1, 0.68], [0.0, 0.48, 0.56], [0.62, 0.36, 0.0],
@@ -29,9 +30,9 @@ function hsl(h: number, s: number, l: number): RGB {
   return [f(0), f(8), f(4)];
 }
 
-/** Colours of zones: neighbours in the list differ; none is near the red of the remainder. */
+/** Colours of zones: neighbours in the list differ; none is near the red of the remainder or the brown of the stock. */
 export function zoneColour(index: number): RGB {
-  const hue = 0.09 + 0.82 * ((index * 0.381966) % 1);
+  const hue = 0.15 + 0.76 * ((index * 0.381966) % 1);
   return hsl(hue, [0.52, 0.42, 0.62][index % 3]!, [0.62, 0.5, 0.72][Math.floor(index / 2) % 3]!);
 }
 

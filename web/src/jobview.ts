@@ -41,6 +41,7 @@ export class JobView {
   private chosen = -1;
   private marked: Vector3 | null = null;
   private seconds: number | null = null;
+  private stockShown = false;
   private playing = 0;
   private labels: { node: HTMLElement; place: Vector3 }[] = [];
   private program: { name: string; lines: string[] } | null = null;
@@ -294,6 +295,10 @@ export class JobView {
 
   // --- colours and steps --------------------------------------------------------------------------------------------------
 
+  private get mode(): Mode {
+    return (Object.entries(this.modes) as [Mode, HTMLInputElement][]).find(([, i]) => i.checked)?.[0] ?? "zones";
+  }
+
   private setMode(mode: Mode): void {
     this.modes[mode].checked = true;
     this.picture.setMode(mode);
@@ -304,7 +309,7 @@ export class JobView {
 
   private buildLegend(mode: Mode): void {
     const h = this.head;
-    if (h) fill(this.legend, ...legendOf(h, mode, new Set([...this.shown()].map((i) => h.steps[i]!.tool))));
+    if (h) fill(this.legend, ...legendOf(h, mode, new Set([...this.shown()].map((i) => h.steps[i]!.tool)), this.stockShown));
   }
 
   private shown(): Set<number> {
@@ -319,8 +324,7 @@ export class JobView {
       all.checked = boxes.every((b) => b.checked);
       all.indeterminate = !all.checked && boxes.some((b) => b.checked);
     }
-    const mode = (Object.entries(this.modes) as [Mode, HTMLInputElement][]).find(([, i]) => i.checked)?.[0];
-    if (mode) this.buildLegend(mode);
+    this.buildLegend(this.mode);
     this.remember();
   }
 
@@ -368,6 +372,11 @@ export class JobView {
       }
     }
     const here = this.picture.time(this.seconds);
+    const stock = here !== null && this.stock.checked && this.picture.hasStock;
+    if (stock !== this.stockShown) {
+      this.stockShown = stock;
+      this.buildLegend(this.mode);
+    }
     this.slider.value = String(Math.round((this.seconds ?? h.seconds) * 10));
     this.tell(here);
     this.remember();
@@ -548,8 +557,7 @@ export class JobView {
   private remember(): void {
     if (!this.head) return;
     const q = [`c=${this.picture.pose.join(",")}`];
-    const mode = (Object.entries(this.modes) as [Mode, HTMLInputElement][]).find(([, i]) => i.checked)?.[0];
-    if (mode) q.push(`m=${mode}`);
+    q.push(`m=${this.mode}`);
     if (this.seconds !== null) q.push(`t=${this.seconds.toFixed(1)}`);
     if (this.sectionAxis.value !== "") q.push(`s=${this.sectionAxis.value},${Number(this.sectionPlace.value) / 1000},${this.sectionFlip.checked ? 1 : 0}`);
     const steps = [...this.shown()];

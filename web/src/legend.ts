@@ -1,11 +1,11 @@
 // What the colours of the picture mean.
-import { CLASSES, CONNECTION, STEPS, UNCUT, css, toolColour, wallColour, zoneColour } from "./colours";
+import { CLASSES, CONNECTION, STEPS, STOCK, UNCUT, css, toolColour, wallColour, zoneColour } from "./colours";
 import { add, el, swatch } from "./dom";
 import type { Mode } from "./scene";
 import type { ViewHead } from "./viewfile";
 
-/** What the colours mean; `drawn` are the T numbers whose ways are shown. */
-export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>): (Node | null)[] {
+/** What the colours mean; `drawn` are the T numbers whose ways are shown, `stock` says whether stock is. */
+export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>, stock: boolean): (Node | null)[] {
   if (mode === "deviation") {
     const low = h.budget_mm.gouge;
     const high = h.budget_mm.scallop;
@@ -19,7 +19,7 @@ export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>): (Node | n
     return [el("div", { class: "scale", role: "img", "aria-label": `Scale: green is within ${low} mm too deep and ${high} mm of stock, red is cut too deep, blue is stock left` },
       ...CLASSES.map((c, i) => cell(c, i < 6 ? words(ends[i]!) : "mm"))),
       el("div", { class: "scalewords" }, el("span", {}, "cut too deep"), el("span", {}, "allowed"), el("span", {}, "stock left")),
-      el("div", { class: "entries" }, entry(css(UNCUT), "never cut", true), entry("rgb(222 222 217)", "not judged"))];
+      el("div", { class: "entries" }, entry(css(UNCUT), "never cut", true), entry("rgb(222 222 217)", "not judged"), stock ? entry(css(STOCK), "stock at this time") : null)];
   }
   const rest = h.remainder.length ? entry("#d8191f", "stays", true) : null;
   const more = (n: number): HTMLElement | null => (n > 0 ? el("span", { class: "entry" }, `and ${n} more`) : null);
@@ -31,6 +31,7 @@ export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>): (Node | n
   else
     out.push(el("div", { class: "entries" }, ...h.zones.slice(0, 10).map((z, i) => entry(css(zoneColour(i)), z.id)), more(h.zones.length - 10), rest,
       entry("rgb(184 186 191)", "nothing to do")));
+  if (stock) out[0]!.appendChild(entry(css(STOCK), "stock at this time"));
   if (drawn.size) {
     const list = el("div", { class: "entries" });
     h.tools.forEach((t, i) => {

@@ -539,10 +539,24 @@ export class Picture {
     return radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
   }
 
+  /** From how far all corners of the part are seen along a direction. */
+  private awayOfAll(d: Vector3): number {
+    const right = new Vector3().crossVectors(this.camera.up, d).normalize();
+    const up = new Vector3().crossVectors(d, right);
+    const half = 0.8 * Math.tan((this.camera.fov * Math.PI) / 360);
+    const [low, high] = this.head!.bounds_mm;
+    let far = 0.5 * this.size;
+    for (let c = 0; c < 8; c++) {
+      const o = new Vector3(...([0, 1, 2].map((k) => (c & (1 << k) ? high[k]! : low[k]!)) as P3)).sub(this.middle);
+      far = Math.max(far, o.dot(d) + Math.max(Math.abs(o.dot(right)) / (half * this.camera.aspect), Math.abs(o.dot(up)) / half));
+    }
+    return far;
+  }
+
   fit(direction: P3 = [-0.55, -0.95, 0.9]): void {
     const d = new Vector3(...direction).normalize();
     this.controls.target.copy(this.middle);
-    this.camera.position.copy(this.middle).addScaledVector(d, this.away(0.5 * this.size) * 0.98);
+    this.camera.position.copy(this.middle).addScaledVector(d, this.awayOfAll(d));
     this.camera.near = this.size / 500;
     this.camera.far = this.size * 60;
     this.camera.updateProjectionMatrix();

@@ -1,5 +1,6 @@
 // The stock as it is drawn. To look at only: the proof has a finer model.
-import { BufferAttribute, BufferGeometry, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial } from "three";
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial } from "three";
+import { STOCK } from "./colours";
 import { noNet, surface, type Net } from "./field";
 import { States, type Course } from "./states";
 import type { ChunkEntry, Table } from "./viewfile";
@@ -14,11 +15,10 @@ void main() {
 const FRAGMENT = /* glsl */ `
 precision highp float;
 in vec3 vPlace; in vec3 vEye; in vec3 vNormal_; in float vSpare; out vec4 outColour;
-uniform vec4 section; uniform float least;
+uniform vec4 section; uniform float least; uniform vec3 base;
 void main() {
   if (dot(section.xyz, vPlace) > section.w) discard;
   if (vSpare < least) discard; // here the part itself is seen
-  vec3 base = vec3(0.80, 0.72, 0.58);
   if (!gl_FrontFacing) {
     outColour = vec4(mix(base, base * 0.86, step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0))) * 0.86, 1.0);
     return;
@@ -27,7 +27,7 @@ void main() {
   float shade = 0.56 + 0.34 * max(dot(n, normalize(vec3(-0.35, 0.55, 0.75))), 0.0) + 0.16 * max(dot(n, eye), 0.0);
   outColour = vec4(base * shade, 1.0);
 }`;
-const SHOWN = 0.12; // of a step: stock that stands out of the part by less is not told from it
+const SHOWN = 0.08; // of a step: stock that stands out of the part by less is not told from it
 
 export class Stock {
   readonly mesh: Mesh;
@@ -37,7 +37,7 @@ export class Stock {
   constructor(entry: ChunkEntry, t: Table, section: { value: unknown }) {
     this.states = new States(entry, t);
     const material = new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: SHOWN * entry.step_mm! } } as never });
+      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: SHOWN * entry.step_mm! }, base: { value: new Color(...STOCK) } } as never });
     this.mesh = new Mesh(new BufferGeometry(), material);
     this.mesh.frustumCulled = false;
     const r = entry.rotation!;
