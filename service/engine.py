@@ -36,7 +36,7 @@ from service.work import WorkConfig, run_job
 log = structlog.get_logger(__name__)
 
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
-READY_EVERY_S = 1.0
+READY_EVERY_S, CHORES_EVERY_S = 1.0, 1.0
 MERCY_S = 1e9  # no lease counts as run out
 STEP_S = 1.0  # how far the clock has to jump to have been set
 SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 8.0, 10.0
@@ -232,7 +232,8 @@ class Engine:
         import dask
 
         # Before the import: distributed sets up its own logging by this key when it is imported.
-        dask.config.set({"distributed.scheduler.allowed-failures": 2, "logging": {"distributed": "error"}})
+        dask.config.set({"distributed.scheduler.allowed-failures": 2, "logging": {"distributed": "error"},
+                         "distributed.worker.profile.enabled": False})  # it looks a hundred times a second
         from distributed import Client, LocalCluster
         from distributed.utils import LoopRunner
 
@@ -263,7 +264,8 @@ class Engine:
         try:
             if self._client is None:
                 self._open_client()
-            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=SCHEDULER_WAIT_S)
+            found = {"": self.settings.workers} if self._cluster is not None else self._client.sync(
+                self._client.scheduler.ncores, callback_timeout=SCHEDULER_WAIT_S)
         except Exception as error:
             self._slots = 0
             if self.settings.scheduler is not None:
@@ -280,12 +282,14 @@ class Engine:
             threading.Thread(target=_close_quietly, args=(client,), name="closer", daemon=True).start()
 
     def _dispatch(self) -> None:
-        idle = ""
+        idle, chores = "", 0.0
         while not self._stop.is_set():
             try:
                 self._reap()
-                self.jobs.give_up(self.settings.max_attempts, self.settings.lease_s, self._mercy_s())
-                self.jobs.miss_deadlines()
+                if time.monotonic() >= chores:
+                    chores = time.monotonic() + CHORES_EVERY_S
+                    self.jobs.give_up(self.settings.max_attempts, self.settings.lease_s, self._mercy_s())
+                    self.jobs.miss_deadlines()
                 check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
                 while self._look() > self._running() and self._submit():
                     pass
