@@ -70,7 +70,7 @@ def set_clock(site, nth, rng):
 def cut_line(site, nth, rng):
     """The network between API and scheduler refuses, then swallows, for a moment or for longer than clients wait."""
     site.line.cut(silent=nth % 2 == 1)
-    time.sleep(40.0 if nth % 8 > 5 else rng.uniform(1.0, 8.0))
+    time.sleep(40.0 if nth % 8 in (2, 3) else rng.uniform(1.0, 8.0))
     site.line.mend()
 
 

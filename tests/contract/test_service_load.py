@@ -43,6 +43,7 @@ class Load:
         self.open: dict[str, str] = {}  # id -> state, of jobs that were posted
         self.ended_events = queue.SimpleQueue()
         self.memory: dict[str, list[tuple[float, float]]] = {}
+        self.used: dict[str, float] = {}
         self.count = 0
 
     def poll(self, nth):
@@ -80,10 +81,10 @@ class Load:
                 except httpx.HTTPError as error:
                     self.wrong.put(("events", type(error).__name__, str(error)))
 
-    def top_up(self):
+    def top_up(self, wanted):
         """Post until so many wait."""
         alive = sum(state not in FINAL for state in self.open.values())
-        for _ in range(self.wanted - alive):
+        for _ in range(wanted - alive):
             self.open[self.client.post(f"j{self.count}", "short nap")] = "queued"
             self.count += 1
 
@@ -96,21 +97,22 @@ class Load:
                 self.open[job["id"]] = job["state"]
             cursor = page["next_cursor"]
         for name, kept in zip(("scheduler", "worker 1", "worker 2", "api 1", "api 2"), self.site.kept, strict=True):
-            resident = psutil.Process(kept.process.pid).memory_info().rss / 1e6
-            self.memory.setdefault(name, []).append((time.monotonic(), resident))
+            process = psutil.Process(kept.process.pid)
+            self.memory.setdefault(name, []).append((time.monotonic(), process.memory_info().rss / 1e6))
+            self.used[name] = sum(process.cpu_times()[:2])
 
     def run(self, seconds):
         """Load for so long, then until the queue is empty."""
         threads = [threading.Thread(target=self.poll, args=(k,), daemon=True) for k in range(50)]
         threads += [threading.Thread(target=self.listen, args=(k,), daemon=True) for k in range(10)]
-        self.top_up()
+        self.top_up(self.wanted)
         for thread in threads:
             thread.start()
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             time.sleep(5.0)
             self.look()
-            self.top_up()
+            self.top_up(self.wanted // 5)
         while any(state not in FINAL for state in self.open.values()):
             time.sleep(5.0)
             self.look()
@@ -197,5 +199,7 @@ def _tell(load, lasted):
     print(f"\n{load.count} jobs, {lasted / 60:.1f} min, {load.ended_events.qsize()} ends told by streams")
     print(f"GET: {len(took)}, {len(took) / lasted:.0f}/s, median {1000 * took[len(took) // 2]:.0f} ms, "
           f"p99 {1000 * took[int(0.99 * len(took))]:.0f} ms, longest {1000 * took[-1]:.0f} ms")
+    used = load.used["api 1"] + load.used["api 2"]
+    print(f"API processes: {1000 * used / len(took):.1f} ms of processor for a GET, all they do counted in")
     for name, growth, median in _growth(load):
         print(f"{name}: {median:.0f} MB, from the second quarter to the last {growth:+.1f} MB")
