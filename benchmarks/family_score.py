@@ -71,12 +71,31 @@ def judge(recipe: str, seed: int, cache: Path, pictures: Path, limit: float) -> 
     out |= {"seed": seed, "recipe": recipe, "features": truth["features"], "facets": len(part.mesh.faces),
             "seconds": {k: round(v, 2) for k, v in seconds.items()}}
     if not out["right"]:
-        from service.preview import draw_preview
-
         pictures.mkdir(parents=True, exist_ok=True)
         title = f"{recipe} {seed}: " + "; ".join(out["causes"])[:110]
-        draw_preview(part, found, None, [], None, pictures / f"{recipe}-{seed}.png", title)
+        draw(part, found, pictures / f"{recipe}-{seed}.png", title)
     return out
+
+
+def draw(part: Any, found: Any, out: Path, title: str) -> None:
+    """The part with a colour for every wall, and orange for what was taken for a connection."""
+    import numpy as np
+    from PIL import Image, ImageDraw
+
+    from service.camera import Camera
+    from service.lettering import font
+    from service.preview import CONNECTION, OTHER, zone_colour
+    from service.scene import shaded
+
+    colours = np.full((len(part.faces) + 1, 3), OTHER, np.float32)
+    for index, wall in enumerate(found.walls):
+        colours[list(wall.faces)] = zone_colour(index)
+    for connection in found.connections:
+        colours[list(connection.faces)] = CONNECTION
+    camera = Camera.fit(part.mesh.vertices, (2400, 1600), azimuth=np.radians(-58.0), elevation=np.radians(38.0))
+    picture = Image.fromarray(shaded(part, colours, camera).halved())
+    ImageDraw.Draw(picture).text((20, 14), title, font=font(22), fill=(25, 30, 38))
+    picture.save(out)
 
 
 def compare(part: Any, found: Any, truth: dict[str, Any]) -> dict[str, Any]:

@@ -50,10 +50,10 @@ from service.programs import (
 from service.scoring import Score, score
 from service.sheet import sheet_files
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
-from service.sides import Look, Program, Side, in_first_frame, in_setup_frame
+from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces
-from service.viewdata import plan_view, verification_view
+from service.viewdata import VIEW_NAME, plan_view, verification_view
 from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.life import with_fresh_cutters, worn
@@ -149,8 +149,10 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             for p in written:
                 files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
         files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-        _preview(ready, sides, report, scored.samples.points[rest], out / "preview.png")
-        files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
+        page = plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look), report)
+        if page:
+            _preview(ready, page[VIEW_NAME][3], report, out / "preview.png")
+            files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
         _deviation(ready, look, dense, proof, report, out / MAP_NAME)
         files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
         if mesh is not None and programs:
@@ -158,7 +160,6 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
                                           lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
             report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
             files[MESH_NAME] = ("machined", "", None, data)
-        page = plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look), report)
         if report["state"] == "proved":
             files.update(stepnc())
     files.update(sheet_files(ready, written, report, files))
@@ -389,18 +390,12 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
         rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
 
 
-def _preview(ready: Prepared, sides: list[Side], report: dict[str, Any], stays: np.ndarray, path: Path) -> None:
-    owner: dict[int, str] = {}
-    for z in ready.zones:
-        for f in z.faces:
-            owner.setdefault(f, z.id)
+def _preview(ready: Prepared, view: bytes | Path, report: dict[str, Any], path: Path) -> None:
     facts = {"state": report["state"], "coverage": f"{100 * report['coverage']:.1f} %",
              "of what is in reach": f"{100 * report['reach_coverage']:.1f} %",
              "machining time": f"{report['machining_time_s'] / 60:.0f} min"}
-    title = ready.setup.labels.get("order") or "zonemill"
-    steps = [step for side in sides for step in in_first_frame(side)]
-    draw_preview(ready.views[0].part, ready.decomposition, owner, steps, stays[:: max(1, len(stays) // 20_000)], path,
-                 title, facts)
+    data = view if isinstance(view, bytes) else view.read_bytes()
+    draw_preview(data, path, ready.setup.labels.get("order") or "zonemill", facts)
 
 
 def _deviation(ready: Prepared, view: Look, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],

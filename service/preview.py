@@ -1,10 +1,8 @@
-"""preview.png: the part as the planner understands it, and what will be cut.
+"""preview.png: zones, what stays and why, and the tool paths, drawn from ``view.bin``, so that picture and page agree.
 
-Left the shaded part: every wall its own colour, connections in one strong
-colour, floors light, edges dark, ids at their places. Right the same view with
-the finishing paths in the colours of their tools, rapids dashed, and what no
-tool reaches in red. Below a legend. No clock, no random number, no graphics
-library: the same input gives the same bytes.
+Left the part: every zone its own colour, hatched red what stays, ids of walls and connections at their places. Right
+the same view with the ways of the finishing steps in the colours of their tools and rapids dashed. Below a legend. No
+clock, no random number, no graphics library: the same file gives the same bytes.
 """
 
 from __future__ import annotations
@@ -12,20 +10,20 @@ from __future__ import annotations
 import colorsys
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from geometry.mesh import F64
-from geometry.part import Part
+from geometry.mesh import F64, TriangleMesh
 from output.text import ascii_text, decimal
 from service.camera import Camera
 from service.lettering import (
     GREY,
     INK,
-    PAPER,
     RGB,
     WHITE,
     bytes_of,
@@ -36,204 +34,248 @@ from service.lettering import (
     font,
 )
 from service.raster import F32, Canvas
-from service.scene import segments, shaded
-from toolpath.motion import Motion, Trajectory, Workingstep
-from zones.model import Decomposition
+from service.scene import lit, segments
+from service.viewfile import read_view
+from service.viewpaths import CUT, RAPID
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
+# those of the page, web/src/colours.ts
 CONNECTION: RGB = (1.0, 0.52, 0.0)
-REMAINDER: RGB = (0.88, 0.0, 0.08)
-RAPID: RGB = (0.35, 0.37, 0.42)
-ROLES: dict[str, RGB] = {
-    "floor": (0.90, 0.89, 0.82), "base": (0.66, 0.68, 0.71), "fillet": (0.80, 0.82, 0.85), "free": (0.74, 0.77, 0.81),
-    "wall": (0.55, 0.68, 0.80), "connection": CONNECTION,
-}
+REMAINDER: RGB = (0.86, 0.10, 0.14)
+HATCHED: RGB = (0.98, 0.86, 0.84)
+OTHER: RGB = (0.72, 0.73, 0.75)
+RAPID_INK: RGB = (0.35, 0.37, 0.42)
 TOOLS: tuple[RGB, ...] = (
-    (0.00, 0.33, 0.80), (0.00, 0.55, 0.25), (0.58, 0.10, 0.68), (0.00, 0.52, 0.60), (0.62, 0.36, 0.00),
-    (0.85, 0.20, 0.55), (0.25, 0.25, 0.30), (0.40, 0.55, 0.00),
+    (0.0, 0.33, 0.8), (0.0, 0.5, 0.22), (0.58, 0.1, 0.68), (0.0, 0.48, 0.56), (0.62, 0.36, 0.0),
+    (0.8, 0.16, 0.5), (0.25, 0.25, 0.3), (0.36, 0.48, 0.0),
 )
-_MOST_LABELS = 40
+FIRST = 2  # what label 0 is on the canvas: 0 is nothing, 1 a face that no sample lies on
+ROUGH, FINE = 0, 1  # levels of detail
+MOST_LABELS, MOST_ZONES, MOST_REASONS = 40, 10, 5
+STEEP = 0.7  # of a feed move along the tool: it is a way up or down
+HATCH, INKED = 14, 5  # pixels from stripe to stripe, and of a stripe
 _TRIAL = (240, 180)  # pixels of the pictures that views are chosen with
+Table = dict[str, NDArray[np.int64]]
 
 
-def draw_preview(
-    part: Part, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None, steps: Sequence[Workingstep],
-    remainder_points: F64 | None, out_path: str | Path, title: str, facts: Mapping[str, str] | None = None,
-) -> None:
-    """Draw part, walls, connections, paths and remainder into a PNG of 1760 x 960 pixels.
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What a view file holds of the part and the ways, in mm.
 
-    part             : Part, setup frame, mm
-    decomposition    : its walls, connections and face roles
-    zone_of_face     : face number -> zone id; faces without one are drawn darker on the right. None: all alike
-    steps            : the plan; paths of the finishing steps are drawn, of all steps where none is finishing
-    remainder_points : (n, 3) float64, mm, points no tool of the setup reaches, or None
-    out_path         : file to write
-    title            : one line of text
-    facts            : more pairs for the legend, for example {'coverage': '97.2 %'}
+    mesh  : facets; their face ids are labels, from ``FIRST``
+    face  : (t,) int64, number of the face each is of
+    edges : polylines (k, 3)
+    ways  : of each step (n, 3) places, (n,) kinds as ``service.viewpaths`` has them, and (n, 3) or (3,) tool axes
     """
+
+    head: Mapping[str, Any]
+    mesh: TriangleMesh
+    face: NDArray[np.int64]
+    edges: Sequence[F64]
+    ways: Mapping[int, tuple[F64, NDArray[np.int64], F64]]
+
+    @classmethod
+    def of(cls, head: Mapping[str, Any], tables: Sequence[Table], most: int) -> Drawn:
+        """From what a view file holds, its levels up to ``most``."""
+        low, chunks = np.array(head["low_mm"]), list(zip(head["chunks"], tables, strict=True))
+        level = max((c["lod"] for c, _ in chunks if c["kind"] == "mesh" and c["lod"] <= most), default=0)
+        parts = [(c["label"], t) for c, t in chunks if c["kind"] == "mesh" and c["lod"] == level]
+        begins = np.cumsum([0, *(len(t["place"]) for _, t in parts)])
+        vertices = np.concatenate([np.zeros((0, 3)), *(low + head["mesh_grid_mm"] * t["place"] for _, t in parts)])
+        corners = np.concatenate([np.zeros((0, 3), np.int64),
+                                  *(t["corners"] + n for (_, t), n in zip(parts, begins[:-1], strict=True))])
+        face = np.concatenate([np.zeros(0, np.int64), *(t["face"][:, 0] for _, t in parts)])
+        label = np.repeat([k + FIRST for k, _ in parts], [len(t["corners"]) for _, t in parts])
+        edges = [low + head["mesh_grid_mm"] * t["place"][a:b] for c, t in chunks if c["kind"] == "edges"
+                 for a, b in zip(t["begins"][:-1, 0], t["begins"][1:, 0], strict=True)]
+        ways = {}
+        for c, t in chunks:  # the finer level of a step comes later
+            if c["kind"] == "path" and c["lod"] <= most:
+                axis = np.array(t["axis"] / head["axis_unit"] if "axis" in t else head["steps"][c["step"]]["axis"])
+                ways[c["step"]] = (low + head["path_grid_mm"] * t["place"], t["kind"][:, 0], axis)
+        mesh = TriangleMesh(np.ascontiguousarray(vertices), corners.astype(np.int32), label.astype(np.int32))
+        return cls(head, mesh, face[corners[:, 0]] if len(corners) else face, edges, ways)
+
+    def labels(self, kind: str) -> list[int]:
+        """The face ids of ``mesh`` that are of a kind, 'zone' or 'remainder', in the order of the head's list."""
+        named = {v[kind]: k + FIRST for k, v in enumerate(self.head["labelled"]) if kind in v}
+        wanted = [z["id"] for z in self.head["zones"]] if kind == "zone" else range(len(self.head["remainder"]))
+        return [named[w] for w in wanted]
+
+    def finishing(self) -> list[int]:
+        """The steps whose ways are drawn: those of finishing, or all where there are none."""
+        steps = [k for k, s in enumerate(self.head["steps"]) if s["operation"] == "finishing" and k in self.ways]
+        return steps or sorted(self.ways)
+
+
+def draw_preview(view: bytes, out_path: str | Path, title: str, facts: Mapping[str, str] | None = None) -> None:
+    """Draw a view file into a PNG of 1760 x 960 pixels.
+
+    view     : bytes of ``view.bin`` (``service.viewfile``)
+    out_path : file to write
+    title    : one line of text
+    facts    : pairs for the legend, for example {'coverage': '97.2 %'}
+    """
+    head, tables = read_view(view)
+    drawn = Drawn.of(head, tables, FINE)
     width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
-    shown = [s for s in steps if s.operation == "finishing"] or list(steps)
-    camera = _camera(part, decomposition, shown, (2 * width, 2 * height))
-    left = shaded(part, _face_colours(part, decomposition), camera)
-    _draw_hidden_connections(left, part, decomposition, camera)
-    pale = shaded(part, _pale_colours(part, decomposition, zone_of_face), camera)
-    tools = _tool_colours(steps)
-    _draw_paths(pale, camera, shown, tools)
-    if remainder_points is not None and len(remainder_points):
-        pale.dots(camera.screen(remainder_points), REMAINDER, width=5, alpha=0.9, hidden=0.35, bias=0.15 * camera.scale)
+    camera = _camera(Drawn.of(head, tables, ROUGH), (2 * width, 2 * height))
+    left = _part(drawn, camera, 1.0)
+    right = _part(drawn, camera, 0.3)
+    tools = _tool_colours(drawn)
+    _draw_ways(right, camera, drawn, tools)
 
     sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
-    for canvas, x in ((left, 0), (pale, width + GUTTER)):
+    for canvas, x in ((left, 0), (right, width + GUTTER)):
         sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
     pen = ImageDraw.Draw(sheet)
     pen.text((20, 14), ascii_text(title), font=font(26), fill=bytes_of(INK))
-    _labels(pen, part, decomposition, camera)
-    _captions(pen, width, shown is not steps and len(shown) != len(steps))
+    _labels(pen, drawn, camera, left.depth)
+    partly = len(drawn.finishing()) < len(drawn.ways)
+    for x, caption in ((0, "Zones, and hatched what stays" if drawn.head["zones"] else "Part"),
+                       (width + GUTTER, "Tool paths" + (" of finishing" if partly else ""))):
+        pen.text((x + 20, HEADER + 12), caption, font=font(17), fill=bytes_of(GREY))
     draw_triad(pen, camera, (54, SIZE[1] - LEGEND - 54))
     for x in (width, SIZE[0]):
         draw_scale(pen, camera, (x - 24, SIZE[1] - LEGEND - 24))
-    _legend(pen, decomposition, zone_of_face, steps, tools, remainder_points, facts or {})
+    _legend(pen, drawn, tools, facts or {})
     sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
 
 
-def _camera(part: Part, decomposition: Decomposition, steps: Sequence[Workingstep], size: tuple[int, int]) -> Camera:
-    """Where the viewer stands: of twelve slanting azimuths and two heights, where the connections fill most pixels.
+def _camera(drawn: Drawn, size: tuple[int, int]) -> Camera:
+    """Where the viewer stands: of twelve slanting azimuths and two heights, where most is seen of what matters.
 
-    Ties, and parts without connections, go to the first, the usual isometric view.
+    That are connections and what stays. Ties, and parts without both, go to the first, the usual isometric view.
     """
-    cuts = [t.points for s in steps for t in s.trajectories if t.motion is Motion.CUT]
-    points = np.concatenate([part.mesh.vertices, *cuts])
-    wanted = [f for c in decomposition.connections for f in c.faces]
+    faces = [f for c in drawn.head["connections"] for f in c["faces"]]
+    matters = np.isin(drawn.face, faces) | np.isin(drawn.mesh.face_ids, drawn.labels("remainder"))
+    points = drawn.mesh.vertices if len(drawn.mesh.vertices) else np.array(drawn.head["bounds_mm"])
+    wanted = TriangleMesh(drawn.mesh.vertices, drawn.mesh.faces, matters.astype(np.int32) + 1)
     views = [(quarter + turn, up) for up in (38.0, 50.0) for turn in (-58.0, -25.0, -65.0)
              for quarter in (0, 90, 180, 270)]
-    best, most = views[0], -1.0
-    for view in views if wanted else ():
+    best, most = views[0], 0.0
+    for view in views if matters.any() else ():
         camera = Camera.fit(points, _TRIAL, azimuth=math.radians(view[0]), elevation=math.radians(view[1]))
-        seen = _owners(part, camera)
-        area = float(np.isin(seen, wanted).sum())
+        area = float((lit(wanted, np.ones((3, 3), np.float32), camera).owner == 2).sum())
         if area > 1.05 * most:
             best, most = view, area
-    return Camera.fit(points, size, azimuth=math.radians(best[0]), elevation=math.radians(best[1]))
+    return Camera.fit(points, size, azimuth=math.radians(best[0]), elevation=math.radians(best[1]), margin=0.1)
 
 
-def _owners(part: Part, camera: Camera) -> NDArray[np.int32]:
-    """(h, w): the face number seen in every pixel."""
-    canvas = Canvas.blank(*camera.size, PAPER)
-    front = np.flatnonzero(part.mesh.normals @ camera.basis[2] > 0.0)
-    canvas.triangles(camera.screen(part.mesh.triangles[front]), np.zeros((len(front), 3), np.float32),
-                     part.mesh.face_ids[front])
-    return canvas.owner
+def _part(drawn: Drawn, camera: Camera, strength: float) -> Canvas:
+    """The part, its colours faded to ``strength``, 0 to 1, with hatching and edges."""
+    colours = np.full((FIRST + len(drawn.head["labelled"]), 3), OTHER, np.float32)
+    for index, label in enumerate(drawn.labels("zone")):
+        colours[label] = zone_colour(index)
+    rest = drawn.labels("remainder")
+    colours[rest] = HATCHED
+    canvas = lit(drawn.mesh, _faded(colours, strength), camera)
+    y, x = np.nonzero(np.isin(canvas.owner, rest))
+    stripe = (x + y) % HATCH < INKED
+    canvas.colour[y[stripe], x[stripe]] = _faded(np.array([REMAINDER], np.float32), 0.4 + 0.6 * strength)
+    solid = Canvas(canvas.colour, canvas.depth, np.minimum(canvas.owner, 1).astype(np.int32))
+    solid.outline(INK, jump=0.02 * min(camera.size))
+    for edge in drawn.edges:
+        canvas.strokes(segments(camera, edge), INK, width=2, alpha=0.75, bias=3.0)
+    return canvas
 
 
-def _draw_hidden_connections(canvas: Canvas, part: Part, decomposition: Decomposition, camera: Camera) -> None:
-    """Edges of connections shine through what stands before them."""
-    faces = {f for c in decomposition.connections for f in c.faces}
-    for edge in part.edges:
-        if faces & set(edge.faces) and len(edge.points) > 1:
-            canvas.strokes(segments(camera, edge.points), CONNECTION, width=3, alpha=0.0, hidden=0.8, bias=4.0,
-                           dash=7.0)
+def _faded(colours: F32, strength: float) -> F32:
+    return np.asarray(strength * colours + (1.0 - strength) * np.float32(0.95), dtype=np.float32)
 
 
-def wall_colour(index: int) -> RGB:
-    """A soft colour for the wall of that index; neighbours differ, none comes near the orange of connections."""
-    hue = (0.40 + 0.381966 * 0.62 * index) % 0.62 + 0.30
-    return colorsys.hsv_to_rgb(hue % 1.0, (0.46, 0.34, 0.56)[index % 3], (0.80, 0.90, 0.72)[index % 3])
+def zone_colour(index: int) -> RGB:
+    """The colour of a zone by its place in the list, as ``zoneColour`` of the page."""
+    hue = 0.15 + 0.76 * ((index * 0.381966) % 1.0)
+    return colorsys.hls_to_rgb(hue, (0.62, 0.50, 0.72)[index // 2 % 3], (0.52, 0.42, 0.62)[index % 3])
 
 
-def _face_colours(part: Part, decomposition: Decomposition) -> F32:
-    """(n + 1, 3): colour of every face number; 0 is a triangle without a face."""
-    colours = np.empty((len(part.faces) + 1, 3), dtype=np.float32)
-    colours[:] = ROLES["free"]
-    for number, role in decomposition.face_role.items():
-        colours[number] = ROLES.get(role, ROLES["free"])
-    for index, wall in enumerate(decomposition.walls):
-        colours[list(wall.faces)] = wall_colour(index)
-    for connection in decomposition.connections:
-        colours[list(connection.faces)] = CONNECTION
-    return colours
+def _tool_colours(drawn: Drawn) -> dict[int, RGB]:
+    """Colours by T number, of the tools of the steps that are drawn."""
+    used = {drawn.head["steps"][k]["tool"] for k in drawn.finishing()}
+    colours = {t["number"]: TOOLS[k % len(TOOLS)] for k, t in enumerate(drawn.head["tools"]) if t["number"] in used}
+    return colours | dict.fromkeys(used - set(colours), GREY)
 
 
-def _pale_colours(part: Part, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None) -> F32:
-    """The same, faded, so that paths stand out; faces without a zone grey."""
-    colours = np.asarray(0.25 * _face_colours(part, decomposition) + 0.75 * np.float32(0.95), dtype=np.float32)
-    if zone_of_face is not None:
-        out = [f.number for f in part.faces if f.number not in zone_of_face]
-        colours[out] = (0.70, 0.71, 0.73)
-    return colours
+def _draw_ways(canvas: Canvas, camera: Camera, drawn: Drawn, tools: Mapping[int, RGB]) -> None:
+    """Rapids and ways up and down first and faint, the cuts over them; what the part hides stays hidden."""
+    moves: dict[str, list[tuple[F64, RGB]]] = {"rapid": [], "aside": [], "cut": []}
+    for step in drawn.finishing():
+        place, kinds, axis = drawn.ways[step]
+        colour = tools[drawn.head["steps"][step]["tool"]]
+        for kind in (RAPID, CUT):
+            rows = np.flatnonzero(kinds == kind)
+            lines = np.stack([place[rows - 1], place[rows]], axis=1)
+            way = lines[:, 1] - lines[:, 0]
+            steep = np.abs((way * (axis[rows] if axis.ndim == 2 else axis)).sum(axis=1)) > STEEP * np.linalg.norm(
+                way, axis=1)
+            if kind == RAPID:
+                moves["rapid"].append((lines, RAPID_INK))
+            else:
+                moves["aside"].append((lines[steep], colour))
+                moves["cut"].append((lines[~steep], colour))
+    for name, alpha, dash in (("rapid", 0.2, 8.0), ("aside", 0.15, 0.0), ("cut", 0.75, 0.0)):
+        for lines, colour in moves[name]:
+            canvas.strokes(camera.screen(lines), colour, width=2, alpha=alpha, bias=4.0, dash=dash)
 
 
-def _tool_colours(steps: Sequence[Workingstep]) -> dict[int, RGB]:
-    numbers = sorted({s.tool.number for s in steps})
-    return {n: TOOLS[i % len(TOOLS)] for i, n in enumerate(numbers)}
-
-
-def _draw_paths(canvas: Canvas, camera: Camera, steps: Sequence[Workingstep], tools: Mapping[int, RGB]) -> None:
-    """Links and rapids faint and first, the cuts over them."""
-    for step in steps:
-        rapids = _of_motion(camera, step.trajectories, (Motion.RAPID,))
-        canvas.strokes(rapids, RAPID, width=1, alpha=0.35, hidden=0.04, bias=4.0, dash=8.0)
-        links = _of_motion(camera, step.trajectories, (Motion.CONNECT, Motion.APPROACH, Motion.LIFT))
-        canvas.strokes(links, tools[step.tool.number], width=1, alpha=0.30, hidden=0.04, bias=4.0)
-    for step in steps:
-        cuts = _of_motion(camera, step.trajectories, (Motion.CUT,))
-        canvas.strokes(cuts, tools[step.tool.number], width=2, alpha=0.75, hidden=0.10, bias=4.0)
-
-
-def _of_motion(camera: Camera, trajectories: Sequence[Trajectory], motions: tuple[Motion, ...]) -> F64:
-    """(n, 2, 3) screen segments of all trajectories of these motions."""
-    lines = [np.stack([t.points[:-1], t.points[1:]], axis=1) for t in trajectories if t.motion in motions]
-    return camera.screen(np.concatenate(lines)) if lines else np.zeros((0, 2, 3))
-
-
-def _labels(pen: ImageDraw.ImageDraw, part: Part, decomposition: Decomposition, camera: Camera) -> None:
-    """Ids of walls at their upper rims and of connections at their tops, on the left picture."""
-    named = [(c.id, c.faces) for c in decomposition.connections] + [(w.id, w.faces) for w in decomposition.walls]
-    if len(named) > _MOST_LABELS:
-        named = named[-_MOST_LABELS:] if len(decomposition.walls) >= _MOST_LABELS else named
-    for name, faces in named[:_MOST_LABELS]:
-        points = part.mesh.triangles[np.isin(part.mesh.face_ids, faces)].reshape(-1, 3)
-        if not len(points):
+def _labels(pen: ImageDraw.ImageDraw, drawn: Drawn, camera: Camera, depth: F64) -> None:
+    """Ids of walls and connections on the left picture, where the page has them; faint what is hidden."""
+    named = [x for x in [*drawn.head["connections"], *drawn.head["walls"]] if x["at_mm"]]
+    taken: list[tuple[float, float]] = []
+    for item in named[:MOST_LABELS]:
+        x, y, z = camera.screen(np.array(item["at_mm"])).tolist()
+        at = (0.5 * x, HEADER + 0.5 * y)
+        if any(abs(at[0] - u) < 28 and abs(at[1] - v) < 18 for u, v in taken):
             continue
-        rim = points[points[:, 2] >= points[:, 2].max() - 0.05 * max(float(np.ptp(points[:, 2])), 1e-9)]
-        wall = name.startswith("W")
-        at = rim[np.argmax(camera.screen(rim)[:, 1])] if wall else rim.mean(axis=0)
-        x, y, _ = 0.5 * camera.screen(at)
-        pen.text((x, HEADER + y + (6 if wall else 0)), name, font=font(17), anchor="mt" if wall else "mm",
-                 fill=bytes_of(INK), stroke_width=3, stroke_fill=bytes_of(WHITE))
+        taken.append(at)
+        row, column = int(np.clip(y, 0, len(depth) - 1)), int(np.clip(x, 0, depth.shape[1] - 1))
+        hidden = depth[row, column] > z + 0.02 * min(camera.size)
+        pen.text(at, item["id"], font=font(17), anchor="mm", fill=bytes_of(GREY if hidden else INK), stroke_width=3,
+                 stroke_fill=bytes_of(WHITE))
 
 
-def _captions(pen: ImageDraw.ImageDraw, width: int, partly: bool) -> None:
-    grey = bytes_of(GREY)
-    pen.text((20, HEADER + 12), "Walls and connections", font=font(17), fill=grey)
-    text = "Finishing paths and remainder" + (" (roughing not drawn)" if partly else "")
-    pen.text((width + GUTTER + 20, HEADER + 12), text, font=font(17), fill=grey)
-
-
-def _legend(pen: ImageDraw.ImageDraw, decomposition: Decomposition, zone_of_face: Mapping[int, str] | None,
-            steps: Sequence[Workingstep], tools: Mapping[int, RGB], remainder: F64 | None,
-            facts: Mapping[str, str]) -> None:
-    """Three columns below the pictures: counts and facts, surfaces, tools and lines."""
-    top = SIZE[1] - LEGEND + 12
-    zones = {s.zone for s in steps if s.zone} | set((zone_of_face or {}).values())
-    counts = {"walls": len(decomposition.walls), "connections": len(decomposition.connections),
-              "channels": len(decomposition.channels), "zones": len(zones), "steps": len(steps)}
-    pairs = [(k, str(v)) for k, v in counts.items()] + [(k, str(v)) for k, v in facts.items()]
-    draw_pairs(pen, pairs, 20, top)
-    surfaces: list[tuple[str, RGB | None]] = [(w.id, wall_colour(i)) for i, w in enumerate(decomposition.walls[:12])]
-    if len(decomposition.walls) > 12:
-        surfaces.append((f"and {len(decomposition.walls) - 12} more walls", None))
-    surfaces += [("connection", CONNECTION), ("floor", ROLES["floor"]), ("fillet", ROLES["fillet"]),
-                 ("base", ROLES["base"])]
-    draw_swatches(pen, surfaces, 610, top, columns=4, step=140)
+def _legend(pen: ImageDraw.ImageDraw, drawn: Drawn, tools: Mapping[int, RGB], facts: Mapping[str, str]) -> None:
+    """Below the pictures: facts, zones, why what stays stays, tools and lines."""
+    top, head = SIZE[1] - LEGEND + 12, drawn.head
+    counts = {"walls": len(head["walls"]), "connections": len(head["connections"]), "zones": len(head["zones"]),
+              "steps": len(head["steps"])}
+    draw_pairs(pen, [(k, str(v)) for k, v in facts.items()][:5], 20, top, wide=250)
+    draw_pairs(pen, [(k, str(v)) for k, v in counts.items()], 265, top, indent=100)
+    zones: list[tuple[str, RGB | None]] = [(z["id"], zone_colour(k)) for k, z in enumerate(head["zones"])]
+    shown = zones if len(zones) <= MOST_ZONES else zones[:MOST_ZONES - 1]
+    if len(shown) < len(zones):
+        shown = [*shown, (f"and {len(zones) - len(shown)} more", None)]
+    draw_swatches(pen, shown, 420, top, columns=2, step=95)
+    reasons = _reasons(head["remainder"])
+    for k, text in enumerate(reasons):
+        line = top + 21 * k
+        _hatched(pen, 640, line + 2)
+        pen.text((670, line), ascii_text(text), font=font(15), fill=bytes_of(INK))
     lines: list[tuple[str, RGB | None]] = []
-    for number, colour in tools.items():
-        body = next(s.tool for s in steps if s.tool.number == number)
-        lines.append((f"T{number} {body.kind} D{decimal(body.diameter)}"
-                      + (f" R{decimal(body.corner_radius)}" if body.kind == "bull" else ""), colour))
-    lines.append(("rapid", RAPID))
-    if remainder is not None and len(remainder):
-        lines.append(("no tool reaches", REMAINDER))
-    if zone_of_face is not None:
-        lines.append(("face without zone", (0.70, 0.71, 0.73)))
-    draw_swatches(pen, lines, 1180, top, columns=3, step=190)
+    for t in head["tools"]:
+        if t["number"] in tools:
+            lines.append((f"T{t['number']} {t['kind']} D{decimal(t['diameter_mm'])}", tools[t["number"]]))
+    lines = [*lines[:8], ("rapid", RAPID_INK), ("nothing to do", OTHER)]
+    draw_swatches(pen, lines, 1400, top, columns=2, step=170)
+
+
+def _reasons(remainder: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What stays in words, entries of one reason together, the largest first; five lines at most."""
+    area: dict[str, list[float]] = {}
+    for entry in remainder:
+        area.setdefault(entry["reason"], []).append(entry["area_mm2"])
+    rows = sorted(area.items(), key=lambda item: -sum(item[1]))
+    lines = [f"{sum(each):.{0 if sum(each) >= 10 else 1}f} mm2 stay: {reason}"
+             + (f" ({len(each)} places)" if len(each) > 1 else "") for reason, each in rows]
+    if len(lines) > MOST_REASONS:
+        left = sum(sum(each) for _, each in rows[MOST_REASONS - 1:])
+        lines = [*lines[:MOST_REASONS - 1], f"{left:.1f} mm2 for {len(lines) - MOST_REASONS + 1} more reasons"]
+    return [line if len(line) <= 84 else line[:81] + "..." for line in lines]
+
+
+def _hatched(pen: ImageDraw.ImageDraw, x: int, y: int) -> None:
+    pen.rectangle([x, y, x + 22, y + 12], fill=bytes_of(HATCHED), outline=bytes_of((0.5, 0.5, 0.5)))
+    for k in (1, 8, 15):
+        pen.line([(x + k, y + 12), (x + min(k + 10, 22), y)], fill=bytes_of(REMAINDER), width=2)

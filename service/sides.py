@@ -12,7 +12,6 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from output.model import Workplan
 from schemas.machine import DIALECT_ENDINGS
-from toolpath.motion import Workingstep
 from toolpath.plan import Plan
 from toolpath.stock import StockMap
 from verify.model import NcProgram, Proof
@@ -117,13 +116,4 @@ def _turned(place: Place | None, rotation: F64) -> Place | None:
     return x, y, z
 
 
-def in_first_frame(side: Side) -> list[Workingstep]:
-    """The steps of a side with their points in the frame of the first access, for a picture."""
-    turn = side.view.rotation @ side.view.first.T
-    if np.array_equal(turn, np.eye(3)):
-        return list(side.made.steps)
-    return [replace(s, trajectories=tuple(replace(t, points=t.points @ turn) for t in s.trajectories))
-            for s in side.made.steps]
-
-
-__all__ = ["Look", "Program", "Side", "in_first_frame", "in_setup_frame"]
+__all__ = ["Look", "Program", "Side", "in_setup_frame"]

@@ -48,8 +48,8 @@ def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32
     report   : whose places are in the setup frame; of a job that is not proved no program is given away.
                Where the file cannot be made its notes say so
     """
-    return _or_none(report, lambda: _plan_view(ready, look, scored, zone, given_up, rest, proof, programs, setup,
-                                               report))
+    return _or_none(report, f"{VIEW_NAME}, and preview.png, which is drawn from it,",
+                    lambda: _plan_view(ready, look, scored, zone, given_up, rest, proof, programs, setup, report))
 
 
 def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
@@ -78,15 +78,15 @@ def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proo
         label = np.zeros(len(samples), np.int64)
         return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, read, report, open_=True)
 
-    return _or_none(report, made)
+    return _or_none(report, VIEW_NAME, made)
 
 
-def _or_none(report: Mapping[str, Any], made: Callable[[], Files]) -> Files:
+def _or_none(report: Mapping[str, Any], what: str, made: Callable[[], Files]) -> Files:
     """The file, or none and a note in the report: no job is lost for its picture."""
     try:
         return made()
     except CamError as error:
-        report["proof"]["notes"].append(f"{VIEW_NAME} could not be made: {error.message}")
+        report["proof"]["notes"].append(f"{what} could not be made: {error.message}")
         return {}
 
 

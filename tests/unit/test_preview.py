@@ -1,47 +1,57 @@
-"""The rasteriser against closed forms, the picture against what must be seen in it."""
+"""The rasteriser against closed forms, the picture against what must be seen in it, its colours against the page's."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from geometry.mesh import TriangleMesh
-from geometry.part import EdgeInfo, EdgeKind, FaceInfo, Part
+from geometry.part import EdgeInfo, EdgeKind
+from service import deviation, preview
 from service.camera import Camera
 from service.lettering import scale_length
-from service.preview import CONNECTION, REMAINDER, SIZE, TOOLS, draw_preview, wall_colour
+from service.preview import REMAINDER, SIZE, TOOLS, draw_preview, zone_colour
 from service.raster import Canvas
-from tests.synthetic_plan import BALL, line, step
-from toolpath.motion import Motion
-from zones.model import Connection, Decomposition, Wall
+from service.viewfile import Chunk, Column, write_view
+from service.viewmesh import GRID, LEFT_UNIT, Facets, edge_chunk, mesh_chunks
+from tests.hand_parts import as_part, box_mesh, joined
 
-
-def box(low, high, first):
-    """Vertices, triangles and face numbers first..first+5 of a box, outward."""
-    x, y, z = zip(low, high, strict=True)
-    v = np.array([[x[i], y[j], z[k]] for k in (0, 1) for j in (0, 1) for i in (0, 1)], dtype=float)
-    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    f = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
-    return v, np.array(f), np.repeat(np.arange(first, first + 6), 2)
+LOW = np.array([-5.0, -5.0, -5.0])
 
 
 @pytest.fixture(scope="module")
 def bridge():
-    """A plate, two walls on it, and a bar between them."""
-    solids = [box((0, 0, 0), (40, 20, 3), 1), box((2, 5, 3), (38, 7, 13), 7), box((2, 13, 3), (38, 15, 13), 13),
-              box((18, 7, 8), (22, 13, 10), 19)]
-    count = np.cumsum([0] + [len(v) for v, _, _ in solids])
-    mesh = TriangleMesh(np.concatenate([v for v, _, _ in solids]),
-                        np.concatenate([f + n for (_, f, _), n in zip(solids, count, strict=False)]),
-                        np.concatenate([i for _, _, i in solids]))
-    assert mesh.volume == pytest.approx(40 * 20 * 3 + 2 * 36 * 2 * 10 + 4 * 6 * 2)
-    faces = tuple(FaceInfo(n, "plane", 1.0, False, 0.0, 0.0) for n in range(1, 25))
+    """A plate, two walls on it, and a bar between them, in facets: the walls are zones, the bar's outside stays."""
+    part = as_part(joined(box_mesh((0, 0, 0), (40, 20, 3)), box_mesh((2, 5, 3), (38, 7, 13)),
+                          box_mesh((2, 13, 3), (38, 15, 13)), box_mesh((18, 7, 8), (22, 13, 10))))
     edge = EdgeInfo((7, 8), EdgeKind.CONVEX, 36.0, 1.57, np.array([[2.0, 5, 13], [38.0, 5, 13]]))
-    part = Part(mesh, faces, (edge,), mesh.volume, mesh.bounds, "mm", 0.01, 0.2, 0.0, (), "0" * 64)
-    roles = dict.fromkeys(range(1, 7), "base") | {2: "floor"} | dict.fromkeys(range(7, 19), "wall")
-    walls = (Wall("W1", tuple(range(7, 13)), (9, 10), 2.0, 3.0, 13.0),
-             Wall("W2", tuple(range(13, 19)), (15, 16), 2.0, 3.0, 13.0))
-    bar = Connection("C1", tuple(range(19, 25)), ("W1", "W2"), 8.0, 10.0)
-    return part, Decomposition(walls, (bar,), (), roles | dict.fromkeys(range(19, 25), "connection"))
+    object.__setattr__(part, "edges", (edge,))
+    t = len(part.mesh.faces)
+    assert t == 48
+    face = np.repeat(np.arange(t) // 2 + 1, 3).astype(np.int32)
+    label = np.array([3, 0, 1, 2])[np.arange(t) // 12]
+    facets = Facets(part.mesh.triangles.reshape(-1, 3), np.repeat(part.mesh.normals, 3, axis=0), face, np.zeros(3 * t),
+                    np.ones(3 * t, np.int64), np.arange(3 * t).reshape(-1, 3), label)
+    return part, facets
+
+
+def view(bridge, ways=(), state="proved"):
+    """A view file; ``ways`` are rows of (places, kinds) of finishing steps."""
+    part, facets = bridge
+    mesh, finer = mesh_chunks(facets, LOW)
+    paths = [Chunk("path", {"step": k, "lod": 0}, {
+        "place": Column(np.rint((np.array(p) - LOW) / GRID), 4, "steps"), "kind": Column(np.array(kind), 1),
+        "time": Column(np.arange(len(p)), 4, "steps")}) for k, (p, kind) in enumerate(ways)]
+    step = {"operation": "finishing", "tool": 1, "axis": [0.0, 0.0, 1.0]}
+    head = {"low_mm": LOW.tolist(), "mesh_grid_mm": GRID, "path_grid_mm": GRID, "left_unit_mm": LEFT_UNIT,
+            "axis_unit": 32000, "bounds_mm": part.bounds.tolist(), "state": state,
+            "labelled": [{"zone": "Z1"}, {"zone": "Z2"}, {"remainder": 0}, {"other": True}],
+            "zones": [{"id": "Z1"}, {"id": "Z2"}], "walls": [{"id": "W1", "at_mm": [20, 6, 13], "faces": [7]}],
+            "connections": [{"id": "C1", "at_mm": [20, 10, 10], "faces": [19, 20, 21, 22, 23, 24]}],
+            "remainder": [{"reason": "undercut behind connection C1", "area_mm2": 12.0}],
+            "tools": [{"number": 1, "kind": "ball", "diameter_mm": 3.0}], "steps": [step] * len(ways)}
+    return write_view(head, [*mesh, edge_chunk(part, LOW, 1.0), *paths, *finer])
 
 
 def near(picture, colour, tolerance=30):
@@ -54,17 +64,9 @@ def hues(picture, colour):
     """How many pixels have the hue of that colour, in light or shade."""
     p = picture.astype(float)
     c = np.array(colour)
-    strong = p.max(axis=-1) - p.min(axis=-1) > 60
+    strong = p.max(axis=-1) - p.min(axis=-1) > 40
     unit = p / np.maximum(np.linalg.norm(p, axis=-1, keepdims=True), 1.0)
-    return int((strong & (unit @ (c / np.linalg.norm(c)) > 0.995)).sum())
-
-
-def draw(tmp_path, bridge, name="a.png", remainder=None, steps=()):
-    part, decomposition = bridge
-    file = tmp_path / name
-    draw_preview(part, decomposition, {n: "Z1" for n in range(7, 25)}, steps, remainder, file, "bridge",
-                 {"coverage": "98 %"})
-    return file
+    return int((strong & (unit @ (c / np.linalg.norm(c)) > 0.998)).sum())
 
 
 def pictures(file):
@@ -74,30 +76,75 @@ def pictures(file):
     return image[60:820, :half], image[60:820, half:]
 
 
-def test_connections_and_both_walls_are_seen(tmp_path, bridge):
-    left, right = pictures(draw(tmp_path, bridge))
-    assert hues(left, CONNECTION) > 2000
+def draw(tmp_path, data, name="a.png"):
+    draw_preview(data, tmp_path / name, "Größe ✓", {"coverage": "98 %"})
+    return pictures(tmp_path / name)
+
+
+def test_zones_have_their_colours_and_what_stays_is_hatched(tmp_path, bridge):
+    left, right = draw(tmp_path, view(bridge))
     for index in (0, 1):
-        assert hues(left, wall_colour(index)) > 2000
-    assert hues(right, CONNECTION) == 0 or hues(right, CONNECTION) < hues(left, CONNECTION) / 4
+        assert hues(left, zone_colour(index)) > 2000 > 4 * hues(right, zone_colour(index))
+    # stripes: both of the two colours, next to each other
+    red = near(left, REMAINDER, 40)
+    assert red > 150 and near(left, preview.HATCHED, 40) > 150
+    assert near(left, preview.OTHER, 60) > 2000
 
 
-def test_paths_have_the_colour_of_their_tool_and_remainder_is_red(tmp_path, bridge):
-    cut = tuple(line(Motion.CUT, (0, y, 14), (40, y, 14), feed=100) for y in np.arange(0.0, 20.0, 0.25))
-    red = np.array([[18 + 0.1 * i, 8 + 0.1 * j, 10.0] for i in range(40) for j in range(40)])
-    left, right = pictures(draw(tmp_path, bridge, "b.png", red, [step(1, BALL, "floor", trajectories=cut)]))
-    assert near(right, TOOLS[0], 90) > 2000 and near(left, TOOLS[0], 60) < 500
-    assert hues(right, REMAINDER) > 1000 and hues(left, REMAINDER) < 20
+def test_ways_have_the_colour_of_their_tool_and_those_up_and_down_are_faint(tmp_path, bridge):
+    y = np.repeat(np.arange(0.0, 20.0, 0.5), 2)
+    x = np.resize([0.0, 40.0, 40.0, 0.0], len(y))
+    cuts = (np.column_stack([x, y, np.full(len(y), 14.0)]), [0, *[2] * (len(y) - 1)])
+    left, right = draw(tmp_path, view(bridge, [cuts]))
+    assert near(right, TOOLS[0], 90) > 2000 > 10 * near(left, TOOLS[0], 60)
+    z = np.resize([14.0, 30.0, 30.0, 14.0], len(y))
+    lifts = (np.column_stack([0.2 * np.arange(len(y)) // 0.4, y, z]), cuts[1])
+    assert near(draw(tmp_path, view(bridge, [lifts]), "b.png")[1], TOOLS[0], 90) < 500
+    rapids = (cuts[0], [0, *[1] * (len(y) - 1)])
+    assert near(draw(tmp_path, view(bridge, [rapids]), "c.png")[1], TOOLS[0], 90) < 50
 
 
 def test_same_bytes_twice(tmp_path, bridge):
-    assert draw(tmp_path, bridge, "one.png").read_bytes() == draw(tmp_path, bridge, "two.png").read_bytes()
+    data = view(bridge)
+    draw(tmp_path, data, "one.png"), draw(tmp_path, data, "two.png")
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
 
 
-def test_a_part_without_walls_or_paths_is_drawn(tmp_path, bridge):
-    file = tmp_path / "plain.png"
-    draw_preview(bridge[0], Decomposition((), (), ()), None, [], None, file, "Größe ✓")
-    assert pictures(file)[0].std() > 5.0
+def test_the_view_with_most_of_what_stays_is_chosen(bridge, tmp_path):
+    """The bar stands between the walls: from along them it is seen, from the side it is not."""
+    left, _ = draw(tmp_path, view(bridge))
+    from service.viewfile import read_view
+
+    camera = preview._camera(preview.Drawn.of(*read_view(view(bridge)), 0), (400, 400))
+    across = abs(camera.basis[2] @ [0.0, 1.0, 0.0])
+    assert across < 0.6 and near(left, REMAINDER, 40) > 150
+
+
+def test_reasons_are_told_once_with_their_area():
+    rows = [{"reason": "corner", "area_mm2": 2.0}, {"reason": "undercut", "area_mm2": 30.0},
+            {"reason": "corner", "area_mm2": 3.5}]
+    assert preview._reasons(rows) == ["30 mm2 stay: undercut", "5.5 mm2 stay: corner (2 places)"]
+    many = [{"reason": f"r{k}", "area_mm2": 10.0 - k} for k in range(8)]
+    assert len(preview._reasons(many)) == preview.MOST_REASONS
+    assert preview._reasons(many)[-1] == "18.0 mm2 for 4 more reasons"
+
+
+def test_colours_and_classes_are_those_of_the_page():
+    source = (Path(__file__).parents[2] / "web" / "src" / "colours.ts").read_text()
+
+    def rows(name):
+        body = re.search(rf"const {name}: RGB(?:\[\])? = (.*?);", source, re.S)[1]
+        numbers = [float(v) for v in re.findall(r"\d+(?:\.\d+)?", body)]
+        return np.array(numbers).reshape(-1, 3)
+
+    assert np.allclose(rows("TOOLS"), preview.TOOLS) and np.allclose(rows("REMAINDER"), [preview.REMAINDER])
+    assert np.allclose(rows("OTHER"), [preview.OTHER]) and np.allclose(rows("CONNECTION"), [preview.CONNECTION])
+    assert np.allclose(rows("CLASSES"), deviation.COLOURS[:deviation.UNCUT])
+    assert np.allclose(rows("UNCUT"), [deviation.COLOURS[deviation.UNCUT]])
+    assert f"STEPS = [{deviation.STEPS[0]:g}, {deviation.STEPS[1]:g}]" in source
+    hue = re.search(r"const hue = ([\d.]+) \+ ([\d.]+) \* \(\(index \* ([\d.]+)\) % 1\)", source).groups()
+    assert [float(v) for v in hue] == [0.15, 0.76, 0.381966]
+    assert zone_colour(0) == pytest.approx((0.8176, 0.7781, 0.4224), abs=1e-4)
 
 
 def test_camera_rows_are_a_right_handed_frame_and_points_fit():
