@@ -257,7 +257,7 @@ def _legend(pen: ImageDraw.ImageDraw, drawn: Drawn, tools: Mapping[int, RGB], fa
     for t in head["tools"]:
         if t["number"] in tools:
             lines.append((f"T{t['number']} {t['kind']} D{decimal(t['diameter_mm'])}", tools[t["number"]]))
-    lines = [*lines[:8], ("rapid", RAPID_INK), ("nothing to do", OTHER)]
+    lines = [*lines[:8], ("rapid", RAPID_INK), ("in no zone", OTHER)]
     draw_swatches(pen, lines, 1400, top, columns=2, step=170)
 
 

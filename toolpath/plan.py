@@ -151,6 +151,7 @@ class _ToolJob:
 
     def finish(self, zone: ZoneArea, plane: float, step_id: str) -> list[Workingstep]:
         """The finish of a zone down to a height, mm."""
+        self.stock.settle()
         f = self.finishes.get(zone.id)
         if f is None:
             f = Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
@@ -195,6 +196,7 @@ class _Layers:
         between: list[tuple[float, NDArray[np.bool_]]] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
             z, below = self.left.pop(0)
+            self.stock.settle()
             between.extend((h, below) for h in layers.between(self.above, z, cut.step_down))
             self.above = z
             self._walk(linker, z, below)

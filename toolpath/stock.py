@@ -54,6 +54,7 @@ class StockMap:
         self.part = np.full_like(self.top, -np.inf) if part is None else np.ascontiguousarray(part)
         self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)  # never too low: lowered as looked at
         self._ceilings: tuple[Ceilings, Ceilings] | None = None  # of stock, and of stock that is not part
+        self._others: _Others | None = None
 
     @classmethod
     def around(cls, tree: TriangleTree, bounds: F64, offset: float, step: float,
@@ -163,21 +164,24 @@ class StockMap:
 
         A place is gone where it lies above one of the others. ``cover`` stays a bound: another's cover counts as far
         round a place as a cell reaches, and the way to the next place asked. ``top`` is lowered by theirs, node by
-        node, so a wall they have finished shows no more than half a cell of stock. What stands in a hollow under
-        what is left counts as stock as before.
+        node, so a wall they have finished shows no more than half a cell of stock. A hollow under what is left counts
+        as stock until that is cut (``settle``).
         """
         if not others:
             return
-        lat, turns = self.lattice, np.array([turn for _, turn in others], dtype=np.float64)
-        frames = np.array([[m.lattice.x0, m.lattice.y0, m.lattice.step] for m, _ in others])
-        reach = HALF_DIAGONAL * lat.step
-        # a place as far as that from another falls on a node of theirs no farther than so many and one
-        wide = [ndimage.maximum_filter(m.cover, 2 * int((reach + lat.step) / m.lattice.step) + 3) for m, _ in others]
-        for heights, theirs, rise in ((self.cover, wide, reach), (self.top, [m.top for m, _ in others], 0.0)):
-            sink(heights.copy(), lat.x0, lat.y0, lat.step, lowest - lat.step, turns, _stacked(theirs), frames, rise,
-                 heights)
-        np.minimum(self.top, self.cover, out=self.top)
-        self._pooled, self._covered, self._ceilings = _pooled(self.top), _pooled(self.cover), None
+        self._others = _Others.of(others, self.lattice, lowest)
+        self.settle()
+        self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)
+
+    def settle(self, last: bool = False) -> None:
+        """Lower what was cut since the last time into the hollows that lie under it; see ``left_by``.
+
+        last : nothing is cut any more, and what the other maps say is let go
+        """
+        if self._others is not None:
+            self._others.sink(self.top, self.cover, self.lattice)
+            self._ceilings = None
+            self._others = None if last else self._others
 
     def cut(self, points: F64, tool: ToolBody) -> None:
         """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
@@ -288,6 +292,37 @@ class StockMap:
     def highest(self) -> float:
         """Highest point of the stock, mm; -inf where there is none."""
         return float(self.cover.max()) if self.cover.size else float("-inf")
+
+
+class _Others:
+    """What maps of the same stock along other axes say; taken as they are when it is made.
+
+    turns, frames : (k, 3, 3) and (k, 3), as ``sink`` takes them; lowest : mm, where ways down end
+    said          : for ``cover`` and for ``top``, what the others say, (k, ny, nx) mm, and the rise
+    """
+
+    def __init__(self, turns: F64, frames: F64, lowest: float, said: Sequence[tuple[F64, float]]) -> None:
+        self.turns, self.frames, self.lowest, self.said = turns, frames, lowest, said
+        self.known = np.zeros((2, 0, 0))  # heights of both, as they came out the last time
+
+    @classmethod
+    def of(cls, others: Sequence[tuple[StockMap, F64]], lat: Lattice, lowest: float) -> _Others:
+        """Of StockMaps with the rotations (3, 3) from the frame of ``lat`` into theirs."""
+        reach = HALF_DIAGONAL * lat.step
+        # a place as far as that from another falls on a node of theirs no farther than so many and one
+        wide = [ndimage.maximum_filter(m.cover, 2 * int((reach + lat.step) / m.lattice.step) + 3) for m, _ in others]
+        return cls(np.array([turn for _, turn in others], dtype=np.float64),
+                   np.array([[m.lattice.x0, m.lattice.y0, m.lattice.step] for m, _ in others]), lowest - lat.step,
+                   ((_stacked(wide), reach), (_stacked([m.top for m, _ in others]), 0.0)))
+
+    def sink(self, top: F64, cover: F64, lat: Lattice) -> None:
+        """Lower both where they are not as they came out the last time."""
+        if self.known.shape[1:] != top.shape:
+            self.known = np.full((2, *top.shape), np.inf)
+        for heights, known, (theirs, rise) in zip((cover, top), self.known, self.said, strict=True):
+            sink(heights, known, lat.x0, lat.y0, lat.step, self.lowest, self.turns, theirs, self.frames, rise)
+        np.minimum(top, cover, out=top)
+        self.known[0], self.known[1] = cover, top
 
 
 def _wall(u: F64, arch: F64, aside: float, up: float) -> F64:

@@ -206,6 +206,41 @@ def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_th
     assert (whole.top[iy, ix][seen] - height[seen]).max() > 3.0  # the slot was there to be seen
 
 
+@pytest.mark.parametrize("level", [4.0, 2.0, 0.0])
+def test_a_hollow_counts_as_air_once_it_is_open(level):
+    """Cut down to a level along the second axis: what the first has taken off below it is not there to be cut again."""
+    first, other, turn = leaning_maps(np.array([[6.5, -3.0, -1.5], [6.5, 15.0, -1.5]]))
+    other.left_by([(first, turn.T)], -9.0)
+    y = np.arange(-8.0, 22.0, 0.5)
+    rows = np.column_stack([np.tile([-8.0, 22.0, 22.0, -8.0], len(y) // 2), np.repeat(y, 2),
+                            np.full(2 * len(y), level)])
+    other.cut(rows, tool(3.0, 0.0))
+    before = other.top.copy()
+    other.settle()
+
+    def stands(points):  # in the frame of the part: the block without the slot
+        inside = (np.abs(points - [6.0, 6.0, 2.0]) <= [7.0, 7.0, 4.0]).all(axis=1)
+        return inside & ~((points[:, 0] > 5.0) & (points[:, 0] < 8.0) & (points[:, 2] > -1.5))
+
+    rng, lat = np.random.default_rng(6), other.lattice
+    plan = np.array([lat.x0, lat.y0]) + rng.random((100_000, 2)) * STEP * np.array([lat.nx - 1, lat.ny - 1])
+    high = rng.uniform(-8.0, level, len(plan))
+    true = stands(np.column_stack([plan, high]) @ turn)
+    assert (other.cover[lat.cells(plan)][true] >= high[true]).all()  # never too low
+    column = np.arange(-8.0, level, 0.02)
+    iy, ix = (v.ravel() for v in np.mgrid[5:lat.ny - 5:3, 5:lat.nx - 5:3])
+    nodes = np.column_stack([lat.x0 + STEP * ix, lat.y0 + STEP * iy])
+    every = np.concatenate([np.repeat(nodes, len(column), axis=0), np.tile(column, len(nodes))[:, None]], axis=1)
+    there = stands(every @ turn).reshape(len(nodes), -1)
+    height = np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
+    seen = np.isfinite(height) & np.isfinite(other.top[iy, ix])
+    assert seen.sum() > 300 and np.quantile(other.top[iy, ix][seen] - height[seen], 0.9) < 2.0 * STEP
+    assert (before[iy, ix][seen] - other.top[iy, ix][seen]).max() > 1.5  # there were hollows
+    held = other.top.copy()
+    other.settle(last=True)
+    np.testing.assert_array_equal(other.top, held)
+
+
 def test_nothing_is_lowered_by_a_whole_block_and_everything_by_one_that_is_gone():
     first, other, turn = leaning_maps(np.array([[50.0, 50.0, 9.0], [51.0, 50.0, 9.0]]))
     before = other.cover.copy()

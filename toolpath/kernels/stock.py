@@ -163,28 +163,28 @@ def _gone(x, y, z, turns, tops, frames, rise):
 
 
 @njit(cache=True, nogil=True)
-def sink(heights, x0, y0, step, low, turns, tops, frames, rise, out):
+def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
     """Lower heights to where, on the way straight down, stock begins that other maps show too.
 
-    heights : (ny, nx) mm, of the nodes, in this frame
+    heights : (ny, nx) mm, of the nodes, in this frame. A place that is gone is no more than a 16th of a step above one
+              that is not; places are asked a step apart, and stock that lies between two of them is overlooked unless
+              ``tops`` are spread by a step
+    known   : (ny, nx) mm, what is as high as this stays
     low     : mm, where a way that meets nothing ends: nothing stands there then
     turns   : (k, 3, 3) rotations from this frame into those of the others
     tops    : (k, ny, nx) mm, heights of the others, -inf where one has no node; frames : (k, 3) x0, y0, step of each
     rise    : mm, over a height of another map up to which a place counts as stock
-    out     : (ny, nx) mm, a place that is gone, no more than a 16th of a step above one that is not; places are asked a
-              step apart, and stock that lies between two of them is overlooked unless ``tops`` are spread by a step
     """
     ny, nx = heights.shape
     for i in range(ny):
         for j in range(nx):
-            out[i, j] = heights[i, j]
-            if not np.isfinite(heights[i, j]):
+            if heights[i, j] == known[i, j] or not np.isfinite(heights[i, j]):
                 continue
             x, y, z = x0 + j * step, y0 + i * step, heights[i, j]
             while z > low and _gone(x, y, z, turns, tops, frames, rise):
                 z -= step
             if z <= low:
-                out[i, j] = -np.inf
+                heights[i, j] = -np.inf
             elif z < heights[i, j]:
                 above, under = z + step, z
                 for _ in range(4):
@@ -193,7 +193,7 @@ def sink(heights, x0, y0, step, low, turns, tops, frames, rise, out):
                         above = half
                     else:
                         under = half
-                out[i, j] = above
+                heights[i, j] = above
 
 
 @njit(cache=True, nogil=True)

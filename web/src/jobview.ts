@@ -108,6 +108,8 @@ export class JobView {
         }
     const bad = h.state === "unproved" && h.findings.length > 0;
     this.setMode(this.look.m ?? (bad || h.kind === "verify" ? "deviation" : "zones"));
+    this.picture.above(this.legend.offsetHeight);
+    this.picture.fit();
     if (this.look.c) this.picture.pose = this.look.c;
     if (this.look.s) {
       this.sectionAxis.value = String(this.look.s[0]);

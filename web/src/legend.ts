@@ -30,7 +30,7 @@ export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>, stock: boo
       entry("rgb(209 212 214)", "floor and others")));
   else
     out.push(el("div", { class: "entries" }, ...h.zones.slice(0, 10).map((z, i) => entry(css(zoneColour(i)), z.id)), more(h.zones.length - 10), rest,
-      entry("rgb(184 186 191)", "nothing to do")));
+      entry("rgb(184 186 191)", "in no zone")));
   if (stock) out[0]!.appendChild(entry(css(STOCK), "stock at this time"));
   if (drawn.size) {
     const list = el("div", { class: "entries" });

@@ -134,9 +134,18 @@ export class Picture {
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2) * this.coarse);
     this.renderer.setSize(w, h, false);
     this.camera.aspect = w / h;
-    this.camera.updateProjectionMatrix();
+    this.above(this.covered);
     this.ask();
   }
+
+  /** The lowest pixels of the picture are covered: its middle is that of the rest. */
+  above(pixels: number): void {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    this.covered = pixels;
+    if (w && h) this.camera.setViewOffset(w, h, 0, 0.5 * pixels, w, h);
+    this.ask();
+  }
+  private covered = 0;
 
   /** Draws before the browser shows the next picture. */
   ask(): void {
@@ -543,12 +552,13 @@ export class Picture {
   private awayOfAll(d: Vector3): number {
     const right = new Vector3().crossVectors(this.camera.up, d).normalize();
     const up = new Vector3().crossVectors(d, right);
-    const half = 0.8 * Math.tan((this.camera.fov * Math.PI) / 360);
+    const half = 0.88 * Math.tan((this.camera.fov * Math.PI) / 360);
+    const tall = half * Math.max(0.4, 1 - this.covered / (this.canvas.clientHeight || Infinity));
     const [low, high] = this.head!.bounds_mm;
     let far = 0.5 * this.size;
     for (let c = 0; c < 8; c++) {
       const o = new Vector3(...([0, 1, 2].map((k) => (c & (1 << k) ? high[k]! : low[k]!)) as P3)).sub(this.middle);
-      far = Math.max(far, o.dot(d) + Math.max(Math.abs(o.dot(right)) / (half * this.camera.aspect), Math.abs(o.dot(up)) / half));
+      far = Math.max(far, o.dot(d) + Math.max(Math.abs(o.dot(right)) / (half * this.camera.aspect), Math.abs(o.dot(up)) / tall));
     }
     return far;
   }

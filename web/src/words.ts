@@ -35,7 +35,7 @@ export function whereOf(f: ViewFinding): string {
 export function needs(r: ViewRest): string {
   const w = r.would_need as { kind?: string; diameter_mm?: number; neck_length_mm?: number; stickout_mm?: number; corner_radius_mm?: number };
   if (!w.kind) return r.why_left ?? "";
-  if (w.diameter_mm === undefined) return `needs ${w.kind === "other access" ? "another access" : w.kind}`;
+  if (w.diameter_mm === undefined) return `needs ${w.kind.replace(/^other /, "another ")}`;
   const neck = w.neck_length_mm !== undefined ? `, neck ${w.neck_length_mm} mm` : "";
   return `needs a ${w.kind} of ${w.diameter_mm} mm${neck}`;
 }
