@@ -230,6 +230,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     zones = [ready.zones[k] for k in mine]
     made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
                    lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
+    stock.settle(last=True)
     lives = {t.id: t.life_min for t in ready.setup.tools if t.life_min is not None}
     used = worn(t for s in before for t in s.made.steps)
     made = Plan(tuple(with_fresh_cutters(made.steps, lives, settings.clearance, used)), made.zones)
