@@ -40,7 +40,7 @@ MOST_STEP = math.radians(60.0)
 MOST_SLOPE = 0.1
 """Of a helix: some controls count F in the plane alone, and go 0.5 % faster on it at most."""
 SAG = 6e-4
-"""mm between an arc and the chords it has as a polyline, in STEP-NC."""
+"""mm between an arc and the chords it has as a polyline, in STEP-NC where no circle can stand: helices, tool axes."""
 BLOCK = 256
 """Moves of a pass at the most between two places at which a block ends in any case."""
 

@@ -24,7 +24,7 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
-from output.grid import check_plan
+from output.grid import I64, GridArc, check_plan
 from output.model import Ap238, Workplan
 from output.part21 import Part21, Write, quoted, real, reals, refs
 from output.stepnc_words import (
@@ -33,10 +33,12 @@ from output.stepnc_words import (
     header_words,
     operation_words,
     pass_plane_normal,
+    path_points,
     region_name,
     setup_words,
     stock_box,
     to_and_fro,
+    trimmed_circle,
     ways,
     written_feed,
     written_speed,
@@ -303,27 +305,41 @@ class _Aim:
         add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{placed})")
 
     def _toolpaths(self, step: Workingstep, operation: int, path: list[Curve]) -> None:
-        at = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
-        place = 0
+        at, place = self.file.points(path_points(path)), 0
         for curve in path:
-            trajectory, count = curve.trajectory, len(curve.points)
-            if count < 2:
+            trajectory, parts = curve.trajectory, curve.parts()
+            if not parts:
                 continue
             place += 1
-            toolpath = self._toolpath(f"{step.id} {trajectory.motion.value} {place}", trajectory,
-                                      range(at, at + count), curve.axes)
-            at += count - 1
+            line, at = self._line(parts, at)
+            toolpath = self._toolpath(f"{step.id} {trajectory.motion.value} {place}", trajectory, line, curve.axes)
             self.file.add(f"MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP('','',#{operation},#{toolpath},{place}.)")
             if trajectory.motion is not Motion.RAPID and written_feed(trajectory.feed) != written_feed(step.feed):
                 technology = self._technology(step.spindle_rpm, trajectory.feed)
                 self.file.add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{toolpath},#{technology})")
 
-    def _toolpath(self, name: str, trajectory: Trajectory, points: range, axes: F64 | None) -> int:
+    def _line(self, parts: Sequence[I64 | GridArc], at: int) -> tuple[int, int]:
+        """The curve of some parts that join, ``at`` the number of their first point; and that of their last."""
+        lines = []
+        for part in parts:
+            if isinstance(part, GridArc):
+                lines.append(trimmed_circle(self.file, part, at, self.up, self.along))
+                at += 1
+            else:
+                lines.append(self.file.add(f"POLYLINE('',{refs(range(at, at + len(part)))})"))
+                at += len(part) - 1
+        if len(lines) == 1:
+            return lines[0], at
+        ways = [".CONTINUOUS."] * (len(lines) - 1) + [".DISCONTINUOUS."]
+        segments = [self.file.add(f"COMPOSITE_CURVE_SEGMENT({way},.T.,#{line})")
+                    for way, line in zip(ways, lines, strict=True)]
+        return self.file.add(f"COMPOSITE_CURVE('',{refs(segments)},.U.)"), at
+
+    def _toolpath(self, name: str, trajectory: Trajectory, line: int, axes: F64 | None) -> int:
         add = self.file.add
         toolpath = add(f"MACHINING_TOOLPATH({quoted(name)},{_CLT},'','')")
         self._property("priority", _CLT, toolpath, self._symbol("required"))
         self._property("trajectory type", _CLT, toolpath, self._symbol(_TYPE[trajectory.motion]))
-        line = add(f"POLYLINE('',{refs(points)})")
         self._property("basic curve", _CLT, toolpath, add(f"REPRESENTATION('',(#{line}),#{self.space})"))
         if axes is not None:
             leaning = add(f"POLYLINE('',{refs(self.file.vectors(axes))})")

@@ -22,7 +22,7 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.nurbs import NurbsSurface
 from geometry.toolbody import ToolBody
-from output.grid import GRID, check_plan, to_grid
+from output.grid import GRID, GridArc, check_plan, to_grid
 from output.model import Workplan
 from output.part21 import Part21, Write, quoted, real, reals, refs
 from output.stepnc_words import (
@@ -32,12 +32,14 @@ from output.stepnc_words import (
     knots_of,
     operation_words,
     pass_plane_normal,
+    path_points,
     region_name,
     region_outline,
     setup_words,
     stock_box,
     surfaces_of,
     to_and_fro,
+    trimmed_circle,
     ways,
     written_feed,
     written_speed,
@@ -263,20 +265,23 @@ class _Arm:
                    f"REPRESENTATION_ITEM('{name}') SURFACE())")
 
     def _toolpaths(self, step: Workingstep, path: Sequence[Curve]) -> int:
-        first = self.file.points(np.concatenate([path[0].points[:1], *(c.points[1:] for c in path)]))
-        at, numbers = first, []
+        """A trajectory for each of the planned ones; of one with arcs, one for each arc and each line between."""
+        at, numbers = self.file.points(path_points(path)), []
         for curve in path:
-            trajectory, count = curve.trajectory, len(curve.points)
-            if count < 2:
-                continue
-            line = self.file.add(f"POLYLINE('',{refs(range(at, at + count))})")
-            at += count - 1
+            trajectory = curve.trajectory
             rapid = trajectory.motion is Motion.RAPID
             speed = "SPEED_NAME(.RAPID.)" if rapid else "$"
-            own = "$" if rapid or written_feed(trajectory.feed) == written_feed(step.feed) else \
-                f"#{self._technology(step.spindle_rpm, trajectory.feed)}"
-            numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,{_TYPE[trajectory.motion]},{speed},{own},"
-                                         f"$,$,#{line},{self._leaning(curve)},$)"))
+            for part in curve.parts():
+                if isinstance(part, GridArc):
+                    line = trimmed_circle(self.file, part, at, self.up, self.along)
+                    at += 1
+                else:
+                    line = self.file.add(f"POLYLINE('',{refs(range(at, at + len(part)))})")
+                    at += len(part) - 1
+                own = "$" if rapid or written_feed(trajectory.feed) == written_feed(step.feed) else \
+                    f"#{self._technology(step.spindle_rpm, trajectory.feed)}"
+                numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,{_TYPE[trajectory.motion]},{speed},{own},"
+                                             f"$,$,#{line},{self._leaning(curve)},$)"))
         if not numbers:
             raise OutputError(f"{step.id} does not move", code="empty_step", subjects=(step.id,))
         return self.file.add(f"TOOLPATH_LIST({refs(numbers)})")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,9 +12,10 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
 from output.clamping import Leg, each_section
-from output.grid import GRID, I64, grid_path, link, to_grid, without_repeats
+from output.grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
 from output.kinematics import RotaryMachine
 from output.model import Workplan
+from output.part21 import Part21, real
 from output.text import face_words
 from toolpath.motion import Motion, Trajectory, Workingstep
 
@@ -26,6 +28,19 @@ class Curve:
     trajectory: Trajectory
     points: I64
     axes: F64 | None = None
+
+    def parts(self) -> list[I64 | GridArc]:
+        """What it is written as, in order: polylines (k, 3), k >= 2, and arcs; nothing where it does not move.
+
+        With tool axes it is one polyline, for these are to have as many points; so are helices, for a circle is flat.
+        """
+        t = self.trajectory
+        if len(self.points) < 2:
+            return []
+        if self.axes is not None or not t.arcs:
+            return [self.points]
+        grid = to_grid(t.points)
+        return list(pieces(grid, [a for a in t.arcs if grid[a.first, 2] == grid[a.last, 2]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +110,27 @@ def _curves(legs: Sequence[Leg], machine: RotaryMachine | None = None) -> tuple[
             points[0] = out[-1].points[-1]
         out.append(Curve(Trajectory(leg.motion, leg.tips, leg.feed), points, axes))
     return tuple(out)
+
+
+def path_points(path: Sequence[Curve]) -> I64:
+    """Where the parts of a path begin and end, and the points of its polylines, each once: (n, 3) int64, grid."""
+    rows = [path[0].points[:1]]
+    for curve in path:
+        rows += [np.array([p.end], np.int64) if isinstance(p, GridArc) else p[1:] for p in curve.parts()]
+    return np.concatenate(rows)
+
+
+def trimmed_circle(file: Part21, arc: GridArc, start: int, up: int, along: int) -> int:
+    """The number of an arc between two CARTESIAN_POINTs, ``start`` and the one after it.
+
+    up, along : numbers of DIRECTIONs Z and X
+    """
+    centre = file.points(np.array([[*arc.centre, arc.start[2]]], np.int64))
+    placed = file.add(f"AXIS2_PLACEMENT_3D('',#{centre},#{up},#{along})")
+    radius = 0.5 * GRID * sum(math.hypot(p[0] - arc.centre[0], p[1] - arc.centre[1]) for p in (arc.start, arc.end))
+    circle = file.add(f"CIRCLE('',#{placed},{real(radius, 6)})")
+    sense = ".T." if arc.left else ".F."
+    return file.add(f"TRIMMED_CURVE('',#{circle},(#{start}),(#{start + 1}),{sense},.CARTESIAN.)")
 
 
 def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:

@@ -285,6 +285,11 @@ class Checked:
         self._check_points(number, numbers)
         return self._places(number, numbers, scale), self.file.lines_of(numbers).astype(np.float64)
 
+    def point(self, number: int, scale: float = 1.0) -> F64:
+        """(3,) float64: a CARTESIAN_POINT, times ``scale``."""
+        self.get(number, "CARTESIAN_POINT")
+        return np.asarray(self._places(number, np.array([number], np.int64), scale)[0])
+
     def _places(self, owner: int, numbers: NDArray[np.int64], scale: float) -> F64:
         """(n, 3) float64: coordinates of points that an instance refers to, times ``scale``."""
         points = self.file.points(numbers)

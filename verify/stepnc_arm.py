@@ -32,6 +32,7 @@ from verify.attributes import (
     attributes,
 )
 from verify.course import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
+from verify.curves import CURVE_TABLE, CURVES, curve_points
 from verify.part21 import Part21, Ref, Typed, Value
 
 SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
@@ -108,7 +109,7 @@ TABLE: Table = {
         its_machine_functions=To(("MILLING_MACHINE_FUNCTIONS",)), overcut_length=Maybe(Real()), approach=Maybe(To()),
         retract=Maybe(To()), its_machining_strategy=Maybe(To())),
     "TOOLPATH_LIST": attributes(its_list=Many(To(("CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")), 1)),
-    "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(("POLYLINE",)),
+    "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(CURVES),
                                              its_toolaxis=Maybe(To(("POLYLINE",))),
                                              surface_normal=Maybe(To(("POLYLINE",)))),
     "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MOST_DWELL)),
@@ -149,6 +150,7 @@ TABLE: Table = {
     "CARTESIAN_POINT": attributes(name=Text(), coordinates=Many(Real(), 3, 3)),
     "POLYLINE": attributes(name=Text(), points=Many(To(("CARTESIAN_POINT",)), 2)),
     "B_SPLINE_SURFACE_WITH_KNOTS": attributes(**_NET, **_KNOTS),
+    **CURVE_TABLE,
 }
 RECORDS: Table = {
     "B_SPLINE_SURFACE": attributes(**{k: v for k, v in _NET.items() if k != "name"}),
@@ -296,7 +298,7 @@ class _Arm:
     def _trajectory(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None,
                     rapid: bool) -> None:
         entity = "CUTTER_LOCATION_TRAJECTORY"
-        tips, lines = self.data.curve(self.data.ref(number, entity, "basiccurve"))
+        tips, lines = curve_points(self.data, self.data.ref(number, entity, "basiccurve"))
         leaning = self.data.maybe(number, entity, "its_toolaxis")
         if leaning is not None:
             axes, _ = self.data.curve(leaning)
