@@ -452,7 +452,10 @@ export class JobView {
     this.findingButtons.forEach((b, k) => b.setAttribute("aria-pressed", String(k === i)));
     this.findingButtons[i]!.scrollIntoView({ block: "nearest", behavior: reducedMotion() ? "auto" : "smooth" });
     if (f.time_s !== null) this.setTime(f.time_s, true);
-    if (f.point) this.goTo(f.point, Math.max(0.09 * this.picture.size, 2.5), f);
+    const here = f.time_s === null ? null : this.picture.at(f.time_s);
+    const tool = here && this.head!.tools.find((t) => t.number === this.head!.steps[here.step]!.tool);
+    // far enough away that the tool does not hide the place
+    if (f.point) this.goTo(f.point, Math.max(0.09 * this.picture.size, 2.5, 1.6 * (tool?.diameter_mm ?? 0)), f);
     this.say(whereOf(f));
   }
 

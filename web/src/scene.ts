@@ -436,7 +436,7 @@ export class Picture {
   }
 
   private addStock(entry: ChunkEntry, t: Table): void {
-    this.stock = new Stock(entry, t, this.shared.section!);
+    this.stock = new Stock(entry, t, this.shared.section!, this.head!.budget_mm.scallop);
     this.stock.mesh.visible = false;
     this.scene.add(this.stock.mesh);
   }

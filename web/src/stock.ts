@@ -34,10 +34,11 @@ export class Stock {
   private readonly states: States;
   private net: Net = noNet();
 
-  constructor(entry: ChunkEntry, t: Table, section: { value: unknown }) {
+  /** allowed : mm of stock on the part that are as good as none */
+  constructor(entry: ChunkEntry, t: Table, section: { value: unknown }, allowed: number) {
     this.states = new States(entry, t);
     const material = new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: SHOWN * entry.step_mm! }, base: { value: new Color(...STOCK) } } as never });
+      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: Math.max(SHOWN * entry.step_mm!, allowed) }, base: { value: new Color(...STOCK) } } as never });
     this.mesh = new Mesh(new BufferGeometry(), material);
     this.mesh.frustumCulled = false;
     const r = entry.rotation!;
