@@ -342,14 +342,16 @@ class Client:
             assert time.monotonic() < until, "the jobs do not start"
             time.sleep(0.1)
 
-    def until_ended(self, patience_s: float) -> dict[str, float]:
-        """Wait until all have ended; returns when each was seen to have, s."""
-        until = time.monotonic() + patience_s
+    def until_ended(self, patience_s: float) -> tuple[float, dict[str, float]]:
+        """Wait until all have ended and the service is whole again; returns when it was, and when each had ended, s."""
+        until, whole = time.monotonic() + patience_s, None
         while True:
             left = [i for i, job in self.look().items() if job["state"] not in FINAL]
-            if not left:
-                return {i: changes[-1][0] for i, changes in self.seen.items()}
-            assert time.monotonic() < until, f"stuck: {[self.seen[i] for i in left]}"
+            if whole is None and self.service.is_ready():
+                whole = time.monotonic()
+            if not left and whole is not None:
+                return whole, {i: changes[-1][0] for i, changes in self.seen.items()}
+            assert time.monotonic() < until, f"stuck, whole again: {whole}: {[self.seen[i] for i in left]}"
             time.sleep(0.2)
 
     def result(self, job_id: str) -> bytes:
