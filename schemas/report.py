@@ -129,7 +129,9 @@ class Caution(ReportModel):
                                            "is high for its thickness; measured is height over thickness. support: "
                                            "thin walls are finished without stock beside them near by; measured is how "
                                            "far they are free, in times their thickness. tool_life: a "
-                                           "tool takes more than one cutter, or more than one for a run.")]
+                                           "tool takes more than one cutter, or more than one for a run. "
+                                           "center_cutting: a tool that does not cut to its centre goes down into "
+                                           "stock.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str
     measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None

@@ -20,6 +20,7 @@ from service.prepare import Prepared
 from toolpath.deflection import Bend
 from toolpath.life import minutes_in_cut
 from toolpath.motion import Workingstep
+from toolpath.ramps import LEAST_RUN
 from verify.model import Support
 from zones.model import Wall
 from zones.thinness import slender_walls
@@ -32,7 +33,7 @@ MOST_RATIO = 10.0
 class Caution:
     """One of them.
 
-    kind      : 'limited', 'thin_wall', 'support', 'deflection' or 'tool_life'
+    kind      : 'limited', 'thin_wall', 'support', 'deflection', 'tool_life' or 'center_cutting'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -74,6 +75,17 @@ def limited(setup: Setup) -> list[Caution]:
             out.append(Caution("limited", (tool.id,), message, asked, limit,
                                f"it runs at {limit:g}; ask for no more, or correct the limit"))
     return out
+
+
+def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
+    """Tools that do not cut to the centre and go down into stock: nothing here knows how wide their core is."""
+    used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
+    return [Caution("center_cutting", (tool.id,),
+                    f"tool {tool.id} does not cut to its centre, and its ways down into stock, of 3 degrees at most, "
+                    f"may be {LEAST_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
+                    LEAST_RUN * used[tool.id].radius, tool.diameter_mm,
+                    "look at its first cuts in closed pockets, drill them first, or take one that cuts to the centre")
+            for tool in setup.tools if not tool.center_cutting and tool.id in used]
 
 
 def walls_to_cut(ready: Prepared) -> list[Wall]:
@@ -157,4 +169,5 @@ def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "unheld", "walls_to_cut"]
+__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
+           "walls_to_cut"]

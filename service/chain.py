@@ -25,7 +25,7 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.artifacts import clear_results
-from service.cautions import bent, limited, lives_ended, sentences, thin_walls, unheld
+from service.cautions import bent, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -131,7 +131,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
-    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps)]
+    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps),
+            *uncut_centres(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
@@ -224,7 +225,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     found = told.along(view.id)
     settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
     if turned:
-        lowest = float(ready.blank.corners(view.rotation)[0, 2]) - ready.blank.beyond
+        lowest = float(ready.blank.corners(view.rotation)[0, 2]) - math.sqrt(3.0) * ready.blank.beyond  # of a box
         stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before], lowest)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]

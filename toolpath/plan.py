@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
+from toolpath.deflection import effective_diameter, left_by_layers
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.family import Target
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
@@ -170,9 +171,11 @@ class _Layers:
         self.zones, self.field, self.cut, self.stock = zones, field, cut, stock
         self.settings, self.depths = settings, depths
         lat, tool = field.lattice, field.tool
-        tips = np.vstack([z.tips for z in zones])
+        self.tips = tips = np.vstack([z.tips for z in zones])
         self.allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-        self.walls = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is Form.STEEP)])
+        # without a finish to follow, rims take every wall to size layer by layer, where what is below still holds it
+        steep = [z.tips for z in zones if z.form is Form.STEEP and settings.finishing]
+        self.walls = np.vstack([np.zeros((0, 3)), *steep])
         self.bounded = cut.engaged < UNBOUNDED
         # the finish of a floor has the whole front in what is left on it
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
@@ -193,26 +196,38 @@ class _Layers:
         field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
         linker = self._linker()
         chord = 0.5 * settings.chordal_tolerance
-        between: list[tuple[float, NDArray[np.bool_]]] = []
+        between: list[float] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
             z, below = self.left.pop(0)
             self.stock.settle()
-            between.extend((h, below) for h in layers.between(self.above, z, cut.step_down))
+            between.extend(layers.between(self.above, z, cut.step_down))
             self.above = z
             self._walk(linker, z, below)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
             rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen)
+            most = self._rim_feed(FLUTE_SHARE * tool.flute_length if unseen else cut.step_down)
             for line in nearest_order(rims, linker.at, False):
-                linker.add(turned(line, settings))
+                linker.add(turned(line, settings), most=most)
         made = self._step(number, "roughing", linker)
         if not settings.semi_finishing:
             return made
         linker = self._linker()
-        for z, below in between:
-            self._walk(linker, z, below)
+        for z in between:
+            self._walk(linker, z, _own(field, self.tips, z))
         return made + self._step(number + len(made), "semi_finishing", linker)
+
+    def _rim_feed(self, depth: float) -> float:
+        """mm/min along a wall that is taken to size, so deep, mm: no more than a finish would bend the tool by."""
+        left = left_by_layers(self.cut.step_down, self.field.lattice.step)
+        return min(self.cut.feed, (self.cut.finish or self.cut).under(depth, left).feed)
+
+    def _thinner(self) -> CutData:
+        """The cut of what stands between layers: a slot at most, a part of a layer deep."""
+        depth = layers.EVEN * self.cut.step_down
+        return self.cut.under(depth, 0.5 * effective_diameter(self.field.tool.diameter, self.field.tool.corner_radius,
+                                                              depth))
 
     def _linker(self) -> Linker:
         cut, tool = self.cut, self.field.tool
@@ -235,9 +250,16 @@ class _Layers:
         if not linker.passes:
             return []
         step_id, tool, ids = f"S{number:02d}", self.field.tool, " ".join(z.id for z in self.zones)
-        kind = "layers" if operation == "roughing" else "between layers"
+        kind, cut = ("layers", self.cut) if operation == "roughing" else ("between layers", self._thinner())
         return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "layers", tool,
-                        self.cut, 0.8 * tool.radius, linker.finish(), self.settings)]
+                        cut, 0.8 * tool.radius, linker.finish(), self.settings)]
+
+
+def _own(field: TipField, tips: F64, z: float) -> NDArray[np.bool_]:
+    """(ny, nx) bool: where of the tips (n, 3), mm, that are finished, some lie at a height or lower."""
+    lat = field.lattice
+    mask = lat.mask(tips[tips[:, 2] <= z + 1e-6, :2])
+    return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
 
 
 def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:
@@ -249,19 +271,14 @@ def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) ->
     tips    : (n, 3) float64, mm, what is finished; heights : mm, of the layers, descending
     """
     lat = field.lattice
-
-    def own(z: float) -> NDArray[np.bool_]:
-        mask = lat.mask(tips[tips[:, 2] <= z + 1e-6, :2])
-        return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
-
     out: list[NDArray[np.bool_]] = []
     rising = list(heights[::-1])
     for z in rising:
-        area = own(z)
+        area = _own(field, tips, z)
         for disc in field.discs:
             low = z + step - disc.height
             deeper = [k for k in range(len(out)) if rising[k] <= low]
-            reach = own(low) | out[deeper[-1]] if deeper else own(low)
+            reach = _own(field, tips, low) | out[deeper[-1]] if deeper else _own(field, tips, low)
             if reach.any():
                 area = area | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
         out.append(area)

@@ -117,3 +117,10 @@ def test_bands_go_no_deeper_than_to_what_holds_a_wall(tmp_path):
     low_planes, high_planes = band_planes(low, low.views[0]), band_planes(high, high.views[0])
     assert len(low_planes) == 1 and min(low_planes) > 9.5
     assert len(high_planes) > len(low_planes) and min(high_planes) < 9.5
+
+
+def test_roughing_alone_holds_a_thin_wall_too(wall, tmp_path):
+    """No finish follows, so layers take the wall to size one by one, while the stock below still holds it."""
+    alone = plan(wall, tmp_path / "alone", setup(operations={"finishing": False}))
+    assert alone["state"] == "proved" and {s["operation"] for s in alone["steps"]} == {"roughing"}
+    assert alone["proof"]["support"]["places"] > 100 and alone["proof"]["support"]["places_over"] == 0

