@@ -131,7 +131,7 @@ def job_figures(folder: Path, part: Path) -> dict[str, float]:
 
 
 def cluster_figures(folder: Path, part: Path, count: int) -> dict[str, Any]:
-    """Processor time and writes of a job on the cluster, by process, beyond its own work."""
+    """Processor time and writes of a job on the cluster, by process, beyond what they take when idle."""
     import psycopg
 
     (folder / "cluster").mkdir()
@@ -161,23 +161,25 @@ def cluster_figures(folder: Path, part: Path, count: int) -> dict[str, Any]:
         try:
             site.until_ready()
             batch(site, part.read_bytes(), 2, "short nap", "warm")
-            idle_before, began = written(), time.monotonic()
-            time.sleep(10.0)
-            idle = (written()["commits"] - idle_before["commits"]) / (time.monotonic() - began)
-            found: dict[str, Any] = {"commits_per_s_idle": idle}
+            commits, database, began = written()["commits"], postgres_cpu(), time.monotonic()
+            resting = spent(site, lambda: time.sleep(15.0))
+            wall = time.monotonic() - began
+            idle = {k: v / 15.0 for k, v in resting.items()}
+            idle |= {"postgres": (postgres_cpu() - database) / wall, "commits": (written()["commits"] - commits) / wall}
+            found: dict[str, Any] = {"idle_per_s": {k: round(v, 4) for k, v in idle.items()}}
             kinds = (("empty", "nothing", "/v1/zones", count), ("nap of 2 s", "nap", "/v1/zones", 4),
-                     ("small plan", "", "/v1/jobs", 2))
+                     ("small plan", "", "/v1/jobs", 1))
             for name, do, path, many in kinds:
                 rows, database, began = written(), postgres_cpu(), time.monotonic()
                 jobs: list[dict[str, Any]] = []
                 cpu = spent(site, lambda: jobs.extend(batch(site, part.read_bytes(), many, do, name, path)))  # noqa: B023
                 wall = time.monotonic() - began
                 new = written()
+                cpu["postgres"] = postgres_cpu() - database
                 found[name] = {
-                    **{f"{k}_cpu_ms": round(1000 * v / many, 1) for k, v in cpu.items()},
-                    "postgres_cpu_ms": round(1000 * (postgres_cpu() - database) / many, 1),
+                    **{f"{k}_cpu_ms": round(1000 * (v - idle[k] * wall) / many, 1) for k, v in cpu.items()},
                     "rows_written": round(sum(new[k] - rows.get(k, 0) for k in new if k != "commits") / many, 1),
-                    "commits_beyond_idle": round((new["commits"] - rows["commits"] - idle * wall) / many, 1),
+                    "commits_beyond_idle": round((new["commits"] - rows["commits"] - idle["commits"] * wall) / many, 1),
                     "wall_s": round(wall / many, 2), "states": sorted({j["state"] for j in jobs})}
             return found
         finally:

@@ -180,7 +180,7 @@ class Service:
             "ZONEMILL_WEBHOOK_SECRET": "s" * 40, "ZONEMILL_WEBHOOK_NETWORKS": '["127.0.0.0/8"]',
             "ZONEMILL_WEBHOOK_ORIGINS": f'["http://127.0.0.1:{self.mailbox.port}"]', "ZONEMILL_WEBHOOK_RETRY_S": "1",
             "ZONEMILL_POST_RATE": "10000/minute", "ZONEMILL_CHILD_THREADS": "1", "ZONEMILL_WORKERS": "2",
-            "ZONEMILL_MIN_FREE_MB": "0", **variables}
+            "ZONEMILL_MIN_FREE_MB": "0", "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False", **variables}
         self.kept: list[Kept]
         self.apis: list[Kept]
         self.urls: list[str]

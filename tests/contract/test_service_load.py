@@ -26,9 +26,11 @@ ALONE = """
 import sys
 from pathlib import Path
 from service import chain
+from schemas.setup import canonical_json
 from service.convert import parse_setup
 part, setup, out = map(Path, sys.argv[1:])
-chain.plan(part, parse_setup(setup.read_text()), out, lambda *_: None)
+kept = canonical_json(parse_setup(setup.read_text())).decode()  # what a job keeps has all defaults filled in
+chain.plan(part, parse_setup(kept), out, lambda *_: None)
 """
 # Of what a process grows by, this much is its caches filling; a leak of 100 bytes an answer would be twice that.
 ALLOWED_MB, ALLOWED = 15.0, 0.10
