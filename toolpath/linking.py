@@ -97,7 +97,7 @@ class Linker:
     def __post_init__(self) -> None:
         self.gone = Depths(self.stock.lattice)  # ways back in air
 
-    def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False, most: float = math.inf) -> bool:
+    def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
 
         Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
@@ -105,7 +105,6 @@ class Linker:
         rapids go, or was walked as it stands, is not walked.
 
         eased : the line takes off what it comes to bit by bit on its way down, as a helix does, and needs no skims
-        most  : mm/min, in stock its feed at most
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
@@ -113,8 +112,8 @@ class Linker:
         before = len(self.skipped)
         free = [q for p in self._under_rapids(Line(points, line.closed)) for q in self._unbarred(p)]
         for piece in [q for p in free for q in self._unwalked(p)]:
-            if not (self._topped(piece, most) and (self._one(piece.points, piece.closed, eased=True, most=most) if eased
-                                             else self._pass(piece.points, piece.closed, most))):
+            if not (self._topped(piece) and (self._one(piece.points, piece.closed, eased=True) if eased
+                                             else self._pass(piece.points, piece.closed))):
                 self.skipped.append(piece)
                 self.refused += 1
         return len(self.skipped) == before
@@ -161,7 +160,7 @@ class Linker:
         return [Line(thinned(p.points, self.motions.tolerance), p.closed)
                 for p in pieces_where(Line(points, line.closed), ~met, -room, 0.0) if p.length > 2.0 * room]
 
-    def _topped(self, line: Line, most: float) -> bool:
+    def _topped(self, line: Line) -> bool:
         """Take off what stands higher over a line than the flutes reach, from the top down."""
         tool = self.field.tool
         points = dense(line.points, LOOK_EVERY * tool.radius)
@@ -172,22 +171,22 @@ class Linker:
             for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
                 # where the tool has been as deep, what the stock still shows is out of its reach
-                if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed, most):
+                if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
                     return False
         return True
 
-    def _pass(self, points: F64, closed: bool, most: float = math.inf) -> bool:
+    def _pass(self, points: F64, closed: bool) -> bool:
         """Walk a line, skimmed before where it would have too much of the cutter in stock; False where it is not."""
-        if self._one(points, closed, unless_over=True, most=most):
+        if self._one(points, closed, unless_over=True):
             return True
         line, tool = Line(points, closed), self.field.tool
         for whole in (False, True) if self.engaged < UNBOUNDED else ():  # the whole, where only the way in is too much
             for skim in skims(self.stock, line, tool, self.engaged, self.found, whole=whole):
                 way = Line(thinned(skim.points, self.motions.tolerance), skim.closed)
-                if not all(self._one(rest.points, rest.closed, most=min(most, self.motions.front_feed))
+                if not all(self._one(rest.points, rest.closed, most=self.motions.front_feed)
                            for rest in self._unwalked(way)):
                     return False
-            if self._one(points, closed, most=most):
+            if self._one(points, closed):
                 return True
         return False
 

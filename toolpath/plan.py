@@ -27,7 +27,7 @@ from toolpath.motion import Workingstep
 from toolpath.order import nearest_order
 from toolpath.pacing import Pace
 from toolpath.settings import CutData, PlanSettings
-from toolpath.stock import StockMap
+from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
 from toolpath.strategies.isoparametric import Faces
 from toolpath.walked import Depths, Walked
@@ -207,9 +207,11 @@ class _Layers:
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
             rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen)
-            most = self._rim_feed(FLUTE_SHARE * tool.flute_length if unseen else cut.step_down)
+            deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
+            usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):
-                linker.add(turned(line, settings), most=most)
+                linker.add(turned(line, settings))
+            linker.pace = usual
         made = self._step(number, "roughing", linker)
         if not settings.semi_finishing:
             return made
@@ -218,10 +220,16 @@ class _Layers:
             self._walk(linker, z, _own(field, self.tips, z))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
-    def _rim_feed(self, depth: float) -> float:
-        """mm/min along a wall that is taken to size, so deep, mm: no more than a finish would bend the tool by."""
-        left = left_by_layers(self.cut.step_down, self.field.lattice.step)
-        return min(self.cut.feed, (self.cut.finish or self.cut).under(depth, left).feed)
+    def _rim_pace(self, depth: float) -> Pace:
+        """Feeds along a wall that is taken to size, so deep, mm: bending the tool no more than a finish may.
+
+        What stock does not show is no wider than its lattice can hide.
+        """
+        cut, step = self.cut, self.field.lattice.step
+        fine = cut.finish or cut
+        seen, hidden = (min(cut.feed, fine.under(depth, wide).feed)
+                        for wide in (left_by_layers(cut.step_down, step), SURE_RIM * step))
+        return Pace(hidden, cut.link_feed, lambda _depth, _angle: seen, cut.step_down)
 
     def _thinner(self) -> CutData:
         """The cut of what stands between layers: a slot at most, a part of a layer deep."""
