@@ -240,12 +240,24 @@ def test_roughing_switched_off_leaves_the_finish_alone():
 
 
 def test_finishing_switched_off_leaves_the_layers_alone():
+    """At the same heights, and more of them along walls (below)."""
     full = replanned(case("corner"))
     c = replanned(full, finishing=False)
     assert c.plan.zones == () and {s.strategy for s in c.plan.steps} == {"layers"}
-    first = [t.points for t in full.plan.steps[0].trajectories]
-    assert all((a == t.points).all() for a, t in zip(first, c.plan.steps[0].trajectories, strict=True))
+    ways = [[np.vstack([w.points for w in s.trajectories if w.motion is Motion.CUT]) for s in plan.steps
+             if s.operation == "roughing" and s.tool.id == "T2"] for plan in (full.plan, c.plan)]
+    levels = [{round(z, 6) for p in way for z, flat in zip(p[1:, 2], np.diff(p[:, 2]) == 0.0, strict=True) if flat}
+              for way in ways]
+    assert levels[0] == levels[1] and len(levels[0]) > 2
     assert replanned(full, roughing=False, finishing=False).plan.steps == ()
+
+
+def test_layers_alone_take_walls_to_size_as_they_go_down():
+    """What a finish would take off goes in every layer, so that a wall is never cut free before it is to size."""
+    plans = [replanned(case("walls"), finishing=finishing).plan for finishing in (True, False)]
+    way = [sum(w.length for s in p.steps if s.operation == "roughing" for w in s.trajectories if w.motion is Motion.CUT)
+           for p in plans]
+    assert way[1] > 1.1 * way[0] > 0.0
 
 
 def test_the_side_of_the_cut_is_told_on_every_step_and_free_where_both_ways_are_allowed():
