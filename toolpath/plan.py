@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
-from toolpath.deflection import effective_diameter, left_by_layers
+from toolpath.deflection import effective_diameter
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.family import Target
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
@@ -228,7 +228,7 @@ class _Layers:
         cut, step = self.cut, self.field.lattice.step
         fine = cut.finish or cut
         seen, hidden = (min(cut.feed, fine.under(depth, wide).feed)
-                        for wide in (left_by_layers(cut.step_down, step), SURE_RIM * step))
+                        for wide in (self.allowance, SURE_RIM * step))
         return Pace(hidden, cut.link_feed, lambda _depth, _angle: seen, cut.step_down)
 
     def _thinner(self) -> CutData:

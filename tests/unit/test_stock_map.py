@@ -161,6 +161,15 @@ def test_a_block_that_stands_askew_is_as_high_as_its_corners_and_edges(direction
     assert checked > 20
 
 
+def highest(lat, stands, column):
+    """Rows and columns of every third node, and the highest of a column of heights at which something stands there."""
+    iy, ix = (v.ravel() for v in np.mgrid[5:lat.ny - 5:3, 5:lat.nx - 5:3])
+    nodes = np.column_stack([lat.x0 + STEP * ix, lat.y0 + STEP * iy])
+    every = np.concatenate([np.repeat(nodes, len(column), axis=0), np.tile(column, len(nodes))[:, None]], axis=1)
+    there = stands(every).reshape(len(nodes), -1)
+    return iy, ix, np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
+
+
 def leaning_maps(slot):
     """Stock of a block round PART: seen from above after a slot with a flat, and its frame leaned, not yet told."""
     lower, upper = np.array([-1.0, -1.0, -2.0]), np.array([13.0, 13.0, 6.0])
@@ -195,11 +204,7 @@ def test_what_an_axis_before_has_left_is_a_bound_and_no_more_than_cells_above_th
     assert (cover[true] >= high[true]).all()  # never too low
     # and where the slot is open to this axis it is not far above: cells of both, a step of the way, over their slopes
     column = np.arange(-6.0, 12.0, 0.02)
-    iy, ix = (v.ravel() for v in np.mgrid[5:lat.ny - 5:3, 5:lat.nx - 5:3])
-    nodes = np.column_stack([lat.x0 + STEP * ix, lat.y0 + STEP * iy])
-    every = np.concatenate([np.repeat(nodes, len(column), axis=0), np.tile(column, len(nodes))[:, None]], axis=1)
-    there = stands(every @ turn).reshape(len(nodes), -1)
-    height = np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
+    iy, ix, height = highest(lat, lambda points: stands(points @ turn), column)
     seen = np.isfinite(height) & np.isfinite(other.top[iy, ix])
     over = other.top[iy, ix][seen] - height[seen]
     assert seen.sum() > 500 and np.quantile(over, 0.9) < 2.0 * STEP
@@ -228,11 +233,7 @@ def test_a_hollow_counts_as_air_once_it_is_open(level):
     true = stands(np.column_stack([plan, high]) @ turn)
     assert (other.cover[lat.cells(plan)][true] >= high[true]).all()  # never too low
     column = np.arange(-8.0, level, 0.02)
-    iy, ix = (v.ravel() for v in np.mgrid[5:lat.ny - 5:3, 5:lat.nx - 5:3])
-    nodes = np.column_stack([lat.x0 + STEP * ix, lat.y0 + STEP * iy])
-    every = np.concatenate([np.repeat(nodes, len(column), axis=0), np.tile(column, len(nodes))[:, None]], axis=1)
-    there = stands(every @ turn).reshape(len(nodes), -1)
-    height = np.where(there.any(axis=1), column[there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)], -np.inf)
+    iy, ix, height = highest(lat, lambda points: stands(points @ turn), column)
     seen = np.isfinite(height) & np.isfinite(other.top[iy, ix])
     assert seen.sum() > 300 and np.quantile(other.top[iy, ix][seen] - height[seen], 0.9) < 2.0 * STEP
     assert (before[iy, ix][seen] - other.top[iy, ix][seen]).max() > 1.5  # there were hollows
