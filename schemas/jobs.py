@@ -58,6 +58,14 @@ class JobWebhook(ReportModel):
     problem: Annotated[str | None, Field(description="What went wrong at the last attempt.")] = None
 
 
+class JobResumed(ReportModel):
+    """What an attempt took over from those before; the result is the same to the byte."""
+
+    plans: Annotated[int, Field(ge=0, description="Accesses that were planned already, counted again for each plan of "
+                                                  "the job.")] = 0
+    proofs: Annotated[int, Field(ge=0, description="Proofs that were there already.")] = 0
+
+
 class Job(ReportModel):
     """One job."""
 
@@ -69,6 +77,8 @@ class Job(ReportModel):
     progress: Annotated[float, Field(ge=0, le=1, description="Share done, 0 to 1; never goes back while an attempt "
                                                              "runs.")]
     attempt: Annotated[int, Field(ge=0, description="How often it was started.")]
+    resumed: Annotated[JobResumed | None, Field(description="What the newest attempt took over from those before; null "
+                                                            "where it began anew.")] = None
     content_sha256: Annotated[str, Field(description="Hash of part and canonical setup (and blank, program).")]
     part_sha256: Annotated[str, Field(description="Hash of the part's bytes.")]
     setup_sha256: Annotated[str, Field(description="Hash of the canonical setup.")]
@@ -122,6 +132,7 @@ class JobEvent(ReportModel):
     state: JobState
     stage: str
     progress: Annotated[float, Field(ge=0, le=1)]
+    resumed: Annotated[JobResumed | None, Field(description="As in the job; left out where it is null.")] = None
 
 
 class LibraryEntry(ReportModel):

@@ -2,6 +2,7 @@
 
     data/blobs/ab/abcdef....bin     an upload, named by the SHA-256 of its bytes
     data/artifacts/ab/abcdef.../    a result, named by the hash of code version, kind and inputs
+    data/kept/ab/abcdef.../         what attempts at that result keep for the next one, until it is there
     data/tmp/                       what is being written; worthless after a crash
 """
 
@@ -12,9 +13,10 @@ import math
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from geometry.errors import InputError
 from schemas.machine import DIALECT_ENDINGS
@@ -84,6 +86,12 @@ def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256:
     text = "\n".join((code_version(), kind, part_sha256, setup_sha256, program_sha256 or "", str(spindle_tool),
                       stock_sha256 or ""))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def key_of(row: Mapping[Any, Any]) -> str:
+    """Name of the result of a job, by its row."""
+    return artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
+                        row["spindle_tool"], row["stock_sha256"])
 
 
 def make_private(folder: Path) -> None:
@@ -192,14 +200,32 @@ class Artifacts:
             return False
         return True
 
+    def kept(self, key: str) -> Path:
+        """Where attempts at the result of that key keep what the next one takes over (``service.kept``)."""
+        return self.root / "kept" / key[:2] / key
+
+    def drop_kept(self, key: str) -> None:
+        """Remove what is kept for the result of that key."""
+        trash = self.tmp / f"trash-{uuid.uuid4().hex}"
+        try:
+            os.rename(self.kept(key), trash)
+        except FileNotFoundError:
+            return
+        _drop(trash)
+
+    def all_kept(self) -> Iterator[Path]:
+        """Every folder of what is kept; its name is the key of the result."""
+        yield from self.root.glob("kept/*/*")
+
     def stored(self) -> Iterator[Path]:
         """Every upload and every result; the stem of the name is its hash."""
         yield from self.root.glob("blobs/*/*.bin")
         yield from self.root.glob("artifacts/*/*")
 
     def remove(self, path: Path, before: float) -> bool:
-        """Remove an upload or a result that was last used before a time (s); False when it was used after all.
+        """Remove an upload, a result or what is kept for one that was last used before a time (s).
 
+        Returns False when it was used after all.
         It is moved away first and looked at again there, so that nobody who takes it up meanwhile finds half of it.
         """
         trash = self.tmp / f"trash-{uuid.uuid4().hex}"

@@ -35,6 +35,7 @@ from service.convert import (
 )
 from service.delivery import Files, deliver, json_bytes
 from service.held import FREE_RATIO, band_planes, in_turn
+from service.kept import Kept
 from service.materials import STEP_DOWN, bending, cutting_data, rates_of
 from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
@@ -47,6 +48,7 @@ from service.programs import (
     turning_of,
     with_figures,
 )
+from service.resume import Resumed
 from service.scoring import Score, score
 from service.sheet import sheet_files
 from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
@@ -81,12 +83,13 @@ FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and 
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
-         planner: Planner = plan_job, blank_path: Path | None = None) -> dict[str, Any]:
+         planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
     mesh : also write the machined part as a mesh, in the frame of the proof (``service.programs.proof_frame``)
     planner : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
     blank_path : STEP file of the blank where ``stock.kind`` is 'step'; what the setup calls it is not looked at
+    kept : what an attempt at this very job kept before and what this one keeps (``service.resume``); nothing in None
 
     Returns
     -------
@@ -109,6 +112,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     checks = scored.checks(ready)
     first, look = ready.views[0], proof_frame(ready)
     dense = look.into(scored.samples, first)
+    resumed = Resumed(kept or Kept(), ready, checks, dense)
     told, begun = Learned(), PREPARED
     sides: list[Side] = []
     found: list[int] = []
@@ -117,13 +121,15 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         ended = begun + FIRST_SHARE * (PROVED - begun)
         span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
         for k, view in list(enumerate(ready.views))[len(sides):]:
-            sides.append(_side(ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner))
+            sides.append(resumed.side(view, sides, told.along(view.id), partial(
+                _side, ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner)))
         made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
         zone, given_up = scored.without(made, ready.zones)
         written = programs_of(ready, sides, trimmed)
         programs = [p.given() for p in written]
-        proof = prove(programs, look.part, tool_bodies(setup), proof_setup(ready, look),
-                      ScoredSamples(dense, zone), [z.id for z in ready.zones], span.proving)
+        proof = resumed.proof(programs, zone, partial(
+            prove, programs, look.part, tool_bodies(setup), proof_setup(ready, look), ScoredSamples(dense, zone),
+            [z.id for z in ready.zones], span.proving))
         more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
         found.append(sum(proof.counts.values()))
         if more is None or not worth_another(found, PLANS):
@@ -226,7 +232,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
     if turned:
         lowest = float(ready.blank.corners(view.rotation)[0, 2]) - math.sqrt(3.0) * ready.blank.beyond  # of a box
-        stock.left_by([(s.stock, s.view.rotation @ view.rotation.T) for s in before], lowest)
+        stock.left_by([(s.left, s.view.rotation @ view.rotation.T) for s in before if s.left is not None], lowest)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
@@ -237,7 +243,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     made = Plan(tuple(with_fresh_cutters(made.steps, lives, settings.clearance, used)), made.zones)
     if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
-    return Side(view, made, settings.clearance, stock)
+    return Side(view, made, settings.clearance, stock if turned else None)
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> dict[str, Any]:

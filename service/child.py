@@ -1,9 +1,9 @@
 # The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
 """``python -m service.child REQUEST.json FD``: run one job, send progress lines to the pipe FD.
 
-The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "chain", "address_bytes"}. Lines on
-the pipe are JSON: {"stage", "progress"} while it runs, then {"state"} or {"error"} once. Exit code 0 with a state, 3
-with an error.
+The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
+Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it takes something over from an
+attempt before (``service.kept``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
 """
 
 
@@ -43,20 +43,25 @@ def reporter(send, interval=0.2):
     return progress
 
 
-def compute(request, progress):
-    """Run the chain as the request says, leave its files in the out folder, and return the final state."""
+def compute(request, progress, resumed):
+    """Run the chain as the request says, leave its files in the out folder, and return the final state.
+
+    resumed : called with what was taken over from attempts before, by kind
+    """
     import importlib
     import json
     from pathlib import Path
 
     from service.convert import parse_setup
+    from service.kept import Kept
 
     chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])
     setup = parse_setup(request["setup"])
     blank = {"blank_path": Path(request["stock"])} if request.get("stock") else {}
     if request["kind"] == "plan":
-        result, name = chain.plan(part, setup, out, progress, **blank), "report.json"
+        kept = Kept(Path(request["kept"]), resumed)
+        result, name = chain.plan(part, setup, out, progress, kept=kept, **blank), "report.json"
         state = result["state"]
     elif request["kind"] == "zones":
         result, name = chain.zones_only(part, setup, progress, **blank), "zones.json"
@@ -89,7 +94,7 @@ def main(argv):
         os.write(pipe, (json.dumps(message, default=str) + "\n").encode())
 
     try:
-        send({"state": compute(request, reporter(send))})
+        send({"state": compute(request, reporter(send), lambda taken: send({"resumed": taken}))})
         return 0
     except CamError as error:
         send({"error": error.as_dict()})

@@ -1,8 +1,9 @@
 """Lets go of the files of old jobs, and removes from the data folder what no job has any use for.
 
 First rows: a job that ended longer ago than ``retention_days`` keeps its row, labels and state, and no longer names its
-files. Then files: an upload or result that no row names is removed. Files are shared by content, so one job's end takes
-nothing from another. What was written or used within ``GRACE_S`` stays, for its row may be on its way.
+files. Then files: an upload or result that no row names is removed, and what attempts kept for a result that no job
+waits for. Files are shared by content, so one job's end takes nothing from another. What was written or used within
+``GRACE_S`` stays, for its row may be on its way.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import structlog
 
-from service.artifacts import Artifacts
+from service.artifacts import Artifacts, key_of
 from service.settings import Settings
 from service.store import JobStore
 
@@ -64,11 +65,18 @@ class Janitor:
                 break
             if path.stem not in named:
                 removed += self.artifacts.remove(path, now - grace_s)
+        removed += self._unkept(now - grace_s)
         left = max(LEFTOVER_S, 4 * self.settings.job_time_limit_s)
         done = Swept(expired, removed, self.artifacts.sweep(now - left))
         if any((done.jobs, done.removed, done.leftovers)):
             log.info("swept", jobs=done.jobs, removed=done.removed, leftovers=done.leftovers)
         return done
+
+    def _unkept(self, before: float) -> int:
+        """Remove what attempts kept before a time, s, for a result that no job waits for any more; returns how many."""
+        candidates = list(self.artifacts.all_kept())
+        wanted = {key_of(row) for row in self.jobs.unfinished()} if candidates else set()
+        return sum(self.artifacts.remove(p, before) for p in candidates if p.name not in wanted)
 
     def _run(self) -> None:
         pause = self.settings.sweep_every_s / 10

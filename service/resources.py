@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import error_from_dict
-from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks, JobSummary, JobWebhook
+from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks, JobResumed, JobSummary, JobWebhook
 from schemas.keys import Key
 from schemas.problem import Problem
 from service.artifacts import Artifacts
@@ -47,8 +47,8 @@ def job_resource(row: RowMapping) -> Job:
     if row["error_json"]:
         error = Problem(**problem_document(error_from_dict(json.loads(row["error_json"])), path))
     return Job(id=row["id"], kind=kind, state=row["state"], stage=row["stage"], progress=row["progress"],
-               attempt=row["attempt"], content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
-               setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
+               attempt=row["attempt"], resumed=_resumed(row), content_sha256=row["content_sha256"],
+               part_sha256=row["part_sha256"], setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=time_text(row["created"]) or "",
                started_at=time_text(row["started"]), deadline_at=time_text(row["deadline"]),
                finished_at=time_text(row["finished"]), expired_at=time_text(row["expired"]), error=error,
@@ -71,9 +71,18 @@ def _webhook(row: RowMapping) -> JobWebhook | None:
                       next_attempt_at=time_text(row["webhook_due"]) if waits else None, problem=row["webhook_problem"])
 
 
+def _resumed(row: RowMapping) -> JobResumed | None:
+    if not row["resumed_json"]:
+        return None
+    taken = json.loads(row["resumed_json"])
+    return JobResumed(plans=taken.get("plan", 0), proofs=taken.get("proof", 0))
+
+
 def event_data(row: RowMapping) -> str:
     """Data of one event, JSON."""
-    return json.dumps({"id": row["id"], "state": row["state"], "stage": row["stage"], "progress": row["progress"]})
+    resumed = _resumed(row)
+    return json.dumps({"id": row["id"], "state": row["state"], "stage": row["stage"], "progress": row["progress"],
+                       **({"resumed": resumed.model_dump()} if resumed else {})})
 
 
 def encode_cursor(job_id: str) -> str:

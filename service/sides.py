@@ -20,12 +20,17 @@ from zones.view import View, turned_samples
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """What was planned along one access, in its frame: its clearance plane there, mm, and the stock as it leaves it."""
+    """What was planned along one access, in its frame, with its clearance plane there, mm.
+
+    left : the stock as it leaves it, for what is planned after it; None where every access begins with the whole blank
+    name : of it among what is kept for another attempt at the job (``service.resume``), '' where nothing is
+    """
 
     view: View
     made: Plan
     clearance: float
-    stock: StockMap
+    left: StockMap | None
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)

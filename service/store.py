@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import secrets
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -240,7 +240,7 @@ class JobStore:
         return self._change(
             sa.and_(jobs.c.id == job_id, jobs.c.claims == claim, jobs.c.state == "running",
                     jobs.c.attempt < max_attempts),
-            attempt=jobs.c.attempt + 1, lease_owner=owner, lease_until=now + lease_s, started=now)
+            attempt=jobs.c.attempt + 1, lease_owner=owner, lease_until=now + lease_s, started=now, resumed_json=None)
 
     def take_over(self, job_id: str, claim: int, owner: str, lease_s: float) -> bool:
         """Make ``owner`` the holder of that claim; False when it was claimed again since, or ended."""
@@ -260,6 +260,11 @@ class JobStore:
     def progress(self, job_id: str, owner: str, stage: str, fraction: float) -> bool:
         """Record what the holder is doing; also a heartbeat's worth of proof that it lives."""
         return self._change(self._held(job_id, owner), stage=stage[:200], progress=min(max(fraction, 0.0), 1.0),
+                            event_seq=jobs.c.event_seq + 1)
+
+    def resumed(self, job_id: str, owner: str, taken: Mapping[str, int]) -> bool:
+        """Record what the newest attempt took over from those before, by kind: it goes with the next event."""
+        return self._change(self._held(job_id, owner), resumed_json=json.dumps(dict(taken)),
                             event_seq=jobs.c.event_seq + 1)
 
     def finish(self, job_id: str, owner: str, state: str, *, artifact: str | None = None,
@@ -355,6 +360,13 @@ class JobStore:
             for row in c.execute(sa.select(*columns).where(jobs.c.expired.is_(None))):
                 named.update(filter(None, row))
         return named
+
+    def unfinished(self) -> list[RowMapping]:
+        """Every job that waits or runs, as far as its result is named by it (``service.artifacts.key_of``)."""
+        columns = (jobs.c.kind, jobs.c.part_sha256, jobs.c.setup_sha256, jobs.c.program_sha256, jobs.c.spindle_tool,
+                   jobs.c.stock_sha256)
+        with self.engine.connect() as c:
+            return list(c.execute(sa.select(*columns).where(jobs.c.state.in_(("queued", "running")))).mappings())
 
     def webhook_counts(self) -> dict[str, int]:
         """Number of webhooks by state."""

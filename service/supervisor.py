@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,12 +48,13 @@ class Limits:
 
 
 def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_progress: Callable[[str, float], None],
-              keep: Callable[[], bool]) -> str:
+              on_resumed: Callable[[Mapping[str, int]], None], keep: Callable[[], bool]) -> str:
     """Run a job in a child.
 
     request     : see ``service.child``; 'parent' and 'address_bytes' are filled in here
     scratch     : folder for what lives as long as the child
     on_progress : called with stage and fraction, at most once per look
+    on_resumed  : called with what the child took over from attempts before, by kind
     keep        : asked at every look; False kills the child
 
     Returns the final state the child reported.
@@ -80,7 +81,7 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
                                          start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
             os.close(writing)
             try:
-                final = _watch(child, reading, limits, on_progress, keep)
+                final = _watch(child, _Lines(reading, on_progress, on_resumed), limits, keep)
             finally:
                 kill_tree(child)
         finally:
@@ -113,22 +114,20 @@ def _environment(threads: int) -> dict[str, str]:
     return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
 
 
-def _watch(child: subprocess.Popen[bytes], reading: int, limits: Limits, on_progress: Callable[[str, float], None],
-           keep: Callable[[], bool]) -> dict[str, Any]:
+def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: Limits, keep: Callable[[], bool]) -> dict[str, Any]:
     """Look at the child until it ends; returns its last word, {} when it said none."""
     deadline = time.monotonic() + limits.time_s
-    handle, lines = psutil.Process(child.pid), _Lines(on_progress)
+    handle = psutil.Process(child.pid)
     next_look = 0.0
-    os.set_blocking(reading, False)
     with selectors.DefaultSelector() as selector:
-        selector.register(reading, selectors.EVENT_READ)
+        selector.register(lines.reading, selectors.EVENT_READ)
         while True:
             open_still = True
             if selector.select(timeout=limits.poll_s):
-                open_still = lines.feed(reading)
+                open_still = lines.feed()
             if not open_still or child.poll() is not None:
                 while open_still and selector.select(timeout=0):
-                    open_still = lines.feed(reading)
+                    open_still = lines.feed()
                 _await_exit(child)
                 return lines.final
             if time.monotonic() >= next_look:
@@ -137,23 +136,29 @@ def _watch(child: subprocess.Popen[bytes], reading: int, limits: Limits, on_prog
 
 
 class _Lines:
-    """Messages of the child, line by line; ``final`` is its last word."""
+    """Messages of the child, line by line, from the pipe ``reading``; ``final`` is its last word."""
 
-    def __init__(self, on_progress: Callable[[str, float], None]) -> None:
-        self.on_progress, self.buffer = on_progress, b""
+    def __init__(self, reading: int, on_progress: Callable[[str, float], None],
+                 on_resumed: Callable[[Mapping[str, int]], None]) -> None:
+        self.reading, self.on_progress, self.on_resumed, self.buffer = reading, on_progress, on_resumed, b""
         self.final: dict[str, Any] = {}
+        os.set_blocking(reading, False)
 
-    def feed(self, reading: int) -> bool:
+    def feed(self) -> bool:
         """Read what is there and pass on the newest progress; False at the end of the pipe."""
-        chunk = os.read(reading, 65536)
+        chunk = os.read(self.reading, 65536)
         *lines, self.buffer = (self.buffer + chunk).split(b"\n")
-        progress = None
+        progress = resumed = None
         for line in filter(None, lines):
             message = json.loads(line)
             if "stage" in message:
                 progress = message
+            elif "resumed" in message:
+                resumed = message
             else:
                 self.final = message
+        if resumed is not None:
+            self.on_resumed(resumed["resumed"])
         if progress is not None and not self.final:
             self.on_progress(progress["stage"], progress["progress"])
         return chunk != b""

@@ -9,7 +9,7 @@ import json
 import shutil
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from sqlalchemy.engine import RowMapping
 from sqlalchemy.exc import DBAPIError
 
 from geometry.errors import CamError, CancelledError, InternalError, ResourceError
-from service.artifacts import Artifacts, artifact_key
+from service.artifacts import Artifacts, key_of
 from service.db import connect
 from service.storage import STORAGE_FULL, is_full, storage_full
 from service.store import WORKER, JobStore
@@ -65,10 +65,10 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
     if not store.start(job_id, claim, owner, config.lease_s, config.max_attempts):
         return "superseded"
     row, key, summary = store.get(job_id), None, None
-    attempt = row["attempt"]
+    attempt, artifacts = row["attempt"], Artifacts(Path(config.data_dir))
     failure: CamError | None = None
     try:
-        state, key, summary = _Attempt(store, Artifacts(Path(config.data_dir)), config, row, owner).run()
+        state, key, summary = _Attempt(store, artifacts, config, row, owner).run()
     except CancelledError:
         return "stopped"
     except CamError as error:
@@ -77,6 +77,8 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
         failure = storage_full() if is_full(error) else _bug(error, job_id, attempt)
     if failure is not None:
         log.warning("job failed", job=job_id, attempt=attempt, error=failure.as_dict())
+        if failure.code == STORAGE_FULL:
+            artifacts.drop_kept(key_of(row))  # it may be what takes the room
         if failure.code == STORAGE_FULL and attempt < config.max_attempts:
             return "put back" if _record(lambda: store.put_back(job_id, owner), config.lease_s) else "superseded"
         state = "failed"
@@ -125,12 +127,11 @@ class _Attempt:
 
     def run(self) -> tuple[str, str, dict[str, Any] | None]:
         """Final state, key of the result and its figures."""
-        row = self.row
-        key = artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
-                           row["spindle_tool"], row["stock_sha256"])
+        key = key_of(self.row)
         folder = self.artifacts.result(key)
         if not self.artifacts.take(key):
             self._make(key)
+        self.artifacts.drop_kept(key)
         return (folder / "state").read_text().strip(), key, summary_of(folder)
 
     def _make(self, key: str) -> None:
@@ -149,11 +150,12 @@ class _Attempt:
             "kind": self.row["kind"], "part": str(self.artifacts.blob(self.row["part_sha256"])),
             "setup": self.row["setup_json"], "program": str(self.artifacts.blob(program)) if program else None,
             "stock": str(self.artifacts.blob(stock)) if stock else None,
-            "spindle_tool": self.row["spindle_tool"], "out": str(workspace), "chain": self.config.chain,
+            "spindle_tool": self.row["spindle_tool"], "out": str(workspace), "kept": str(self.artifacts.kept(key)),
+            "chain": self.config.chain,
         }
         try:
             state = supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
-                              keep=self._keep)
+                              on_resumed=self._resumed, keep=self._keep)
             (workspace / "state").write_text(f"{state}\n")
             self.artifacts.commit(workspace, key)
         finally:
@@ -164,6 +166,13 @@ class _Attempt:
             self.store.progress(self.row["id"], self.owner, stage, fraction)
         except DBAPIError as error:
             log.warning("progress not recorded", job=self.row["id"], error=type(error).__name__)
+
+    def _resumed(self, taken: Mapping[str, int]) -> None:
+        log.info("taken over from an attempt before", job=self.row["id"], attempt=self.row["attempt"], **taken)
+        try:
+            self.store.resumed(self.row["id"], self.owner, taken)
+        except DBAPIError as error:
+            log.warning("what was taken over is not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _keep(self) -> bool:
         """Whether to go on; renews the lease in good time. A database that does not answer is no reason to stop."""

@@ -43,9 +43,10 @@ class Cluster:
         return self._start("worker", self.address, "--no-nanny", "--nthreads", "1", "--memory-limit", "0",
                            "--no-dashboard")
 
-    def api(self):
+    def api(self, chain="fake_chain"):
         """A process that serves; returns it with a client."""
-        command = [sys.executable, str(FAKES / "serve_fake.py"), str(self.data), "3"]
+        port = [] if chain == "fake_chain" else [str(free_port()), chain]
+        command = [sys.executable, str(FAKES / "serve_fake.py"), str(self.data), "3", *port]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=self.environment, cwd=ROOT)
         self.processes.append(process)
         return process, httpx.Client(base_url=process.stdout.readline().strip(), trust_env=False, timeout=20)

@@ -47,7 +47,7 @@ def _misbehave(what, progress):
         raise errors.PartError("the part has open shells", code="open_shell", subjects=("F3",))
 
 
-def plan(part_path, setup, out, progress, blank_path=None):
+def plan(part_path, setup, out, progress, blank_path=None, kept=None):
     what = setup.labels.get("do", "")
     _misbehave(what, progress)
     for k in range(3):

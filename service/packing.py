@@ -1,0 +1,138 @@
+"""Plans and proofs as bytes and back: plain values, arrays and the classes named here, nothing that could run.
+
+    8 bytes      length of the words, little-endian
+    words        JSON, UTF-8: the tree of values, in which an array is its type, shape and place
+    arrays       one behind the other, each at a multiple of ``ALIGNED`` from the end of the words
+
+What comes back is what went in: a number keeps its type (a numpy scalar rounds otherwise than a float), an array its
+type, shape, order in memory and bits. Objects that both sides have anyway go by their name (``Known``).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from geometry.timing import Rates
+from toolpath.bands import HighWall
+from toolpath.counterexamples import Counterexamples
+from toolpath.deflection import Bend
+from toolpath.finish import ZonePlan
+from toolpath.motion import Arc, Motion, Trajectory, Workingstep
+from toolpath.plan import Plan
+from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
+from zones.reach import Lattice
+
+ALIGNED = 64
+CLASSES: dict[str, Any] = {c.__name__: c for c in (
+    Plan, Workingstep, Trajectory, Arc, Rates, Bend, ZonePlan, Counterexamples, HighWall, Lattice, Proof, Finding,
+    Engagement, Spent, Support, ZoneProof, FaceProof)}
+ENUMS: dict[str, Any] = {e.__name__: e for e in (Motion, FindingKind)}
+PLAIN = (type(None), bool, int, float, str)
+
+
+@dataclass(frozen=True)
+class Known:
+    """Objects that are not packed but named: by the name of their class, then by their ``id``."""
+
+    objects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def pack(value: Any, known: Known = Known()) -> bytes:
+    """A value as bytes.
+
+    Raises
+    ------
+    TypeError
+        Something in it is of a class that is not named here.
+    """
+    arrays: list[np.ndarray] = []
+    words = json.dumps(_tree(value, known, arrays, [0]), separators=(",", ":")).encode()
+    out = bytearray(len(words).to_bytes(8, "little") + words)
+    begin = len(out)
+    for a in arrays:
+        out += bytes(-(len(out) - begin) % ALIGNED)
+        out += a.tobytes(order="A")
+    return bytes(out)
+
+
+def unpack(data: bytes, known: Known = Known()) -> Any:
+    """The value that was packed.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        The bytes are not what ``pack`` writes, or name something that is not known here.
+    """
+    begin = 8 + int.from_bytes(data[:8], "little")
+    # a copy of its own, so that arrays can be written to as those of a plan can
+    room = np.frombuffer(data, np.uint8, offset=begin).copy()
+    return _value(json.loads(data[8:begin]), known, room)
+
+
+def _tree(value: Any, known: Known, arrays: list[np.ndarray], used: list[int]) -> Any:
+    kind = type(value)
+    if kind in PLAIN:
+        return value
+    if kind is tuple:
+        return [_tree(v, known, arrays, used) for v in value]
+    if isinstance(value, np.ndarray):
+        turned = value.flags.f_contiguous and not value.flags.c_contiguous
+        if value.dtype.hasobject:
+            raise TypeError("an array of objects is not packed")
+        place = used[0] + -used[0] % ALIGNED
+        used[0] = place + value.nbytes
+        arrays.append(value if turned else np.ascontiguousarray(value))
+        return {"a": [value.dtype.str, list(value.shape), place, turned]}
+    if kind.__name__ in known.objects:
+        if known.objects[kind.__name__].get(value.id) != value:
+            raise TypeError(f"{kind.__name__} {value.id} is another than the one that is known")
+        return {"k": [kind.__name__, value.id]}
+    if isinstance(value, np.generic):
+        return {"n": [value.dtype.str, value.item()]}
+    if isinstance(value, Enum) and kind.__name__ in ENUMS:
+        return {"e": [kind.__name__, value.value]}
+    if is_dataclass(value) and kind.__name__ in CLASSES:
+        return {"c": [kind.__name__, *(_tree(getattr(value, f.name), known, arrays, used) for f in fields(value))]}
+    if kind is list:
+        return {"l": [_tree(v, known, arrays, used) for v in value]}
+    if isinstance(value, Mapping):
+        return {"m": [[_tree(k, known, arrays, used), _tree(v, known, arrays, used)] for k, v in value.items()]}
+    raise TypeError(f"a {kind.__name__} is not packed")
+
+
+def _value(tree: Any, known: Known, room: np.ndarray) -> Any:
+    if isinstance(tree, list):
+        return tuple(_value(t, known, room) for t in tree)
+    if not isinstance(tree, dict):
+        return tree
+    ((mark, said),) = tree.items()
+    if mark == "a":
+        kind, shape, place, turned = said
+        dtype = np.dtype(kind)
+        size = dtype.itemsize * int(np.prod(shape, dtype=np.int64))
+        if place + size > len(room):
+            raise ValueError("an array goes beyond the end")
+        return room[place:place + size].view(dtype).reshape(shape, order="F" if turned else "C")
+    if mark == "k":
+        return known.objects[said[0]][said[1]]
+    if mark == "n":
+        return np.dtype(said[0]).type(said[1])
+    if mark == "e":
+        return ENUMS[said[0]](said[1])
+    if mark == "c":
+        made = CLASSES[said[0]]
+        return made(*(_value(t, known, room) for t in said[1:]))
+    if mark == "l":
+        return [_value(t, known, room) for t in said]
+    if mark == "m":
+        return {_value(k, known, room): _value(v, known, room) for k, v in said}
+    raise ValueError(f"a mark {mark!r} is not known")
+
+
+__all__ = ["Known", "pack", "unpack"]
