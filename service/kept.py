@@ -34,21 +34,21 @@ class Kept:
     def __bool__(self) -> bool:
         return self.folder is not None
 
-    def get(self, kind: str, name: str) -> bytes | None:
+    def get(self, kind: str, name: str) -> memoryview | None:
         """What was put under a name; None where it is not there or not whole."""
         if self.folder is None:
             return None
         path = self.folder / f"{kind}-{name}"
         try:
-            data = path.read_bytes()
+            data = memoryview(path.read_bytes())
         except OSError:
             return None
-        if hashlib.sha256(memoryview(data)[DIGEST:]).digest() != data[:DIGEST]:
+        if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
             self.drop(kind, name)
             return None
         return data[DIGEST:]
 
-    def put(self, kind: str, name: str, data: bytes) -> bool:
+    def put(self, kind: str, name: str, data: bytes | bytearray) -> bool:
         """Keep bytes under a name; False where that could not be done."""
         if self.folder is None:
             return False

@@ -43,7 +43,7 @@ class Known:
     objects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
-def pack(value: Any, known: Known = Known()) -> bytes:
+def pack(value: Any, known: Known = Known()) -> bytearray:
     """A value as bytes.
 
     Raises
@@ -58,10 +58,10 @@ def pack(value: Any, known: Known = Known()) -> bytes:
     for a in arrays:
         out += bytes(-(len(out) - begin) % ALIGNED)
         out += a.tobytes(order="A")
-    return bytes(out)
+    return out
 
 
-def unpack(data: bytes, known: Known = Known()) -> Any:
+def unpack(data: bytes | bytearray | memoryview, known: Known = Known()) -> Any:
     """The value that was packed.
 
     Raises
@@ -72,7 +72,7 @@ def unpack(data: bytes, known: Known = Known()) -> Any:
     begin = 8 + int.from_bytes(data[:8], "little")
     # a copy of its own, so that arrays can be written to as those of a plan can
     room = np.frombuffer(data, np.uint8, offset=begin).copy()
-    return _value(json.loads(data[8:begin]), known, room)
+    return _value(json.loads(bytes(data[8:begin])), known, room)
 
 
 def _tree(value: Any, known: Known, arrays: list[np.ndarray], used: list[int]) -> Any:

@@ -6,9 +6,9 @@ is taken over is named by a digest of all it came from:
     plan    the job as prepared here, the access, the plans before it, what proofs found along it
     proof   the job as prepared here, the very texts that were proved, who answers for each sample
 
-The job as prepared has its setup, our sources and the versions of the libraries that compute in it, and part, zones
-and samples bit by bit: a worker on which any of them is another finds no plan of the other's. So a job that was taken
-up again ends with the bytes of one that nothing happened to.
+The job as prepared has its setup, our sources, the versions of the libraries that compute and the kind of processor in
+it, and part, zones and samples bit by bit: a worker on which any of them is another finds no plan of the other's. So a
+job that was taken up again ends with the bytes of one that nothing happened to.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
 
+import llvmlite.binding as llvm
 import numpy as np
 import structlog
 from numpy.typing import NDArray
@@ -140,7 +141,7 @@ def _checked(kind: type[T], value: Any) -> T:
     return value
 
 
-def _digest(*told: str | bytes | NDArray[Any]) -> str:
+def _digest(*told: str | bytearray | NDArray[Any]) -> str:
     """SHA-256 over texts, bytes and arrays, each with its length before it, hex."""
     digest = hashlib.sha256()
     for one in told:
@@ -153,8 +154,8 @@ def _digest(*told: str | bytes | NDArray[Any]) -> str:
 
 
 def _computing() -> str:
-    """What computes: the versions of interpreter and libraries."""
-    found = [sys.version]
+    """What computes: interpreter, processor as kernels are compiled for it, versions of libraries."""
+    found = [sys.version, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
     for name in COMPUTING:
         try:
             found.append(f"{name} {version(name)}")
