@@ -1,7 +1,7 @@
 """Whole jobs from a box, ours beside a plan nobody optimised: proof, time, air, retracts, tool changes, engagement.
 
-    python benchmarks/whole_job.py [PART/AXES ...] [--plan ours|baseline] [--spacing MM] [--out out/whole_job]
-        [--table]
+    python benchmarks/whole_job.py [PART/AXES ...] [--plan ours|baseline] [--spacing MM] [--engaged DEG]
+        [--out out/whole_job] [--table]
 
 Parts: the demo, a gap of 0.8 mm, a closed pocket, a strut impeller; axes 3 (upright) and 5 (table A/C, A -30 to 110
 degrees). Each is planned and proved in a process of its own, with the feeds of its setup; what it gave is a line of
@@ -11,7 +11,8 @@ again with the feeds of ours where these changed.
 ``--table`` prints the newest line of each. Times and moves are those the proof simulated; air is all time but that of
 moves which take stock. A move takes stock where it takes a line of the proof's stock, and lines stand 0.15 mm apart, so
 a skin that a finishing pass takes off a wall meets few of them and much of the pass counts as air; ``--spacing`` says
-how far apart they are to be.
+how far apart they are to be. ``--engaged`` bounds the engaged angle of all tools of 1.5 mm and more; such jobs have a
+table of their own.
 """
 
 from __future__ import annotations
@@ -40,13 +41,18 @@ ROWS = ROOT / "benchmarks" / "whole_job_rows"
 PARTS: dict[str, dict[str, Any]] = {
     "demo:0": {}, "narrow:1": {}, "mixed_linear:0": {"walls": 2, "connections": 1}, "impeller:4": {}}
 AXES = {"3": None, "5": MACHINE}
+BOUNDED = 1.5  # mm, diameter of the least tool that --engaged bounds: thinner ones have no room for arcs in their slots
 STOCK = {"kind": "box", "margin_mm": 1.0, "uncertainty_mm": 0.5}
 HEAD = ("part", "axes", "plan", "state", "left mm²", "min", "air min", "air", "retracts", "changes", "cut m",
         "engaged max / p99 deg", "gouge mm", "s by stage")
 
 
-def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None = None) -> dict[str, Any]:
-    """Make, plan and prove one part: plain data. spacing : mm between lines of the proof's stock, where not its own."""
+def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None = None,
+            engaged: float | None = None) -> dict[str, Any]:
+    """Make, plan and prove one part: plain data.
+
+    spacing : mm between lines of the proof's stock, where not its own;  engaged : degrees, as ``--engaged`` has it
+    """
     from benchmarks import baseline_plan
     from examples.demo import demo_setup
     from examples.family import make_part
@@ -64,30 +70,36 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
     setup = {**(demo_setup() if recipe == "demo" else made.setup), "stock": STOCK}
     if AXES[axes] is not None:
         setup["machine"] = AXES[axes]
-    stages, facts = Stages(), {"part": part, "axes": axes, "plan": plan, "spacing": spacing}
+    for tool in setup["tools"] if engaged is not None else ():
+        if tool["diameter_mm"] >= BOUNDED:
+            tool["max_engagement_deg"] = engaged
+    stages = Stages()
+    facts = {"part": part, "axes": axes, "plan": plan, "spacing": spacing, "engaged_limit": engaged}
     try:
         report = chain.plan(step, Setup.model_validate(setup), folder / "job", stages,
                             planner=baseline_plan.plan_job if plan == "baseline" else plan_job)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
-    engaged = [t["engagement_deg"] for t in report["tools"] if t["engagement_deg"]]
+    met = [t["engagement_deg"] | {"id": t["id"]} for t in report["tools"] if t["engagement_deg"]]
     return facts | {
         "state": report["state"], "findings": dict(report["finding_counts"]), "reach": report["reach_coverage"],
         "coverage": report["coverage"], "left": sum(x["area_mm2"] for x in report["remainder"]),
         "gouge": report["gouge_max_mm"], "faces": report["part"]["faces"], "zones": len(report["zones"]),
         "seconds": report["machining_time_s"], "time": report["time"],
         "cut_mm": report["proof"]["cutting_length_mm"],
-        "engaged": [max((e[k] for e in engaged), default=0.0) for k in ("max", "p99")],
+        "engaged": [max((e[k] for e in met), default=0.0) for k in ("max", "p99")], "engaged_by_tool": met,
         "steps": len(report["steps"]), "stages": {k: round(v, 1) for k, v in stages.seconds.items()},
         "processor": {k: round(v, 1) for k, v in stages.busy.items()}}
 
 
-def run(part: str, axes: str, plan: str, limit: float | None, spacing: float | None) -> dict[str, Any]:
+def run(part: str, axes: str, plan: str, limit: float | None, spacing: float | None,
+        engaged: float | None) -> dict[str, Any]:
     """One part in a process of its own."""
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as scratch:
         try:
-            done = subprocess.run([sys.executable, __file__, "--one", part, axes, plan, scratch, str(spacing or "")],
+            done = subprocess.run([sys.executable, __file__, "--one", part, axes, plan, scratch, str(spacing or ""),
+                                   str(engaged or "")],
                                   capture_output=True, text=True, timeout=limit)
             lines = done.stdout.splitlines()
             row = json.loads(lines[-1]) if done.returncode == 0 and lines else {
@@ -113,6 +125,8 @@ def cells(row: dict[str, Any]) -> list[str]:
 def table(rows: list[dict[str, Any]]) -> None:
     """The newest line of each part, axes and plan; after ours what is saved against the baseline."""
     print("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
+    bounded = {(r["part"], r["axes"]): r for r in rows if r.get("engaged_limit") and r["state"] != "error"}
+    rows = [r for r in rows if not r.get("engaged_limit")]
     newest = {(r["part"], r["axes"], r["plan"], r.get("spacing")): r for r in rows}
     spacings = sorted({key[3] for key in newest}, key=lambda s: s or 1.0, reverse=True)
     for part, axes, spacing in [(p, a, s) for p in PARTS for a in AXES for s in spacings]:
@@ -126,12 +140,20 @@ def table(rows: list[dict[str, Any]]) -> None:
             apart = "" if spacing is None else f", lines {spacing:g} mm apart"
             print(f"\n{part} {axes} axes{apart}: total time {1 - now['seconds'] / was['seconds']:+.1%} saved, air "
                   f"{1 - now['time']['in_air_s'] / was['time']['in_air_s']:+.1%} saved\n")
+    if bounded:
+        head = ("part", "axes", "limit deg", "state", "min", "max / p99 deg by tool")
+        print(f"\nWith a limit of the engaged angle:\n\n| {' | '.join(head)} |\n|" + "---|" * len(head))
+    for (part, axes), row in bounded.items():
+        by = ", ".join(f"{e['id']} {e['max']:.0f} / {e['p99']:.0f}" for e in row["engaged_by_tool"])
+        kinds = ", ".join(f"{n} {k}" for k, n in sorted(row["findings"].items()))
+        print(f"| {part} | {axes} | {row['engaged_limit']:g} | {row['state']}{': ' + kinds if kinds else ''} | "
+              f"{row['seconds'] / 60:.1f} | {by} |")
 
 
 def growth(rows: list[dict[str, Any]]) -> None:
     """How processor seconds of our plans grow with faces and with metres of cutting: exponents over jobs."""
     newest = {(r["part"], r["axes"]): r for r in rows if r["plan"] == "ours" and r["state"] != "error"
-              and r.get("spacing") is None and "processor" in r}
+              and r.get("spacing") is None and not r.get("engaged_limit") and "processor" in r}
     if len(newest) < 3:
         return
     names = [*dict.fromkeys(k for r in newest.values() for k in r["processor"]), "all"]
@@ -156,18 +178,19 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROWS)
     parser.add_argument("--limit", type=float)
     parser.add_argument("--spacing", type=float)
+    parser.add_argument("--engaged", type=float)
     parser.add_argument("--table", action="store_true")
-    parser.add_argument("--one", nargs=5, help=argparse.SUPPRESS)
+    parser.add_argument("--one", nargs=6, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.one:
-        spacing = float(args.one[4]) if args.one[4] else None
-        print(json.dumps(planned(*args.one[:3], Path(args.one[3]), spacing)))
+        spacing, engaged = (float(text) if text else None for text in args.one[4:])
+        print(json.dumps(planned(*args.one[:3], Path(args.one[3]), spacing, engaged)))
         return
     args.out.mkdir(parents=True, exist_ok=True)
     kept = args.out / "rows.jsonl"
     jobs = args.jobs or [f"{p}/{a}" for p in PARTS for a in AXES]
     for part, axes in [job.split("/") for job in jobs] if not args.table else ():
-        row = {"sources": digest_of(SOURCES)} | run(part, axes, args.plan, args.limit, args.spacing)
+        row = {"sources": digest_of(SOURCES)} | run(part, axes, args.plan, args.limit, args.spacing, args.engaged)
         with kept.open("a") as out:
             out.write(json.dumps(row) + "\n")
         print(f"{part}/{axes} {args.plan}: {row['state']} {row['wall']} s", flush=True)
