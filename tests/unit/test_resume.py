@@ -76,6 +76,7 @@ def kinds(kept: Kept) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("fields", [TWO_WAYS, TURNED], ids=["two ways up", "turned"])
 def test_an_attempt_goes_on_where_the_one_before_was_cut_off(tmp_path, monkeypatch, fields):
     told: list[dict[str, int]] = []
@@ -94,6 +95,7 @@ def test_an_attempt_goes_on_where_the_one_before_was_cut_off(tmp_path, monkeypat
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_rounds_are_gone_through_again_without_planning_or_proving(tmp_path, monkeypatch):
     """A job that is planned twice, for its first proof has something to say of the second access."""
     asked: list[int] = []
