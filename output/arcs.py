@@ -41,6 +41,8 @@ MOST_SLOPE = 0.1
 """Of a helix: some controls count F in the plane alone, and go 0.5 % faster on it at most."""
 SAG = 6e-4
 """mm between an arc and the chords it has as a polyline, in STEP-NC where no circle can stand: helices, tool axes."""
+ROUNDED = (Motion.CUT, Motion.APPROACH, Motion.LIFT)
+"""What may have arcs: passes, and the arcs that lead on and off them."""
 BLOCK = 256
 """Moves of a pass at the most between two places at which a block ends in any case."""
 
@@ -65,9 +67,9 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
     plan      : cuts within its chordal tolerances
     tolerance : mm, what is added to these, >= 0
 
-    Returns the plan, the chordal tolerance of its steps so much larger. Cuts alone are touched, not ways in and out,
-    and of them those whose tool axis is fixed. Arcs are in steps along Z of the written frame alone. The ends of all
-    trajectories are where they were.
+    Returns the plan, the chordal tolerance of its steps so much larger. Cuts and the ways on and off them are touched,
+    not links, and of them those whose tool axis is fixed. Arcs are in steps along Z of the written frame alone. The
+    ends of all trajectories are where they were.
     """
     places = [(s, t) for s, step in enumerate(plan.steps) for t, way in enumerate(step.trajectories) if _may(way)]
     if not places or tolerance <= 0.0:
@@ -82,7 +84,7 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
 
 
 def _may(way: Trajectory) -> bool:
-    return way.motion is Motion.CUT and way.axes is None and not way.arcs and len(way.points) > 2
+    return way.motion in ROUNDED and way.axes is None and not way.arcs and len(way.points) > 2
 
 
 def _upright(plan: Workplan, step: Workingstep) -> bool:

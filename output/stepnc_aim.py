@@ -436,6 +436,7 @@ def _square_to(axis: F64) -> Sequence[float]:
 
 def _purpose(step: Workingstep) -> str:
     """What the strategy was asked for: class 1 carries no strategy object."""
-    return (f"{step.strategy}, {'climb' if step.climb else 'conventional'}, side step {decimal(step.side_step)} mm, "
+    direction = "climb or conventional" if step.either_way else "climb" if step.climb else "conventional"
+    return (f"{step.strategy}, {direction}, side step {decimal(step.side_step)} mm, "
             f"scallop {decimal(step.scallop_height)} mm, chordal tolerance {decimal(step.chordal_tolerance)} mm, "
             f"{height_word(step)} {decimal(step.top)} to {decimal(step.bottom)} mm")

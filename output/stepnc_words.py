@@ -149,9 +149,10 @@ def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
 
 
 def to_and_fro(step: Workingstep) -> bool:
-    """Whether passes are walked to and fro: those along the borders of faces where most go against the one before."""
+    """Whether passes are walked to and fro: those along the borders of faces where most go against the one before, all
+    others where they may go either way."""
     if step.strategy != "isoparametric":
-        return step.strategy == "zigzag"
+        return step.strategy == "zigzag" or step.either_way
     ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is Motion.CUT]).reshape(-1, 3)
     return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 

@@ -292,7 +292,7 @@ class Finish:
 
     def _linker(self) -> Linker:
         return Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found,
-                      engaged=self.cut.engaged)
+                      engaged=self.cut.engaged, walls=self.zone.form is Form.STEEP)
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
@@ -477,4 +477,4 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
                        settings.scallop_height, settings.chordal_tolerance, walked, outline,
                        max(z.top for z in zones), min(z.bottom for z in zones), settings.climb, rates=settings.rates,
-                       bend=cut.bend)
+                       bend=cut.bend, either_way=settings.either_way)

@@ -1,8 +1,9 @@
 """Passes of a leaning tool as motions: what of them is free of stock, their feeds, their ways in and out.
 
 A pass is one step of work: the tool comes down along its own axis beside the beginning, goes to it, along the pass, off
-it, and up along its axis again; where it turns to the next one it is outside of everything. What it would meet of part,
-fixtures and stock is asked pose by pose.
+it, and up along its axis again; where it turns to the next one it is outside of everything. On and off a wall that its
+flank cuts it goes on an arc where there is room (``toolpath.leads``). What it would meet of part, fixtures and stock is
+asked pose by pose.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.levels import true_runs
+from toolpath.leads import arc_onto, radii
+from toolpath.levels import dense, true_runs
 from toolpath.motion import Motion, Trajectory
 from toolpath.piece import LEAST_PIECE, Piece, places_along, raised_poses, thinned_poses
 from toolpath.posed import Blocked
@@ -33,6 +35,7 @@ THICK = 0.12  # of the diameter: what a leaning tool may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
 LEAST_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
 LEAST_WAY = 1e-3  # mm, across the axis, that says where a pass comes from
+SQUARE = 0.7  # of a way off the wall, square to the pass: where it is less the pass does not go along the wall
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
@@ -253,7 +256,7 @@ def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
 def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
               around: Surroundings) -> tuple[Trajectory, ...] | str:
     """A pass with its ways in and out, or why there is none, in words."""
-    thick = THICK * tool.diameter
+    thick, chord = THICK * tool.diameter, 0.25 * settings.chordal_tolerance
     walked = around.turning.along(piece.tips, piece.axes)
     if walked is None:
         return "the rotary axes do not get along it"
@@ -264,13 +267,13 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     dense = Piece(tips, axes, axes, piece.reach).at(places_along(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
         return LOADED
-    straight_up = [(np.zeros(3), thick, SKIN * tool.diameter)]  # where it has been it may go as it stands
+    straight_up = [(tips[-1:], thick, SKIN * tool.diameter)]  # where it has been it may go as it stands
     back = piece.reversed()
-    ways = [_way_in(piece, tool, settings, around, _leads(piece, tool, thick)),
-            _way_in(back, tool, settings, around, straight_up if piece.on_end else _leads(back, tool, thick))]
+    ways = [_way_in(piece, tool, settings, around, _leads(piece, tool, thick, chord)),
+            _way_in(back, tool, settings, around, straight_up if piece.on_end else _leads(back, tool, thick, chord))]
     if ways[0] is None or ways[1] is None:
         return "the tool does not get there along its own axis"
-    (first, near), (last, off) = ways[0], ways[1]
+    (top, first, near), (out_top, last, off) = ways[0], ways[1]
     last = last[::-1]
     out: list[Trajectory] = []
 
@@ -279,14 +282,14 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
             out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
 
     a, b = axes[0], axes[-1]
-    go(Motion.APPROACH, np.array([first[0], first[1] + near * a]), cut.link_feed, a)
-    go(Motion.APPROACH, np.array([first[1] + near * a, first[1]]), cut.plunge_feed, a)
-    go(Motion.CONNECT, first[1:], cut.feed, a)
+    go(Motion.APPROACH, np.array([top, first[0] + near * a]), cut.link_feed, a)
+    go(Motion.APPROACH, np.array([first[0] + near * a, first[0]]), cut.plunge_feed, a)
+    go(Motion.CONNECT, first, cut.feed, a)
     for i, j in _steady(feeds):
         out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
-    go(Motion.CONNECT, last[:2], cut.feed, b)
-    go(Motion.LIFT, np.array([last[1], last[1] + off * b]), cut.feed, b)
-    go(Motion.LIFT, np.array([last[1] + off * b, last[2]]), cut.link_feed, b)
+    go(Motion.CONNECT, last, cut.feed, b)
+    go(Motion.LIFT, np.array([last[-1], last[-1] + off * b]), cut.feed, b)
+    go(Motion.LIFT, np.array([last[-1] + off * b, out_top]), cut.link_feed, b)
     return tuple(out)
 
 
@@ -317,32 +320,35 @@ def _steady(feeds: F64) -> list[tuple[int, int]]:
 
 
 Lead = tuple[F64, float, float]
-"""Where a tool may come down, (3,) mm off the beginning of a pass, and what stock it may meet there, mm, at its flank
-and under its end."""
+"""A way (k, 3), mm, from beside the beginning of a pass to it, k = 1 for straight down on it, and what stock the tool
+may meet where it comes down, mm, at its flank and under its end."""
 
 
 def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
-            leads: Sequence[Lead]) -> tuple[F64, float] | None:
-    """(3, 3) mm: above everything, beside the beginning of a piece, and the beginning; None where none is free.
+            leads: Sequence[Lead]) -> tuple[F64, F64, float] | None:
+    """A place (3,) above everything and a way (k, 3) from under it to the beginning of a piece, mm; None where none is
+    free.
 
-    With it mm above the middle one, down to where nothing stands near the tool. Beside the beginning where there is
-    room for that; else straight down: along a wall where the end of the tool is round enough not to dig up what stands
-    there, and on its end where there is no more than a skin under it.
+    With it mm above the beginning of that way, down to where nothing stands near the tool. Beside the beginning where
+    there is room for that; else straight down: along a wall where the end of the tool is round enough not to dig up
+    what stands there, and on its end where there is no more than a skin under it.
     """
-    axis, tip = piece.axes[0], piece.tips[0]
-    for aside, stock, under in leads:
-        beside = tip + aside
-        dip = tip[2] - float(lowest(tip[None], axis[None], tool, around.discs, UP_Z)[0])
+    axis, thick = piece.axes[0], THICK * tool.diameter
+    for way, stock, under in leads:
+        beside = way[0]
+        dip = beside[2] - float(lowest(beside[None], axis[None], tool, around.discs, UP_Z)[0])
         high = (settings.clearance + max(dip, 0.0) - beside[2]) / axis[2]
         if high <= 0.0:
             return None
         down = beside + np.linspace(high, 0.0, int(np.ceil(high / (LOOK * tool.radius))) + 5)[:, None] * axis
-        over = beside + np.linspace(0.0, 1.0, 5)[:, None] * (tip - beside)
-        axes = np.tile(axis, (len(down), 1))
-        if around.blocked(down, axes, tool).any() or around.blocked(over, axes[:len(over)], tool).any():
+        over = dense(way, min(LOOK * tool.radius, MOST_LEAD / 4.0))
+        axes = np.tile(axis, (max(len(down), len(over)), 1))
+        if (around.blocked(down, axes[:len(down)], tool).any() or around.blocked(over, axes[:len(over)], tool).any()
+                or len(way) > 2 and around.met(over, axes[:len(over)], tool, thick).any()):
             continue
+        axes = axes[:len(down)]
         if not (around.met(down, axes, tool, stock, under) | settings.found.bars(tool, down)).any():
-            return np.array([beside + high * axis, beside, tip]), min(_near(down, axes, tool, around), high)
+            return beside + high * axis, way, min(_near(down, axes, tool, around), high)
     return None
 
 
@@ -358,17 +364,43 @@ def _near(down: F64, axes: F64, tool: ToolBody, around: Surroundings) -> float:
     return IN_FRONT + max(SKIN * tool.diameter, float(high[max(met[0] - 1, 0)]) if len(met) else 0.0)
 
 
-def _leads(piece: Piece, tool: ToolBody, thick: float) -> list[Lead]:
+def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lead]:
     """Where the tool may come down at the beginning of a piece, the best first."""
-    room, skin, axis = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0]
+    room, skin, axis, tip = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0], piece.tips[0]
+
+    def straight(aside: F64) -> F64:
+        return np.array([tip + aside, tip])
+
     if piece.on_end:
-        on_the_spot = [(np.zeros(3), 0.0, skin)]
-        way = piece.tips[0] - piece.tips[1:]
+        on_the_spot = [(tip[None], 0.0, skin)]
+        way = tip - piece.tips[1:]
         way = way - (way @ axis)[:, None] * axis
         size = np.linalg.norm(way, axis=1)
         far = np.flatnonzero(size > LEAST_WAY)
-        return [*((room * way[k] / size[k], 0.0, 0.0) for k in far[:1].tolist()), *on_the_spot]
+        return [*((straight(room * way[k] / size[k]), 0.0, 0.0) for k in far[:1].tolist()), *on_the_spot]
     aside = piece.away[0] - (piece.away[0] @ axis) * axis
     aside /= np.linalg.norm(aside)
-    down_the_wall = [(0.0 * aside, thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []
-    return [(room * aside, 0.0, 0.0), (0.25 * room * aside, 0.0, 0.0), *down_the_wall]
+    down_the_wall = [(tip[None], thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []
+    return [*((arc, 0.0, 0.0) for arc in _arcs_onto(piece, tool, aside, chord)), (straight(room * aside), 0.0, 0.0),
+            (straight(0.25 * room * aside), 0.0, 0.0), *down_the_wall]
+
+
+def _arcs_onto(piece: Piece, tool: ToolBody, aside: F64, chord: float) -> list[F64]:
+    """Arcs (k, 3), mm, onto the beginning of a pass, square to the tool there.
+
+    aside : (3,) float64, unit, off the wall; chord : mm, what the chords of the arcs may be under them
+    """
+    axis, tip = piece.axes[0], piece.tips[0]
+    way = piece.tips[1:] - tip
+    way = way - (way @ axis)[:, None] * axis
+    size = np.linalg.norm(way, axis=1)
+    far = np.flatnonzero(size > LEAST_WAY)
+    if not len(far):
+        return []
+    ahead = way[far[0]] / size[far[0]]
+    off = aside - (aside @ ahead) * ahead
+    if float(np.linalg.norm(off)) < SQUARE:
+        return []
+    length = float(np.linalg.norm(np.diff(piece.tips, axis=0), axis=1).sum())
+    off /= np.linalg.norm(off)
+    return [arc_onto(tip, ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MOST_LEAD]

@@ -7,11 +7,12 @@ Stock that stands higher over a pass than the flutes reach is first walked off a
 2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
 3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
    top is in air, or a free place close beside it is.
-A pass with none of these is left out. To where ways 2 and 3 begin the tool goes straight over what is between, or by
-the clearance plane where that is sooner. Where the engaged angle has a limit (``toolpath.engaged``) ways in keep it,
-and where a pass would not it is first walked in skims above that. Rapids move Z alone between that plane and a height
-clear of the stock, or XY alone at the plane; below that height every move is a feed move, as no rapid keeps its
-clearance beside a wall.
+A pass with none of these is left out. One along a wall begins and ends on an arc (``toolpath.leads``) where the tool is
+free on it and clear of stock at its far end, and is come to by ways 1 and 2 there. To where ways 2 and 3 begin the tool
+goes straight over what is between, or by the clearance plane where that is sooner. Where the engaged angle has a limit
+(``toolpath.engaged``) ways in keep it, and where a pass would not it is first walked in skims above that. Rapids move Z
+alone between that plane and a height clear of the stock, or XY alone at the plane; below that height every move is a
+feed move, as no rapid keeps its clearance beside a wall.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
+from toolpath.leads import arc_onto, radii
 from toolpath.levels import Line, dense, pieces_where, stretch, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import GUARD, Pace, paced
@@ -43,6 +45,8 @@ OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
+BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
+LEVEL_SHARE = 0.9  # of its length, level: a pass that goes up or down steeper has no arcs
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -79,6 +83,7 @@ class Linker:
     found   : what a proof found wrong with an earlier plan
     pace    : Pace of passes that take stock off; None: all at one feed
     engaged : rad, most of the front of the cutter that may be in stock
+    walls   : whether passes go along walls, and begin and end on arcs
     """
 
     field: TipField
@@ -88,6 +93,7 @@ class Linker:
     found: Counterexamples = NONE
     pace: Pace | None = None
     engaged: float = UNBOUNDED
+    walls: bool = False
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
     passes: int = 0
@@ -198,7 +204,14 @@ class Linker:
         """
         if unless_over and not within(self.stock, points, self.field.tool, self.engaged, self.found):
             return False
-        way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
+        arc = np.empty((0, 3))
+        if self.walls and not eased:
+            arc, points = self._onto(points, closed)
+        if len(arc):
+            led = np.vstack([arc, points[1:]])
+            way: Linker.Way | None = self._straight_on(led, False) or (arc[:1], led, False)
+        else:
+            way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
         if way is None:
             return False
         entry, cut, joined = way
@@ -210,6 +223,9 @@ class Linker:
                 self._feed(Motion.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self._here() - cut[0]) > 1e-9:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
+        if len(arc):
+            self._feed(Motion.APPROACH, arc, self.motions.feed)
+            cut = points
         down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
         most = min(most, self.motions.front_feed) if eased else most
         head = min(most, self._descent(cut[:down + 1]))
@@ -220,7 +236,42 @@ class Linker:
             self._paced(Motion.CUT, cut, most)
         self.depths.cut(cut)
         self.passes += 1
+        if self.walls and not eased:
+            off = self._arc(points[-1], points[-2] - points[-1], Line(points, closed).length)
+            if off is not None:
+                self._feed(Motion.LIFT, np.ascontiguousarray(off[::-1]), self.motions.feed)
         return True
+
+    def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
+        """An arc (k, 3), mm, onto a pass (n, 3), k = 0 where there is none, and the pass, begun where the arc ends."""
+        length = Line(points, closed).length
+        starts = sorted({0, *(len(points) * np.arange(1, BEGINNINGS) // BEGINNINGS).tolist()}) if closed else [0]
+        for first in starts:
+            begun = np.vstack([points[first:-1], points[:first + 1]]) if first else points
+            arc = self._arc(begun[0], begun[1] - begun[0], length)
+            if arc is not None:
+                return arc, begun
+        return np.empty((0, 3)), points
+
+    def _arc(self, at: F64, way: F64, length: float) -> F64 | None:
+        """A level arc (k, 3), mm, onto a place (3,) from where a tool is clear of stock, that goes on along ``way``.
+
+        length : mm, of the pass. None where the tool is not free on any, where too much stock stands on it, and where
+        the pass goes up or down.
+        """
+        run = float(np.hypot(*way[:2]))
+        if run < LEVEL_SHARE * float(np.linalg.norm(way)) or run <= 0.0:
+            return None
+        ahead = np.array([way[0], way[1], 0.0]) / run
+        left = np.array([-ahead[1], ahead[0], 0.0])
+        for radius in radii(self.field.tool.diameter, length):
+            for off in (left, -left):
+                arc = arc_onto(at, ahead, off, radius, 0.5 * self.motions.tolerance)
+                if bool(self.stock.in_air(arc[:1], self.field.tool)[0]):
+                    tips = dense(arc, 0.3 * self.field.lattice.step)
+                    if self._free(tips) and self._lane(tips, 1.5 * self.motions.step_down):
+                        return arc
+        return None
 
     def _descent(self, points: F64) -> float:
         """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
@@ -450,7 +501,11 @@ class Linker:
     def _free_move(self, a: F64, b: F64, z: float) -> bool:
         n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
-        tips = np.column_stack([a + t * (b - a), np.full(n, z + LEVEL_TOLERANCE)])
+        return self._free(np.column_stack([a + t * (b - a), np.full(n, z)]))
+
+    def _free(self, tips: F64) -> bool:
+        """Whether the tool meets no part and fixture, and its bodies no stock, at tips (n, 3), mm, close together."""
+        tips = tips + [0.0, 0.0, LEVEL_TOLERANCE]
         if bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any()):
             return False
         return not bool(self.stock.meets_bodies(tips, self.field.discs).any())

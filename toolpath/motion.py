@@ -100,6 +100,7 @@ class Workingstep:
     rates     : what the machine does, for times
     bend      : what its cuts bend the tool by, as estimated; None where nobody knows
     fresh     : the program asks for a fresh cutter before it
+    either_way: its passes may go in both directions; climb says that of the first
     """
 
     id: str
@@ -123,6 +124,7 @@ class Workingstep:
     rates: Rates = RATES
     bend: Bend | None = None
     fresh: bool = False
+    either_way: bool = False
 
     @property
     def seconds(self) -> float:

@@ -20,6 +20,7 @@ from output.walker import write_program
 from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, round_plan, turn
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step
+from toolpath.leads import arc_onto
 from toolpath.motion import Motion
 from verify.agree import check_agreement
 from verify.kinematics import Kinematics
@@ -111,9 +112,9 @@ def test_words_that_every_control_takes():
         assert (arc.sweep > 0.0) is arc.left
 
 
-def test_only_cuts_of_a_fixed_axis_are_touched():
+def test_links_and_a_tool_that_turns_are_not_touched():
     work = cutting(SHAPES["ring"])
-    down = replace(work.steps[0].trajectories[2], motion=Motion.APPROACH)
+    down = replace(work.steps[0].trajectories[2], motion=Motion.CONNECT)
     ways = (*work.steps[0].trajectories[:2], down, *work.steps[0].trajectories[3:])
     same = fitted(replace(work, steps=(replace(work.steps[0], trajectories=ways),)), HALF)
     assert same.steps[0].trajectories == ways
@@ -121,6 +122,18 @@ def test_only_cuts_of_a_fixed_axis_are_touched():
     swings = replace(swings, steps=(replace(step(1, BALL, "zlevel", trajectories=leaning(4.0, 5.0)), access="I1"),))
     cuts = [t for t in fitted(swings, HALF).steps[0].trajectories if t.axes is not None]
     assert cuts and cuts[0] is swings.steps[0].trajectories[2]
+
+
+@pytest.mark.parametrize("motion", [Motion.APPROACH, Motion.LIFT])
+def test_arcs_on_and_off_a_wall_are_written_as_arcs(motion):
+    lead = arc_onto(np.array([3.0, 4.0, 1.0]), np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0]), 2.0, 0.5 * HALF)
+    work = cutting(lead)
+    steps = work.steps[0]
+    ways = (*steps.trajectories[:2], replace(steps.trajectories[2], motion=motion), *steps.trajectories[3:])
+    made = fitted(replace(work, steps=(replace(steps, trajectories=ways),)), HALF).steps[0].trajectories[2]
+    (arc,) = made.arcs
+    assert (arc.first, arc.last) == (0, len(made.points) - 1) and arc.left
+    np.testing.assert_allclose(arc.centre, [3.0 - 1.6, 4.0 + 1.2], atol=0.01)
 
 
 def test_the_budget_is_told():

@@ -169,6 +169,8 @@ def test_no_way_in_goes_through_stock_beside_it(corner):
 def test_a_pass_that_begins_on_the_spot_has_a_way_in():
     axes = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.05, 0.08, 0.08)])
     piece = Piece(np.array([[0.0, 0, 1], [0, 0, 1], [4.0, 0, 1]]), axes, axes, 6.0, on_end=True)
-    leads = _leads(piece, tool(12.0, 1.0), 1.44)
-    assert all(np.isfinite(aside).all() and abs(aside @ axes[0]) < 1e-9 for aside, _, _ in leads)
-    assert leads[0][0][0] < -1.0 and not leads[-1][0].any()
+    leads = _leads(piece, tool(12.0, 1.0), 1.44, 0.001)
+    aside = [way[0] - piece.tips[0] for way, _, _ in leads]
+    assert all(np.isfinite(a).all() and abs(a @ axes[0]) < 1e-9 for a in aside)
+    assert aside[0][0] < -1.0 and not aside[-1].any()
+    assert all((way[-1] == piece.tips[0]).all() for way, _, _ in leads)
