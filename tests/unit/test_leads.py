@@ -1,0 +1,165 @@
+"""Arcs on and off walls: their shape, where they are taken, and that nothing is met on them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
+from toolpath.leads import SIZES, arc_onto, radii
+from toolpath.leaning import Surroundings, with_ways
+from toolpath.levels import Line
+from toolpath.linking import Linker, Motions
+from toolpath.motion import Motion
+from toolpath.piece import Piece
+from toolpath.settings import CutData, PlanSettings, Turning
+from toolpath.stock import StockMap
+from toolpath.walked import Depths
+from zones.reach import Clearances
+
+
+@pytest.mark.parametrize("radius", [0.06, 0.5, 3.0, 20.0])
+def test_an_arc_touches_the_pass_and_its_chords_are_close(radius):
+    rng = np.random.default_rng(7)
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    start, ahead, off = rng.normal(size=3), axes[0], axes[1]
+    arc = arc_onto(start, ahead, off, radius, CHORD)
+    centre = start + radius * off
+    assert (arc[-1] == start).all()
+    np.testing.assert_allclose(arc[0], centre - radius * ahead, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(arc - centre, axis=1), radius, atol=1e-12)
+    assert np.abs((arc - start) @ axes[2]).max() < 1e-12
+    middle = 0.5 * (arc[1:] + arc[:-1])
+    assert (radius - np.linalg.norm(middle - centre, axis=1)).max() <= CHORD
+    last = (arc[-1] - arc[-2]) / np.linalg.norm(arc[-1] - arc[-2])
+    assert math.acos(min(1.0, last @ ahead)) <= math.acos(1.0 - min(CHORD / radius, 0.3)) + 1e-9
+
+
+def test_arcs_are_no_longer_than_the_pass_and_not_too_small_to_be_one():
+    assert radii(10.0, 100.0) == [10.0 * s for s in SIZES]
+    assert radii(10.0, math.pi * 2.6) == [10.0 * s for s in SIZES[:2]]
+    assert radii(10.0, 3.0) == []
+    assert radii(0.3, 100.0) == [0.3 * s for s in SIZES[1:]]
+
+
+CHORD = 0.005
+FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+               np.array([0.0, 0, 1]), -100.0)
+WALL = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([0, 18, 0], [30, 22, 8]))
+
+
+def beside_the_wall(skin, *, slot=None, body=None):
+    """A wall along x, its face at y = 18, with a skin of stock on it; slot : mm to a second wall before it."""
+    mesh = WALL if slot is None else joined(WALL, box_mesh([0, 2, 0], [30, 18 - slot, 8]))
+    body = body or tool(4.0, 0.0)
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 8.0]), 0.1)
+    y = stock.lattice.y0 + stock.lattice.step * np.arange(stock.lattice.ny)
+    top = np.where((y > 18 - skin)[:, None] & (y < 23)[:, None], stock.top, -2.0)
+    stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
+    motions = Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 2.0, 0.001)
+    return Linker(field_of(mesh, body), stock, motions, Depths(stock.lattice), walls=True)
+
+
+def along(z, x0=6.0, x1=24.0, y=15.999):
+    return Line(np.array([[x0, y, z], [x1, y, z]]), False)
+
+
+def parts(link):
+    return [(t.motion, t) for t in link.trajectories if t.motion is not Motion.RAPID]
+
+
+def test_a_pass_along_a_wall_begins_and_ends_on_an_arc():
+    link = beside_the_wall(0.2)
+    assert link.add(along(6.0))
+    made = parts(link)
+    k = [m for m, _ in made].index(Motion.CUT)
+    onto, cut, off = made[k - 1][1], made[k][1], made[k + 1][1]
+    assert (onto.motion, off.motion) == (Motion.APPROACH, Motion.LIFT)
+    assert onto.feed == off.feed == 800
+    for arc in (onto.points, off.points[::-1]):
+        assert np.ptp(arc[:, 2]) == 0.0 and len(arc) >= 5
+        assert np.isclose(abs(arc[0, 0] - arc[-1, 0]), 15.999 - arc[0, 1])  # a quarter
+        assert (np.diff(arc[:, 1]) > 0.0).all()  # towards the wall all the way
+    assert onto.points[0, 0] < 6.0 < 24.0 < off.points[-1, 0]
+    np.testing.assert_array_equal(cut.points[[0, -1]], along(6.0).points)
+    assert not link.field.blocked_by_cutter(np.vstack([onto.points, off.points])).any()
+
+
+def test_a_thicker_skin_takes_a_wider_arc_and_one_too_thick_takes_none():
+    far = []
+    for skin in (0.2, 0.7, 1.6):
+        link = beside_the_wall(skin)
+        assert link.add(along(6.0))
+        first = next(t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5)
+        far.append(round(15.999 - float(first.points[0, 1]), 3))
+    assert far == [0.48, 1.0, 2.0]
+    link = beside_the_wall(5.0)
+    assert link.add(along(6.0))
+    assert not [t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5]
+
+
+def test_in_a_slot_with_no_room_there_are_no_arcs_and_the_pass_is_walked():
+    link = beside_the_wall(0.2, slot=4.3)
+    assert link.add(along(6.0))
+    assert link.passes == 1
+    assert all(len(t.points) < 5 for t in link.trajectories if t.motion in (Motion.APPROACH, Motion.LIFT))
+
+
+def test_level_after_level_the_tool_goes_down_off_the_wall():
+    link = beside_the_wall(0.2)
+    for z in (6.0, 5.0, 4.0):
+        assert link.add(along(z))
+        link.add(Line(along(z - 0.5).points[::-1].copy(), False))
+    assert link.passes == 6
+    for t in link.trajectories:
+        if t.motion is not Motion.CUT:
+            down = np.flatnonzero(np.abs(np.diff(t.points[:, 2])) > 1e-9)
+            assert (t.points[down, 1] < 15.6).all() and (t.points[down + 1, 1] < 15.6).all()
+
+
+def test_a_ring_begins_where_there_is_room_for_an_arc():
+    """Round a post a wall stands so close to its first place that no arc fits there."""
+    post, wall = box_mesh([13, 13, 0], [17, 17, 6]), box_mesh([19.15, 10, 0], [22, 20, 6])
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), post, wall)
+    body = ball(2.0)
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 6.0]), 0.1)
+    flat = np.where(stock.part > 0.1, stock.part, -2.0)
+    stock.become(StockMap(stock.lattice, flat, flat.copy(), stock.part))
+    link = Linker(field_of(mesh, body), stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 2.0, 0.001),
+                  Depths(stock.lattice), walls=True)
+    c = np.array([[18.003, 15], [18.003, 11.997], [11.997, 11.997], [11.997, 18.003], [18.003, 18.003], [18.003, 15]])
+    ring = Line(np.column_stack([c, np.full(6, 3.0)]), True)
+    assert link.add(ring)
+    cut = next(t for t in link.trajectories if t.motion is Motion.CUT).points
+    assert (cut[0] == cut[-1]).all() and cut[0, 0] < 18.0
+    assert np.isclose(Line(cut, True).length, ring.length)
+    assert [t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5]
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3])
+def test_a_flank_comes_onto_its_wall_on_an_arc_square_to_itself(lean):
+    body = tool(6.0, 1.0)
+    mesh = box_mesh([-20, -20, -2], [20, 20, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([-20.0, -20.0, -2.0]), np.array([20.0, 20.0, 0.0]), 0.15)
+    axis = np.array([0.0, np.sin(lean), np.cos(lean)])
+    away = np.array([0.0, -np.cos(lean), np.sin(lean)])
+    tips = np.column_stack([np.linspace(-8.0, 8.0, 33), np.zeros((33, 2))]) + [0.0, 0.0, 1.0]
+    axes = np.tile(axis, (33, 1))
+    wall = 0.001  # the axis line may not come nearer to the wall than on the pass
+
+    def enters(at, leaning):
+        return (at - tips[0]) @ away < -wall
+
+    around = Surroundings(enters, FREE, stock, (), Clearances())
+    made = with_ways(Piece(tips, axes, np.tile(away, (33, 1)), 8.0), body, CutData(10_000, 1000.0, 200, 3000, 3.6),
+                     PlanSettings(0.01, 0.002, 0.0, 0.0, 20.0, 19.0, RAMP, turning=FREE), around)
+    assert not isinstance(made, str)
+    arcs = [t for t in made if t.motion is Motion.CONNECT]
+    assert len(arcs) == 2 and all(len(t.points) >= 5 for t in arcs)
+    for arc, end in ((arcs[0].points, tips[0]), (arcs[1].points[::-1], tips[-1])):
+        assert np.allclose(arc[-1], end) and np.abs((arc - end) @ axis).max() < 1e-9
+        r = SIZES[0] * body.diameter
+        np.testing.assert_allclose(np.linalg.norm(arc - (end + r * away), axis=1), r, atol=1e-9)

@@ -1,0 +1,48 @@
+"""Arcs on and off walls: a pass along a wall begins and ends on a quarter of a circle that touches it.
+
+Where a tool stops on a wall it springs back from its bend and leaves a mark as deep as that. On an arc its load comes
+and goes little by little, and it turns to the next pass off the wall. The circle lies square to the tool: with the unit
+tangent u of the pass and the unit way w off the wall, both square to the tool, the arc onto a place p is
+
+    p + r ((1 - cos a) w - sin a u),    a from 90 degrees to 0
+
+so the tool begins r off the wall and r before the pass, and comes to p along u. Its chords are under the arc by no more
+than r (1 - cos (da / 2)).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geometry.mesh import F64
+
+SIZES = (0.12, 0.25, 0.5)  # radii, of the diameter of the tool: the least that gets it off the stock of the wall
+LEAST_RADIUS = 0.05  # mm
+
+
+def radii(diameter: float, length: float) -> list[float]:
+    """mm: radii of arcs to try, for a pass of a length, mm: both arcs are no longer than the pass."""
+    sizes = (share * diameter for share in SIZES)
+    return [r for r in sizes if r >= LEAST_RADIUS and math.pi * r <= length]
+
+
+def arc_onto(start: F64, ahead: F64, off: F64, radius: float, chord: float) -> F64:
+    """A quarter of a circle onto the beginning of a pass.
+
+    start  : (3,) float64, mm, where the pass begins
+    ahead  : (3,) float64, unit, along the pass there
+    off    : (3,) float64, unit, square to that, away from the wall
+    radius : mm
+    chord  : mm, what its chords may be under it
+
+    Returns
+    -------
+    (n, 3) float64, mm, from off the wall to ``start``
+    """
+    most = 2.0 * math.acos(max(1.0 - chord / radius, 0.0))
+    a = np.linspace(0.5 * math.pi, 0.0, max(4, math.ceil(0.5 * math.pi / most)) + 1)[:, None]
+    out = start + radius * ((1.0 - np.cos(a)) * off - np.sin(a) * ahead)
+    out[-1] = start
+    return np.ascontiguousarray(out)
