@@ -237,7 +237,8 @@ class Linker:
         self.depths.cut(cut)
         self.passes += 1
         if self.walls and not eased:
-            off = self._arc(points[-1], points[-2] - points[-1], Line(points, closed).length)
+            length = Line(points, closed).length
+            off = self._arc(cut[-1], cut[-2] - cut[-1], length)  # a ring that is gone down along begins elsewhere
             if off is not None:
                 self._feed(Motion.LIFT, np.ascontiguousarray(off[::-1]), self.motions.feed)
         return True

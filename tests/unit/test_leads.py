@@ -139,6 +139,34 @@ def test_a_ring_begins_where_there_is_room_for_an_arc():
     assert [t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5]
 
 
+def test_a_ring_that_is_gone_down_along_is_left_where_it_ends():
+    """A skin too high for arcs onto it, but at one place between the beginnings: the ramp begins there."""
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([11, 11, 0], [19, 19, 6]))
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 6.0]), 0.1)
+    at = stock.lattice.step * np.arange(max(stock.lattice.nx, stock.lattice.ny))
+    x, y = np.meshgrid(stock.lattice.x0 + at[:stock.lattice.nx], stock.lattice.y0 + at[:stock.lattice.ny])
+    skin = (np.maximum(np.abs(x - 15), np.abs(y - 15)) < 4.2) & ~((x > 17.3) & (y < 13))
+    top = np.where(skin, stock.top, -2.0)
+    stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
+    link = Linker(field_of(mesh, tool(2.0, 0.0)), stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 1.0, 0.001),
+                  Depths(stock.lattice), walls=True)
+    side = np.linspace(-5.003, 5.003, 41)
+    far = 5.003 + 0.05 * (1.0 - (side / 5.003) ** 2)  # bent: a straight one is two points to the linker
+    ring = np.roll(np.vstack([np.column_stack(xy)[1:] for xy in (
+        (side, far), (far, -side), (-side, -far), (-far, side))]), 20, axis=0)  # its beginnings are amid its sides
+    ring = np.vstack([ring, ring[:1]])
+    assert link.add(Line(np.column_stack([ring + 15.0, np.full(len(ring), 3.4)]), True))
+    ends = [(a.points[-1], b.points[0]) for a, b in zip(link.trajectories[:-1], link.trajectories[1:], strict=True)]
+    assert max(float(np.linalg.norm(a - b)) for a, b in ends) == 0.0
+    assert steep(link) and link.trajectories[-1].motion is Motion.LIFT
+
+
+def steep(link):
+    """Whether the tool came down along the pass."""
+    cut = next(t for t in link.trajectories if t.motion is Motion.CUT).points
+    return cut[0, 2] > cut[-1, 2] + 1.0
+
+
 @pytest.mark.parametrize("lean", [0.0, 0.3])
 def test_a_flank_comes_onto_its_wall_on_an_arc_square_to_itself(lean):
     body = tool(6.0, 1.0)
