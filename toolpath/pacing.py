@@ -33,23 +33,26 @@ class Pace:
     """Feeds of one tool in layers, mm/min.
 
     feed  : at which the worst is cut; air : where nothing stands
-    under : where a cut has a depth and an engaged angle, mm and rad
+    under : where a cut has a depth and an engaged angle, mm and rad; no less than ``feed`` counts
     layer : mm, depth of a layer
+    hidden: where the stock map shows nothing, on passes that take what it does not show; None: that is air
     """
 
     feed: float
     air: float
     under: Callable[[float, float], float]
     layer: float
+    hidden: float | None = None
 
 
 def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
     """A pass (n, 3), mm, in stretches: whether one is in air, its points, and its feed, mm/min.
 
     Where the stock map shows nothing all along, it is one that takes what the map does not show; where moves in air are
-    no faster than those in stock, it stays whole.
+    no faster than those in stock, it stays whole. A pass with a feed for what is hidden has no stretch in air.
     """
-    if pace.air <= pace.feed:
+    calm = pace.air if pace.hidden is None else pace.hidden
+    if max(calm, pace.air) <= pace.feed:
         return [(False, points, pace.feed)]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     guard = max(GUARD * tool.diameter, 2.0 * stock.lattice.step)
@@ -57,15 +60,15 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
     way = np.column_stack([np.interp(at, s, points[:, c]) for c in range(3)])
     busy = stock.overlap(way, tool, SURE_RIM, least=0.0) > AIR_TOLERANCE
     if not busy.any():
-        return [(False, points, pace.feed)]
-    feeds = np.full(len(at), pace.air)
+        return [(False, points, pace.feed if pace.hidden is None else pace.hidden)]
+    feeds = np.full(len(at), calm)
     feeds[busy] = _in_stock(way, stock, tool, pace)[busy]
     feeds = minimum_filter1d(feeds, 2 * ASKED + 1, mode="nearest")
     # what is faster for less than a guard's way is not worth a word
     feeds = maximum_filter1d(minimum_filter1d(feeds, ASKED + 1, mode="nearest"), ASKED + 1, mode="nearest")
     between = np.minimum(feeds[1:], feeds[:-1])
     near = maximum_filter1d(busy, 2 * ASKED + 1, mode="nearest")  # stock may be cut as fast as moves in air go
-    cuts = near[1:] | near[:-1] | (between < pace.air)
+    cuts = near[1:] | near[:-1] | (between < pace.air) | (pace.hidden is not None)
     ends = np.concatenate([[0], np.flatnonzero((np.diff(between) != 0.0) | (np.diff(cuts))) + 1, [len(between)]])
     return [(not cuts[a], stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
             for a, b in zip(ends[:-1], ends[1:], strict=True)]

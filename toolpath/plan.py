@@ -223,13 +223,20 @@ class _Layers:
     def _rim_pace(self, depth: float) -> Pace:
         """Feeds along a wall that is taken to size, so deep, mm: bending the tool no more than a finish may.
 
-        What stock does not show is no wider than its lattice can hide.
+        What stock does not show is no wider than its lattice can hide, what it shows is wider by that at most, and
+        beside a wall no wider than the allowance. In a slot too narrow for a ring a rim is all there is: there the feed
+        is that of layers.
         """
-        cut, step = self.cut, self.field.lattice.step
+        cut, tool, hides = self.cut, self.field.tool, SURE_RIM * self.field.lattice.step
         fine = cut.finish or cut
-        seen, hidden = (min(cut.feed, fine.under(depth, wide).feed)
-                        for wide in (self.allowance, SURE_RIM * step))
-        return Pace(hidden, cut.link_feed, lambda _depth, _angle: seen, cut.step_down)
+        widest = fine.under(depth, self.allowance).feed
+
+        def seen(deep: float, angle: float) -> float:
+            wide = 0.5 * tool.diameter * (1.0 - math.cos(angle)) + hides
+            least = widest if wide >= self.allowance else fine.under(depth, wide).feed
+            return min(least, cut.feed_under(tool, deep, angle))
+
+        return Pace(min(cut.feed, widest), cut.link_feed, seen, cut.step_down, fine.under(depth, hides).feed)
 
     def _thinner(self) -> CutData:
         """The cut of what stands between layers: a slot at most, a part of a layer deep."""

@@ -87,6 +87,17 @@ def test_what_the_map_does_not_show_is_cut_at_the_feed():
     assert not air and feed == SLOT and points is way
 
 
+def test_a_pass_that_takes_what_the_map_does_not_show_has_no_air():
+    """Nothing up to X 8, then a slot: before it the feed for what may be hidden, in it its own, though that is less."""
+    stock, hidden = low(block(), lambda x, y: x < 8.0), 150.0
+    pace = Pace(60.0, AIR, lambda depth, angle: 60.0, LAYER, hidden)
+    made = paced(np.array([[2.0, 15.0, 0.0], [28.0, 15.0, 0.0]]), stock, tool(4.0, 0.0), pace)
+    assert [(air, feed) for air, _, feed in made] == [(False, hidden), (False, 60.0)]
+    assert made[0][1][-1, 0] < 8.0 - 2.0
+    alone = np.array([[2.0, 15.0, 0.0], [4.0, 15.0, 0.0]])
+    assert [(air, feed) for air, _, feed in paced(alone, stock, tool(4.0, 0.0), pace)] == [(False, hidden)]
+
+
 def test_an_eased_feed_is_given_back_where_less_stands_and_never_more():
     slim = {"id": "T1", "kind": "flat", "diameter_mm": 3, "flutes": 4, "flute_length_mm": 8, "neck_diameter_mm": 2.8,
             "neck_length_mm": 24, "shank_diameter_mm": 6, "stickout_mm": 40}
