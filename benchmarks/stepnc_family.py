@@ -70,7 +70,8 @@ def interpreted(path: Path, tcp: bool) -> str:
     """'ok' where LinuxCNC's interpreter takes a program, else what it says last."""
     done = subprocess.run(["bash", str(GCODE), *(["--tcp"] if tcp else []), str(path)], capture_output=True, text=True)
     said = (done.stdout + done.stderr).strip().splitlines()
-    return "ok" if done.returncode == 0 else f"exit {done.returncode}: {said[-1] if said else '?'}"
+    why = next((line for line in said if line.startswith("REJECTED")), said[-1] if said else "?")
+    return "ok" if done.returncode == 0 else f"exit {done.returncode}: {why}"
 
 
 def small(seed: int, folder: Path) -> tuple[Path, dict[str, Any]]:

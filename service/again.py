@@ -83,29 +83,31 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
         if f.kind is FindingKind.RESIDUAL and f.depth > 0.0:
             continue  # all of them are told below, sample by sample
         step = _step_of(f, tried.programs)
-        if step is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
-            side = next(s for s in tried.sides for t in s.made.steps if t is step)
+        side = None if step is None else _side_of(step, tried.sides)
+        if step is not None and side is None:
+            return None
+        if step is not None and side is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
             out[side.view.id] = _held(before.along(side.view.id), out.get(side.view.id, NONE), f, tried, side)
             notes.append(f"planned again, in lower bands ({step.id}): {f.message}")
             continue
-        if step is None or f.tip is None or f.kind not in (FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *MET):
+        if step is None or side is None or f.tip is None or f.kind not in (
+                FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *MET):
             return None
-        side, made = next((s, t) for s in tried.sides for t in s.made.steps if t is step)
         tip = np.array(f.tip) @ tried.look.rotation @ side.view.rotation.T
         old = out.get(side.view.id, NONE)
-        careful = f.kind is FindingKind.PLUNGE and made.strategy != "flank" and old.care(made.tool, tip[None]) == 1.0
-        thin = f.kind is FindingKind.ENGAGEMENT and made.strategy != "flank" and not old.crowds(made.tool, tip[None])[0]
+        careful = f.kind is FindingKind.PLUNGE and step.strategy != "flank" and old.care(step.tool, tip[None]) == 1.0
+        thin = f.kind is FindingKind.ENGAGEMENT and step.strategy != "flank" and not old.crowds(step.tool, tip[None])[0]
         how = "with care" if careful else "in skims" if thin else "and kept away"
         if careful:
-            old = replace(old, dug=_with(old.dug, made.tool.id, tip))
+            old = replace(old, dug=_with(old.dug, step.tool.id, tip))
         elif thin:
-            old = replace(old, packed=_with(old.packed, made.tool.id, tip))
+            old = replace(old, packed=_with(old.packed, step.tool.id, tip))
         else:
-            old = replace(old, barred=_with(old.barred, made.tool.id, tip))
+            old = replace(old, barred=_with(old.barred, step.tool.id, tip))
         out[side.view.id] = old
         x, y, z = f.point or f.tip
         notes.append(f"planned again, {how} near X{x:.2f} Y{y:.2f} Z{z:.2f} "
-                     f"({made.id}): {f.message}")
+                     f"({step.id}): {f.message}")
     left = np.flatnonzero((tried.answered > 0) & ~tried.proof.proved)
     for k in np.unique(tried.answered[left]).tolist():
         zone = tried.zones[k - 1]
@@ -139,6 +141,11 @@ def _held(before: Counterexamples, old: Counterexamples, f: Finding, tried: Atte
     top = float((np.array(f.point) @ tried.look.rotation @ side.view.rotation.T)[2])
     thin = f.limit / tried.proof.support.limit * CLOSER ** (2 if before.unheld else 1)
     return replace(old, unheld=(*old.unheld, HighWall(top, top - f.depth, thin)))
+
+
+def _side_of(step: Workingstep, sides: Sequence[Side]) -> Side | None:
+    """The side a step of a program was planned on; by its id, as arcs and longer lines make another step of it."""
+    return next((s for s in sides if any(t.id == step.id for t in s.made.steps)), None)
 
 
 def _with(places: Mapping[str, F64], tool: str, tip: F64) -> Mapping[str, F64]:

@@ -344,7 +344,8 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         over = dense(way, min(LOOK * tool.radius, MOST_LEAD / 4.0))
         axes = np.tile(axis, (max(len(down), len(over)), 1))
         if (around.blocked(down, axes[:len(down)], tool).any() or around.blocked(over, axes[:len(over)], tool).any()
-                or len(way) > 2 and around.met(over, axes[:len(over)], tool, thick).any()):
+                or len(way) > 2 and (around.met(over, axes[:len(over)], tool, thick)
+                                     | settings.found.bars(tool, over)).any()):
             continue
         axes = axes[:len(down)]
         if not (around.met(down, axes, tool, stock, under) | settings.found.bars(tool, down)).any():

@@ -45,6 +45,7 @@ OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
+BESIDE = 0.05  # mm off a pass: a wall it goes along is met there
 BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
 LEVEL_SHARE = 0.9  # of its length, level: a pass that goes up or down steeper has no arcs
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
@@ -264,15 +265,23 @@ class Linker:
         if run < LEVEL_SHARE * float(np.linalg.norm(way)) or run <= 0.0:
             return None
         ahead = np.array([way[0], way[1], 0.0]) / run
-        left = np.array([-ahead[1], ahead[0], 0.0])
+        sides = self._off_the_wall(at, np.array([-ahead[1], ahead[0], 0.0]))
         for radius in radii(self.field.tool.diameter, length):
-            for off in (left, -left):
+            for off in sides:
                 arc = arc_onto(at, ahead, off, radius, 0.5 * self.motions.tolerance)
                 if bool(self.stock.in_air(arc[:1], self.field.tool)[0]):
                     tips = dense(arc, 0.3 * self.field.lattice.step)
-                    if self._free(tips) and self._lane(tips, 1.5 * self.motions.step_down):
+                    if (self._free(tips) and not self.found.bars(self.field.tool, tips).any()
+                            and self._lane(tips, 1.5 * self.motions.step_down)):
                         return arc
         return None
+
+    def _off_the_wall(self, at: F64, left: F64) -> list[F64]:
+        """Of the directions ``left`` (3,), unit, and against it those that lead off a wall at a place (3,), mm: both
+        where no wall is beside it."""
+        ways = np.array([left, -left])
+        met = self.field.blocked_by_cutter(at + BESIDE * ways + [0.0, 0.0, LEVEL_TOLERANCE])
+        return [way for way, blocked in zip(ways, met, strict=True) if not blocked]
 
     def _descent(self, points: F64) -> float:
         """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
@@ -427,7 +436,8 @@ class Linker:
                         n = max(2, int(far / 0.2) + 1)
                         t = np.linspace(0.0, 1.0, n)[:, None]
                         lane = q + t * (start - q)
-                        if self._lane(lane, 1.5 * self.motions.step_down):
+                        barred = self.found.bars(tool, lane).any()
+                        if not barred and self._lane(lane, 1.5 * self.motions.step_down):
                             yield q
 
     def _lane(self, tips: F64, most: float) -> bool:

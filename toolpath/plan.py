@@ -37,6 +37,7 @@ from zones.zoning import ZoneArea
 
 AGAIN_SHARE = 0.95  # of the progress, before zones are gone over again
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
+THIN = 2.0  # scallops: what stands no farther off a wall is what a finish leaves
 LATTICE_CARE = 1.5
 
 Progress = Callable[[float], None]
@@ -206,7 +207,8 @@ class _Layers:
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
-            rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen)
+            rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
+                              min(THIN * settings.scallop_height, 0.5 * self.allowance))
             deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
             usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):

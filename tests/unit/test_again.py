@@ -53,6 +53,17 @@ def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all():
     assert not once.along("A2").dug
 
 
+def test_a_step_written_with_arcs_is_another_one_and_still_known():
+    """Programs hold steps made anew by fitted arcs and longer lines; the job died of it."""
+    tried = attempt(found(FindingKind.PLUNGE))
+    program = tried.programs[0]
+    program.work.steps = [SimpleNamespace(**vars(s)) for s in program.work.steps]
+    told = learned(Learned(), tried)
+    assert told is not None and len(told.along("A1").dug[TOOL.id]) == 1
+    program.work.steps[0].id, program.text = "S09", TEXT.replace("S01", "S09")
+    assert learned(Learned(), tried) is None  # of no side: nothing that another plan would be told
+
+
 def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
     once = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT)))
     assert np.allclose(once.along("A1").packed[TOOL.id], [[1.0, 3.0, -2.0]]) and "in skims" in once.notes[0]

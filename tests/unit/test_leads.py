@@ -9,9 +9,10 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
+from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
 from toolpath.leads import SIZES, arc_onto, radii
 from toolpath.leaning import Surroundings, with_ways
-from toolpath.levels import Line
+from toolpath.levels import Line, dense
 from toolpath.linking import Linker, Motions
 from toolpath.motion import Motion
 from toolpath.piece import Piece
@@ -118,6 +119,40 @@ def test_level_after_level_the_tool_goes_down_off_the_wall():
         if t.motion is not Motion.CUT:
             down = np.flatnonzero(np.abs(np.diff(t.points[:, 2])) > 1e-9)
             assert (t.points[down, 1] < 15.6).all() and (t.points[down + 1, 1] < 15.6).all()
+
+
+def test_where_the_tool_is_barred_there_is_no_arc_but_the_pass():
+    """The far end of the first arc is nearer to the pass than a bar reaches round it, but not on it."""
+    link = beside_the_wall(0.2)
+    link.add(along(6.0))
+    far = next(t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5).points[0]
+    again = beside_the_wall(0.2)
+    again.found = Counterexamples(barred={"T1": far[None]})
+    assert again.add(along(6.0)) and again.passes == 1
+    reach = max(BARRED * again.field.tool.radius, LEAST_BARRED)
+    for t in again.trajectories:
+        if t.motion is not Motion.RAPID and t.points[:, 2].min() < 7.0:
+            low = dense(t.points, 0.05)
+            low = low[low[:, 2] < 6.2]
+            assert not len(low) or np.linalg.norm(low - far, axis=1).min() > reach - 1e-9
+
+
+@pytest.mark.parametrize("x", [10.0, 12.0, 14.0])
+def test_beside_the_end_of_a_wall_an_arc_does_not_curl_round_it(x):
+    """A post of stock bars the free side at one end of a pass; on the other side the wall has ended."""
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([0, 18, 0], [x + 1.0, 22, 8]))
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 8.0]), 0.1)
+    xs = stock.lattice.x0 + stock.lattice.step * np.arange(stock.lattice.nx)
+    ys = stock.lattice.y0 + stock.lattice.step * np.arange(stock.lattice.ny)
+    post = (np.abs(xs - x - 3.0) < 1.5)[None, :] & (ys < 13.9)[:, None]
+    top = np.where(post, 8.0, np.maximum(stock.part, -2.0))
+    stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
+    link = Linker(field_of(mesh, tool(4.0, 0.0)), stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 2.0, 0.001),
+                  Depths(stock.lattice), walls=True)
+    assert link.add(along(6.0, 4.0, x))
+    for t in link.trajectories:
+        if t.motion in (Motion.APPROACH, Motion.LIFT) and len(t.points) >= 5:
+            assert t.points[:, 1].max() <= 15.999 + 1e-9
 
 
 def test_a_ring_begins_where_there_is_room_for_an_arc():

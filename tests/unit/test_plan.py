@@ -221,7 +221,8 @@ def test_every_step_carries_the_data_of_its_own_tool():
         feeds = {m: {t.feed for t in s.trajectories if t.motion is m} for m in Motion}
         assert feeds[Motion.CUT] == {cut.feed} and feeds[Motion.CONNECT] <= {cut.feed, cut.link_feed}
         assert feeds[Motion.APPROACH] <= {cut.plunge_feed, cut.feed, cut.link_feed}
-        assert feeds[Motion.LIFT] == {cut.link_feed} and feeds[Motion.RAPID] == {0.0}
+        assert {cut.link_feed} <= feeds[Motion.LIFT] <= {cut.feed, cut.link_feed}  # off a wall on an arc, then up
+        assert feeds[Motion.RAPID] == {0.0}
         # a descent ends at the plunge feed, a way in from beside is as fast as the cut
         for a, b in zip(s.trajectories[:-1], s.trajectories[1:], strict=True):
             if a.motion is Motion.APPROACH and b.motion is Motion.CUT:

@@ -71,7 +71,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
-        allowance: float, tolerance: float, unseen: bool) -> list[Line]:
+        allowance: float, tolerance: float, unseen: bool, thin: float = 0.0) -> list[Line]:
     """Lines that take the allowance off walls which no finishing pass of this tool will follow at this height.
 
     Without them a wall that is undercut, or is no business of this tool, keeps a thin rim that stands higher than
@@ -81,6 +81,7 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     tolerance : mm, of the lines against the true boundary; the other parameters are those of ``layer``
     unseen    : follow every wall, finished here or not, also where the stock map, coarser than a thin rim, shows
                 none; done once a flute length on the way down
+    thin      : mm off the wall, what a finish leaves: on a steep wall that is high over the cutter and no rim
     """
     lat, tool = field.lattice, field.tool
     skip = dilated(finished, 3.0 * allowance / lat.step + 2.0) & ~_slots(field, z, allowance)
@@ -88,7 +89,8 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
         skip = np.zeros_like(skip)
     out: list[Line] = []
     for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~skip, tolerance):
-        seen = stock.overlap(line.points, tool, SURE_RIM if unseen else 0.0, least=0.0) > STOCK_WORTH
+        off = SURE_RIM if unseen else -thin / stock.lattice.step
+        seen = stock.overlap(line.points, tool, off, least=0.0) > STOCK_WORTH
         wanted = seen & ~skip[lat.cells(line.points[:, :2])]
         out.extend(pieces_where(line, wanted, 0.5 * tool.radius, 2.0 * tool.radius))
     return out
