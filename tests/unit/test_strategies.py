@@ -436,6 +436,25 @@ def test_the_rim_pass_is_for_walls_nobody_finishes_or_for_all_once_a_flute():
     assert layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False) == []
 
 
+def test_what_a_finish_leaves_on_a_steep_wall_is_no_rim():
+    """Stock 0.04 mm thick on a wall that leans 3 degrees stands 0.76 mm over the cutter that touches the wall."""
+    body, z, rise = tool(3.0, 0.0), 0.5, math.tan(math.radians(3.0))
+    mesh = slope_field(lambda x, y: np.clip(y / rise, 0.0, 6.0), size=12.0, n=240)
+    field = field_of(mesh, body)
+    stock = StockMap.box(TriangleTree(mesh), np.array([-6.0, -6.0, -3.0]), np.array([6.0, 6.0, 6.0]), 0.05)
+    lat, lengths = field.lattice, []
+    area = np.abs(lat.x0 + lat.step * np.arange(lat.nx)) < 3.0
+    area = area & (lat.y0 + lat.step * np.arange(lat.ny) < 0.0)[:, None]
+    y = np.broadcast_to((stock.lattice.y0 + stock.lattice.step * np.arange(stock.lattice.ny))[:, None], stock.top.shape)
+    for thick in (0.04, 0.3):
+        high = np.clip((y + thick) / rise, 0.0, 6.0)
+        stock.become(StockMap(stock.lattice, high, high.copy(), stock.part))
+        for thin in (0.0, 0.08):
+            lines = layers.rim(field, stock, z, area, np.zeros_like(area), 0.2, CHORD, False, thin)
+            lengths.append(sum(line.length for line in lines))
+    assert lengths[1] == 0.0 and min(lengths[0], *lengths[2:]) > 5.0
+
+
 # -- single touches -----------------------------------------------------------------------------------------------
 
 
