@@ -13,13 +13,17 @@ than r (1 - cos (da / 2)).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from geometry.mesh import F64
+from zones.reach import LEVEL_TOLERANCE, TipField
 
 SIZES = (0.12, 0.25, 0.5)  # radii, of the diameter of the tool: the least that gets it off the stock of the wall
 LEAST_RADIUS = 0.05  # mm
+LEVEL_SHARE = 0.9  # of its length, level: an upright pass that goes up or down steeper has no arcs
+BESIDE = 0.05  # mm off a pass: a wall it goes along is met there
 
 
 def radii(diameter: float, length: float) -> list[float]:
@@ -46,3 +50,25 @@ def arc_onto(start: F64, ahead: F64, off: F64, radius: float, chord: float) -> F
     out = start + radius * ((1.0 - np.cos(a)) * off - np.sin(a) * ahead)
     out[-1] = start
     return np.ascontiguousarray(out)
+
+
+def arcs_along(field: TipField, at: F64, way: F64, length: float, chord: float) -> Iterator[F64]:
+    """Level arcs to try onto an end of a pass of an upright tool, the least first.
+
+    field  : TipField; where a wall is beside the end, arcs lead off it, else both ways
+    at     : (3,) float64, mm, the end;  way : (3,) float64, mm, along the pass there, away from the arc
+    length : mm, of the pass;  chord : mm, what chords may be under an arc
+
+    Yields
+    ------
+    (n, 3) float64, mm, that end at ``at``; none where the pass goes up or down
+    """
+    run = float(np.hypot(*way[:2]))
+    if run < LEVEL_SHARE * float(np.linalg.norm(way)) or run <= 0.0:
+        return
+    ahead = np.array([way[0], way[1], 0.0]) / run
+    sides = np.array([[-ahead[1], ahead[0], 0.0], [ahead[1], -ahead[0], 0.0]])
+    met = field.blocked_by_cutter(at + BESIDE * sides + [0.0, 0.0, LEVEL_TOLERANCE])
+    for radius in radii(field.tool.diameter, length):
+        for off in sides[~met]:
+            yield arc_onto(at, ahead, off, radius, chord)

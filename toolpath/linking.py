@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
-from toolpath.leads import arc_onto, radii
+from toolpath.leads import arcs_along
 from toolpath.levels import Line, dense, pieces_where, stretch, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import GUARD, Pace, paced
@@ -45,9 +45,7 @@ OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
-BESIDE = 0.05  # mm off a pass: a wall it goes along is met there
 BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
-LEVEL_SHARE = 0.9  # of its length, level: a pass that goes up or down steeper has no arcs
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -256,32 +254,19 @@ class Linker:
         return np.empty((0, 3)), points
 
     def _arc(self, at: F64, way: F64, length: float) -> F64 | None:
-        """A level arc (k, 3), mm, onto a place (3,) from where a tool is clear of stock, that goes on along ``way``.
+        """A level arc (k, 3), mm, onto a place (3,) that goes on along ``way``, of a pass so long, mm; None where the
+        tool is not free on any, is barred there, or has too much stock on it."""
+        tool = self.field.tool
 
-        length : mm, of the pass. None where the tool is not free on any, where too much stock stands on it, and where
-        the pass goes up or down.
-        """
-        run = float(np.hypot(*way[:2]))
-        if run < LEVEL_SHARE * float(np.linalg.norm(way)) or run <= 0.0:
-            return None
-        ahead = np.array([way[0], way[1], 0.0]) / run
-        sides = self._off_the_wall(at, np.array([-ahead[1], ahead[0], 0.0]))
-        for radius in radii(self.field.tool.diameter, length):
-            for off in sides:
-                arc = arc_onto(at, ahead, off, radius, 0.5 * self.motions.tolerance)
-                if bool(self.stock.in_air(arc[:1], self.field.tool)[0]):
-                    tips = dense(arc, 0.3 * self.field.lattice.step)
-                    if (self._free(tips) and not self.found.bars(self.field.tool, tips).any()
-                            and self._lane(tips, 1.5 * self.motions.step_down)):
-                        return arc
-        return None
+        def free(arc: F64) -> bool:
+            if not bool(self.stock.in_air(arc[:1], tool)[0]):
+                return False
+            tips = dense(arc, 0.3 * self.field.lattice.step)
+            return (self._free(tips) and not bool(self.found.bars(tool, tips).any())
+                    and self._lane(tips, 1.5 * self.motions.step_down))
 
-    def _off_the_wall(self, at: F64, left: F64) -> list[F64]:
-        """Of the directions ``left`` (3,), unit, and against it those that lead off a wall at a place (3,), mm: both
-        where no wall is beside it."""
-        ways = np.array([left, -left])
-        met = self.field.blocked_by_cutter(at + BESIDE * ways + [0.0, 0.0, LEVEL_TOLERANCE])
-        return [way for way, blocked in zip(ways, met, strict=True) if not blocked]
+        return next((arc for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance)
+                     if free(arc)), None)
 
     def _descent(self, points: F64) -> float:
         """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
