@@ -208,7 +208,7 @@ class _Layers:
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
             rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
-                              min(THIN * settings.scallop_height, 0.5 * self.allowance))
+                              min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0)
             deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
             usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):
