@@ -224,6 +224,7 @@ class Linker:
             self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
         if len(arc):
             self._feed(Motion.APPROACH, arc, self.motions.feed)
+            self.depths.cut(arc)
             cut = points
         down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
         most = min(most, self.motions.front_feed) if eased else most
@@ -237,9 +238,10 @@ class Linker:
         self.passes += 1
         if self.walls and not eased:
             length = Line(points, closed).length
-            off = self._arc(cut[-1], cut[-2] - cut[-1], length)  # a ring that is gone down along begins elsewhere
+            off = self._arc(cut[-1], cut[-2] - cut[-1], length, onto=False)  # a ring may have been begun elsewhere
             if off is not None:
-                self._feed(Motion.LIFT, np.ascontiguousarray(off[::-1]), self.motions.feed)
+                self._feed(Motion.LIFT, off, self.motions.feed)
+                self.depths.cut(off)
         return True
 
     def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
@@ -248,14 +250,14 @@ class Linker:
         starts = sorted({0, *(len(points) * np.arange(1, BEGINNINGS) // BEGINNINGS).tolist()}) if closed else [0]
         for first in starts:
             begun = np.vstack([points[first:-1], points[:first + 1]]) if first else points
-            arc = self._arc(begun[0], begun[1] - begun[0], length)
+            arc = self._arc(begun[0], begun[1] - begun[0], length, onto=True)
             if arc is not None:
                 return arc, begun
         return np.empty((0, 3)), points
 
-    def _arc(self, at: F64, way: F64, length: float) -> F64 | None:
-        """A level arc (k, 3), mm, onto a place (3,) that goes on along ``way``, of a pass so long, mm; None where the
-        tool is not free on any, is barred there, or has too much stock on it."""
+    def _arc(self, at: F64, way: F64, length: float, *, onto: bool) -> F64 | None:
+        """A level arc (k, 3), mm, onto a place (3,) that goes on along ``way``, of a pass so long, mm, or off it; None
+        where the tool is not free on any, is barred there, has too much stock on it, or went it before."""
         tool = self.field.tool
 
         def free(arc: F64) -> bool:
@@ -265,8 +267,11 @@ class Linker:
             return (self._free(tips) and not bool(self.found.bars(tool, tips).any())
                     and self._lane(tips, 1.5 * self.motions.step_down))
 
-        return next((arc for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance)
-                     if free(arc)), None)
+        for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
+            walked = arc if onto else np.ascontiguousarray(arc[::-1])
+            if int(self.depths.were_cut(walked).sum()) <= MOST_AGAIN and free(arc):
+                return walked
+        return None
 
     def _descent(self, points: F64) -> float:
         """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
