@@ -84,8 +84,6 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
             continue  # all of them are told below, sample by sample
         step = _step_of(f, tried.programs)
         side = None if step is None else _side_of(step, tried.sides)
-        if step is not None and side is None:
-            return None
         if step is not None and side is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
             out[side.view.id] = _held(before.along(side.view.id), out.get(side.view.id, NONE), f, tried, side)
             notes.append(f"planned again, in lower bands ({step.id}): {f.message}")
