@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from pydantic import Field
+from pydantic.json_schema import SkipJsonSchema
 
 from schemas.base import ReportModel
 from schemas.machine import Machine
@@ -132,7 +133,9 @@ class JobEvent(ReportModel):
     state: JobState
     stage: str
     progress: Annotated[float, Field(ge=0, le=1)]
-    resumed: Annotated[JobResumed | None, Field(description="As in the job; left out where it is null.")] = None
+    resumed: Annotated[JobResumed | SkipJsonSchema[None], Field(
+        description="As in the job; left out where an attempt began anew.",
+        json_schema_extra=lambda schema: schema.pop("default"))] = None
 
 
 class LibraryEntry(ReportModel):

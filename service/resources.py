@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import error_from_dict
-from schemas.jobs import FINAL_STATES, Job, JobFile, JobFiles, JobLinks, JobResumed, JobSummary, JobWebhook
+from schemas.jobs import FINAL_STATES, Job, JobEvent, JobFile, JobFiles, JobLinks, JobResumed, JobSummary, JobWebhook
 from schemas.keys import Key
 from schemas.problem import Problem
 from service.artifacts import Artifacts
@@ -80,9 +80,8 @@ def _resumed(row: RowMapping) -> JobResumed | None:
 
 def event_data(row: RowMapping) -> str:
     """Data of one event, JSON."""
-    resumed = _resumed(row)
-    return json.dumps({"id": row["id"], "state": row["state"], "stage": row["stage"], "progress": row["progress"],
-                       **({"resumed": resumed.model_dump()} if resumed else {})})
+    return JobEvent(id=row["id"], state=row["state"], stage=row["stage"], progress=row["progress"],
+                    resumed=_resumed(row)).model_dump_json(exclude_none=True)
 
 
 def encode_cursor(job_id: str) -> str:

@@ -92,7 +92,7 @@ ANSWERS: dict[str, Any] = {
     "healthz": Health(status="ok"),
     "readyz": Health(status="ok", checks={"database": "ok", "data_folder": "ok", "disk_space": "ok", "engine": "ok"}),
     "followJob": "event: progress\ndata: " + JobEvent(id=JOB_ID, state="running", stage="zones",
-                                                      progress=0.12).model_dump_json() + "\nid: 4\n\n",
+                                                      progress=0.12).model_dump_json(exclude_none=True) + "\nid: 4\n\n",
     "metrics": 'zonemill_jobs{state="queued"} 3.0\n', "getFile": "%\nG21\nG90\nM2\n%\n",
 }
 """What each operation answers when all is well, by its id; those that answer nothing (204) are left out."""
