@@ -26,7 +26,7 @@ from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
 from toolpath.levels import Line, serving, thinned, true_runs
-from toolpath.linking import Linker, Motions
+from toolpath.linking import Linker
 from toolpath.motion import Motion, Trajectory, Workingstep
 from toolpath.order import nearest_order
 from toolpath.posed import enters
@@ -37,6 +37,7 @@ from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
+from toolpath.travel import Motions
 from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable import Form
 from zones.reach import TipField

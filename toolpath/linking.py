@@ -4,15 +4,14 @@ Stock that stands higher over a pass than the flutes reach is first walked off a
 1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
    more stock than a layer; down to a deeper level in air, there or beside its start, or along the pass itself, never
    steeper than the ramp angle.
-2. Down in air over the start of the pass, or over a free place beside it that is in air, and in from there.
+2. Down in air over the start of the pass, or over a free place beside it that is in air or that the tool has come down
+   to before, and in from there.
 3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
-   top is in air, or a free place close beside it is.
+   top is in air or just above where the tool has been, or a free place close beside it is.
 A pass with none of these is left out. One along a wall begins and ends on an arc (``toolpath.leads``) where the tool is
 free on it and clear of stock at its far end, and is come to by ways 1 and 2 there. To where ways 2 and 3 begin the tool
-goes straight over what is between, or by the clearance plane where that is sooner. Where the engaged angle has a limit
-(``toolpath.engaged``) ways in keep it, and where a pass would not it is first walked in skims above that. Rapids move Z
-alone between that plane and a height clear of the stock, or XY alone at the plane; below that height every move is a
-feed move, as no rapid keeps its clearance beside a wall.
+gets as ``toolpath.travel`` says. Where the engaged angle has a limit (``toolpath.engaged``) ways in keep it, and where
+a pass would not it is first walked in skims above that.
 """
 
 from __future__ import annotations
@@ -29,44 +28,24 @@ from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
 from toolpath.leads import arcs_along
-from toolpath.levels import Line, dense, pieces_where, stretch, thinned
+from toolpath.levels import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
-from toolpath.pacing import GUARD, Pace, paced
+from toolpath.pacing import Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
-from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
+from toolpath.stock import SURE_RIM, StockMap
+from toolpath.travel import Motions, Travel
 from toolpath.walked import Depths, still_to_walk
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
-IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
-MOST_IN_FRONT = 0.5  # mm
-OVER = 0.1  # mm above what stands between, on the way across
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
+BEEN_NEAR = 0.5  # of the diameter: places so near that the tool has been to are looked at, to come down to a cut beside
+MOST_BEEN = 6  # of them
 BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
-
-
-@dataclass
-class Motions:
-    """Feeds and heights of a step, mm and mm/min.
-
-    plunge_feed : straight down, and how fast a way down along a pass goes down; front_feed : in cut at most, where the
-    whole front of the cutter is in stock that no limit of the engaged angle counts
-    """
-
-    feed: float
-    plunge_feed: float
-    link_feed: float
-    rapid_feed: float
-    clearance: float
-    rapid_floor: float
-    ramp_angle: float
-    step_down: float
-    tolerance: float
-    front_feed: float = math.inf
 
 
 @dataclass
@@ -93,14 +72,23 @@ class Linker:
     pace: Pace | None = None
     engaged: float = UNBOUNDED
     walls: bool = False
-    trajectories: list[Trajectory] = fresh(default_factory=list)
-    at: F64 | None = None
     passes: int = 0
     skipped: list[Line] = fresh(default_factory=list)
     refused: int = 0
 
     def __post_init__(self) -> None:
+        self.go = Travel(self.field, self.stock, self.motions)
         self.gone = Depths(self.stock.lattice)  # ways back in air
+
+    @property
+    def trajectories(self) -> list[Trajectory]:
+        """So far."""
+        return self.go.trajectories
+
+    @property
+    def at(self) -> F64 | None:
+        """(3,) mm, where the tool is; None before its first move."""
+        return self.go.at
 
     def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False) -> bool:
         """Append one line as a cutting pass; False where no safe way in was found.
@@ -215,16 +203,15 @@ class Linker:
             return False
         entry, cut, joined = way
         if joined:
-            self._joined(np.vstack([self._here(), entry]))
+            self._joined(np.vstack([self.go.here(), entry]))
         else:
-            self._come_down(entry[0])
+            self.go.come_down(entry[0])
             if len(entry) > 1:
-                self._feed(Motion.APPROACH, entry, self.motions.feed)
-        if np.linalg.norm(self._here() - cut[0]) > 1e-9:
-            self._feed(Motion.APPROACH, np.vstack([self._here(), cut[:1]]), self.motions.plunge_feed)
+                self.go.feed(Motion.APPROACH, entry, self.motions.feed)
+        if np.linalg.norm(self.go.here() - cut[0]) > 1e-9:
+            self.go.feed(Motion.APPROACH, np.vstack([self.go.here(), cut[:1]]), self.motions.plunge_feed)
         if len(arc):
-            self._feed(Motion.APPROACH, arc, self.motions.feed)
-            self.depths.cut(arc)
+            self._led(Motion.APPROACH, arc)
             cut = points
         down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
         most = min(most, self.motions.front_feed) if eased else most
@@ -240,8 +227,7 @@ class Linker:
             length = Line(points, closed).length
             off = self._arc(cut[-1], cut[-2] - cut[-1], length, onto=False)  # a ring may have been begun elsewhere
             if off is not None:
-                self._feed(Motion.LIFT, off, self.motions.feed)
-                self.depths.cut(off)
+                self._led(Motion.LIFT, off)
         return True
 
     def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
@@ -264,7 +250,7 @@ class Linker:
             if not bool(self.stock.in_air(arc[:1], tool)[0]):
                 return False
             tips = dense(arc, 0.3 * self.field.lattice.step)
-            return (self._free(tips) and not bool(self.found.bars(tool, tips).any())
+            return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
                     and self._lane(tips, 1.5 * self.motions.step_down))
 
         for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
@@ -290,33 +276,27 @@ class Linker:
             return
         slow = self.pace is None or motion is Motion.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
         if self.pace is None or slow:
-            self._feed(motion, points, min(self.motions.feed, most))
+            self.go.feed(motion, points, min(self.motions.feed, most))
             return
         for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
-            self._feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
+            self.go.feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
 
     def _joined(self, way: F64) -> None:
         """Go along a way (n, 3), mm, to the next pass: as far as it is in air as fast as links go.
 
         Its first stretch, and one before stock, may touch what the stock's lattice does not show.
         """
-        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-        guard = max(GUARD * self.field.tool.diameter, 2.0 * self.stock.lattice.step)
-        if s[-1] > 4.0 * guard and self.motions.link_feed > self.motions.feed:
-            at = np.linspace(0.0, s[-1], math.ceil(2.0 * s[-1] / self.stock.lattice.step) + 1)
-            points = np.column_stack([np.interp(at, s, way[:, c]) for c in range(3)])
-            met = np.flatnonzero(self.stock.overlap(points, self.field.tool, least=0.0) > AIR_TOLERANCE)
-            last = float(at[met[0]] if len(met) else s[-1]) - guard
-            if last > 2.0 * guard:
-                self._feed(Motion.CONNECT, stretch(way, s, 0.0, guard), self.motions.feed)
-                self._feed(Motion.CONNECT, stretch(way, s, guard, last), self.motions.link_feed)
-                way = stretch(way, s, last, float(s[-1]))
-        self._paced(Motion.CONNECT, way)
+        for quick, part in self.go.parts(way, seen=True):
+            if quick:
+                self.go.feed(Motion.CONNECT, part, self.motions.link_feed)
+            else:
+                self._paced(Motion.CONNECT, part)
 
-    def _nothing_stands(self, way: F64) -> bool:
-        """Whether no stock that the lattice shows is met along a way (n, 3), mm."""
-        points = dense(way, 0.5 * self.stock.lattice.step)
-        return float(self.stock.overlap(points, self.field.tool, least=0.0).max()) <= AIR_TOLERANCE
+    def _led(self, motion: Motion, arc: F64) -> None:
+        """Go along an arc (n, 3), mm, on or off a pass: beside the wall at the feed of the pass, else as links go."""
+        for quick, part in self.go.parts(arc, seen=False):
+            self.go.feed(motion, part, self.motions.link_feed if quick else self.motions.feed)
+        self.depths.cut(arc)
 
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
@@ -331,22 +311,22 @@ class Linker:
             if not len(steps):
                 return True
             length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-            if length / self.motions.link_feed > self._by_plane(way[0], way[-1]):
+            if length / self.motions.link_feed > self.go.by_plane(way[0], way[-1]):
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
             if int(known.sum()) > MOST_AGAIN:
                 continue
-            if (self._nothing_stands(way)
-                    and all(self._free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)):
-                self._feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+            free = (self.go.free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)
+            if self.go.nothing_stands(way) and all(free):
+                self.go.feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
                 self.gone.cut(way)
                 return True
-        self._lift()
+        self.go.lift()
         return False
 
     def finish(self) -> tuple[Trajectory, ...]:
         """Lift to the clearance plane and return all trajectories."""
-        self._lift()
+        self.go.lift()
         return tuple(self.trajectories)
 
     # -- ways in ----------------------------------------------------------------------------------------------
@@ -356,12 +336,12 @@ class Linker:
     def _straight_on(self, points: F64, closed: bool) -> Way | None:
         if self.at is None:
             return None
-        here, start = self._here(), points[0]
+        here, start = self.go.here(), points[0]
         run = float(np.hypot(*(start - here)[:2]))
         if run > 4.0 * self.field.tool.radius + 1.0 or abs(start[2] - here[2]) > 2.0 * self.motions.step_down:
             return None
         z = max(here[2], start[2])
-        if not self._free_move(here[:2], start[:2], z):
+        if not self.go.free_move(here[:2], start[:2], z):
             return None
         n = max(2, int(run / 0.2) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
@@ -391,7 +371,7 @@ class Linker:
         A way down along the pass is as long as its slope is flat, and is walked twice. None where this is longer, or
         where the tool is not free in air.
         """
-        here, start, m = self._here(), points[0], self.motions
+        here, start, m = self.go.here(), points[0], self.motions
         sooner = 2.0 * (z - start[2]) / (math.tan(m.ramp_angle) * RAMP_SHARE * m.feed)
         for q in self._beside_start(points):
             way = np.array([here, [*here[:2], z], [*q[:2], z], q])
@@ -399,7 +379,7 @@ class Linker:
             length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
             if length / m.link_feed + float(np.linalg.norm(start - q)) / m.feed > sooner:
                 continue
-            if (self._nothing_stands(way) and self._free_move(here[:2], q[:2], z)
+            if (self.go.nothing_stands(way) and self.go.free_move(here[:2], q[:2], z)
                     and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MOST_AGAIN):
                 return np.vstack([way[1:], start])
         return None
@@ -412,7 +392,10 @@ class Linker:
         return None if q is None else (np.vstack([q, start]), points, False)
 
     def _beside_start(self, points: F64) -> Iterator[F64]:
-        """Places (3,) in air, as high as the start of a pass (n, 3), mm, that lead onto it straight; nearest first."""
+        """Places (3,) as high as the start of a pass (n, 3), mm, that lead onto it straight.
+
+        First those in air, nearest first; then such as the tool has come down to before, as in a gap it only just fits.
+        """
         start, tool = points[0], self.field.tool
         ahead = points[1, :2] - start[:2]
         ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
@@ -421,14 +404,25 @@ class Linker:
         for far in (2.5 * self.stock.lattice.step, *(np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0]) * tool.diameter)):
             for side in ways:
                 q = np.array([*(start[:2] + far * side), start[2]])
-                if bool(self.stock.in_air(q[None, :], tool)[0]) and self._free_move(q[:2], start[:2], start[2]):
-                    if self._limit(q) <= q[2] + LEVEL_TOLERANCE:
-                        n = max(2, int(far / 0.2) + 1)
-                        t = np.linspace(0.0, 1.0, n)[:, None]
-                        lane = q + t * (start - q)
-                        barred = self.found.bars(tool, lane).any()
-                        if not barred and self._lane(lane, 1.5 * self.motions.step_down):
-                            yield q
+                if bool(self.stock.in_air(q[None, :], tool)[0]) and self._leads_onto(q, start):
+                    yield q
+        yield from self._been_beside(start)
+
+    def _been_beside(self, start: F64) -> Iterator[F64]:
+        """Places (3,) as high as a start of a cut, mm, that the tool has come down to, straight beside it."""
+        been = self.depths.near(start[:2], BEEN_NEAR * self.field.tool.diameter)
+        for x, y, _ in been[been[:, 2] <= start[2]][:MOST_BEEN]:
+            q = np.array([x, y, start[2]])
+            if self._leads_onto(q, start):
+                yield q
+
+    def _leads_onto(self, q: F64, start: F64) -> bool:
+        """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
+        if not self.go.free_move(q[:2], start[:2], start[2]) or self.go.limit(q) > q[2] + LEVEL_TOLERANCE:
+            return False
+        t = np.linspace(0.0, 1.0, max(2, int(np.hypot(*(start - q)[:2]) / 0.2) + 1))[:, None]
+        lane = q + t * (start - q)
+        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, 1.5 * self.motions.step_down)
 
     def _lane(self, tips: F64, most: float) -> bool:
         """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
@@ -452,8 +446,10 @@ class Linker:
         slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
         head = points if closed else head_of(points, 0.5 * (seen + 0.1) / slope)
         above = max(float(self.depths.above(head).max()), 0.0)
-        for over in (min(above, seen) + 0.1, seen + 0.1, max(seen, self.motions.step_down) + 0.1,
-                     highest + 0.1):
+        been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
+        beside = max(float(been - points[0, 2]), 0.0)
+        for most in (min(beside, above, seen), min(above, seen), seen, max(seen, self.motions.step_down), highest):
+            over = most + 0.1
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
             if ramp is not None:  # over a move it made before a tool stands free, so it begins after the last of these
                 known = np.flatnonzero(self._known_down(ramp, points))
@@ -474,9 +470,11 @@ class Linker:
         for far in (0.06, 0.12, 0.25, 0.5, 1.0):
             ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
             for k in np.flatnonzero(self.stock.in_air(ring, tool)):
-                if self._limit(ring[k]) <= top[2] + LEVEL_TOLERANCE and self._free_move(ring[k, :2], top[:2], top[2]):
+                free = self.go.limit(ring[k]) <= top[2] + LEVEL_TOLERANCE
+                if free and self.go.free_move(ring[k, :2], top[:2], top[2]):
                     return np.vstack([ring[k], top])
-        return None
+        q = next(self._been_beside(top), None)
+        return None if q is None else np.vstack([q, top])
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
         tool = self.field.tool
@@ -489,107 +487,4 @@ class Linker:
         """Which moves of a ramp's way down, without the pass (n, 3) after it, the tool has cut before."""
         return self.depths.were_cut(ramp[:len(ramp) - len(points) + 1])
 
-    # -- moves ------------------------------------------------------------------------------------------------
 
-    @property
-    def _in_front(self) -> float:
-        return min(IN_FRONT * self.field.tool.diameter, MOST_IN_FRONT)
-
-    def _here(self) -> F64:
-        assert self.at is not None
-        return self.at
-
-    def _free_move(self, a: F64, b: F64, z: float) -> bool:
-        n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
-        t = np.linspace(0.0, 1.0, n)[:, None]
-        return self._free(np.column_stack([a + t * (b - a), np.full(n, z)]))
-
-    def _free(self, tips: F64) -> bool:
-        """Whether the tool meets no part and fixture, and its bodies no stock, at tips (n, 3), mm, close together."""
-        tips = tips + [0.0, 0.0, LEVEL_TOLERANCE]
-        if bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any()):
-            return False
-        return not bool(self.stock.meets_bodies(tips, self.field.discs).any())
-
-    def _limit(self, tip: F64) -> float:
-        return float(self.field.tips(tip[None, :2])[0])
-
-    def _feed(self, motion: Motion, points: F64, feed: float) -> None:
-        self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
-        self.stock.cut(points, self.field.tool)
-        self.at = points[-1]
-
-    def _rapid(self, points: F64) -> None:
-        self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
-        self.at = points[-1]
-
-    def _lift(self) -> None:
-        if self.at is None or self.at[2] >= self.motions.clearance - 1e-9:
-            return
-        x, y, z = self.at
-        free = max(z, self.motions.rapid_floor)
-        if free > z + 1e-9:
-            self._feed(Motion.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
-        if self.motions.clearance > free + 1e-9:
-            self._rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
-
-    def _across(self, start: F64) -> F64 | None:
-        """A way (n, 3) in air from where the tool is to just over a place to come down at, no higher than it has to be.
-
-        Up over the stock and whatever else is between, straight across, and down: a feed way, taken where that is
-        sooner than by the clearance plane. None where it is not, or where the tool is not free on it.
-        """
-        tool, m = self.field.tool, self.motions
-        if self.at is None or self.at[2] >= m.rapid_floor:
-            return None
-        here, low = self.at, start[2] + self._in_front
-        run = float(np.hypot(*(start - here)[:2]))
-        level = max(float(here[2]), low)
-        by_plane = self._by_plane(here, np.array([*start[:2], low]))
-        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane:
-            return None
-        n = max(2, int(run / (0.5 * self.stock.lattice.step)) + 1)
-        t = np.linspace(0.0, 1.0, n)[:, None]
-        lane = np.column_stack([here[:2] + t * (start - here)[:2], np.full(n, level)])
-        level = max(level, float(self.field.tips(lane[:, :2]).max()))
-        lane[:, 2] = level
-        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM, least=0.0),
-                            self.stock.under_end(lane, tool, least=0.0))
-        level += float(stands.max()) + OVER
-        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane or level >= m.rapid_floor:
-            return None
-        lane[:, 2] = level
-        if not (self._free_move(here[:2], start[:2], level) and bool(self.stock.in_air(lane, tool).all())):
-            return None
-        way = np.array([here, [*here[:2], level], [*start[:2], level], [*start[:2], low]])
-        return np.ascontiguousarray(way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]])
-
-    def _by_plane(self, here: F64, to: F64) -> float:
-        """Minutes from a place to another, (3,) mm, up to the clearance plane, across and down."""
-        m, run = self.motions, float(np.hypot(*(to - here)[:2]))
-        return float((2.0 * m.rapid_floor - here[2] - to[2]) / m.link_feed
-                     + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
-
-    def _come_down(self, start: F64) -> None:
-        x, y, z = start
-        way = self._across(start)
-        if way is not None:
-            self._feed(Motion.CONNECT, way, self.motions.link_feed)
-            self._feed(Motion.APPROACH, np.array([way[-1], start]), self.motions.plunge_feed)
-            return
-        top = self.motions.clearance
-        if self.at is None:
-            self.at = np.array([x, y, top])
-            self._rapid(np.array([[x, y, top], [x, y, top]]))
-        else:
-            self._lift()
-            if np.hypot(*(self._here()[:2] - start[:2])) > 1e-9:
-                self._rapid(np.array([self._here(), [x, y, top]]))
-        free = min(max(z, self.motions.rapid_floor), top)
-        if top > free + 1e-9:
-            self._rapid(np.array([[x, y, top], [x, y, free]]))
-        slow = min(z + self._in_front, free)
-        if free > slow + 1e-9:
-            self._feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
-        if slow > z + 1e-9:
-            self._feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self.motions.plunge_feed)

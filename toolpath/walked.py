@@ -29,6 +29,7 @@ class Depths:
         self._lattice = lattice
         self._places: dict[bytes, float] = {}  # mm, Z of the lowest cut by place of a tip
         self._cells = np.full((lattice.ny, lattice.nx), math.inf)  # mm, the same by cell, along the moves too
+        self._spots = np.zeros((lattice.ny, lattice.nx, 2))  # mm, X and Y of that
         self._moves: set[tuple[bytes, bytes]] = set()
 
     def cut(self, points: F64) -> None:
@@ -39,7 +40,11 @@ class Depths:
         self._moves.update(zip(keys[:-1], keys[1:], strict=True))
         way = dense(points, 0.5 * self._lattice.step)
         way = way[self._lattice.inside(way)]
-        np.minimum.at(self._cells, self._lattice.cells(way), way[:, 2])
+        way = way[np.argsort(-way[:, 2], kind="stable")]  # of what is written to one cell the last stays
+        i, j = self._lattice.cells(way)
+        deeper = way[:, 2] < self._cells[i, j]
+        i, j, way = i[deeper], j[deeper], way[deeper]
+        self._cells[i, j], self._spots[i, j] = way[:, 2], way[:, :2]
 
     def lowest(self, place: F64) -> float:
         """Z of the lowest cut at the very place of a tip (3,), mm; inf where there was none."""
@@ -50,6 +55,17 @@ class Depths:
         keys = _written(points)
         return np.array([move in self._moves for move in zip(keys[:-1], keys[1:], strict=True)], np.bool_)
 
+    def near(self, place: F64, reach: float) -> F64:
+        """(n, 3) mm: where the tool has been no more than ``reach`` from a place (2,), mm, nearest first: the lowest of
+        each cell. It can come down there again from above."""
+        lat = self._lattice
+        (i0, i1), (j0, j1) = (sorted(k.tolist()) for k in lat.cells(np.array([place - reach, place + reach])))
+        low, at = self._cells[i0:i1 + 1, j0:j1 + 1], self._spots[i0:i1 + 1, j0:j1 + 1]
+        been = np.isfinite(low)
+        out = np.column_stack([at[been], low[been]])
+        far = np.hypot(*(out[:, :2] - place).T)
+        return np.ascontiguousarray(out[np.argsort(far, kind="stable")][:int((far <= reach).sum())])
+
     def above(self, points: F64) -> F64:
         """(m,) mm: how far above a line (n, 3) the tool has come down before, all along it; inf where it never did."""
         way = dense(points, self._lattice.step)
@@ -59,12 +75,13 @@ class Depths:
     def copied(self) -> Depths:
         """The same, to be added to on its own."""
         out = Depths(self._lattice)
-        out._places, out._cells, out._moves = dict(self._places), self._cells.copy(), set(self._moves)
+        out._places, out._moves = dict(self._places), set(self._moves)
+        out._cells, out._spots = self._cells.copy(), self._spots.copy()
         return out
 
     def become(self, other: Depths) -> None:
         """Take over what a copy of this has come to."""
-        self._places, self._cells, self._moves = other._places, other._cells, other._moves
+        self._places, self._moves, self._cells, self._spots = other._places, other._moves, other._cells, other._spots
 
 
 class Walked:

@@ -12,9 +12,10 @@ from tests.hand_parts import RAMP, box_mesh, field_of, joined, tool
 from toolpath.clearing import Clearing
 from toolpath.engaged import CLOSE, LOOK, angles
 from toolpath.levels import dense
-from toolpath.linking import Linker, Motions
+from toolpath.linking import Linker
 from toolpath.motion import Motion
 from toolpath.stock import StockMap
+from toolpath.travel import Motions
 from toolpath.walked import Depths
 
 ALLOWANCE, Z = 0.2, 5.0
@@ -24,11 +25,17 @@ MOST = math.radians(120.0)
 class Watched(Linker):
     """A linker that asks how much of the cutter is in stock on every pass, just before it is gone."""
 
-    def _feed(self, motion, points, feed):
-        if motion is Motion.CUT and not getattr(self, "eased", False):
-            way = dense(points, LOOK * self.field.tool.radius)
-            self.worst = max(getattr(self, "worst", 0.0), float(angles(self.stock, way, self.field.tool).max()))
-        super()._feed(motion, points, feed)
+    def __post_init__(self):
+        super().__post_init__()
+        go, self.worst, self.eased = self.go.feed, 0.0, False
+
+        def feed(motion, points, feed):
+            if motion is Motion.CUT and not self.eased:
+                way = dense(points, LOOK * self.field.tool.radius)
+                self.worst = max(self.worst, float(angles(self.stock, way, self.field.tool).max()))
+            go(motion, points, feed)
+
+        self.go.feed = feed
 
     def add(self, line, tolerance=None, *, eased=False):
         self.eased = eased

@@ -13,11 +13,12 @@ from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
 from toolpath.leads import SIZES, arc_onto, radii
 from toolpath.leaning import Surroundings, with_ways
 from toolpath.levels import Line, dense
-from toolpath.linking import Linker, Motions
+from toolpath.linking import Linker
 from toolpath.motion import Motion
 from toolpath.piece import Piece
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
+from toolpath.travel import Motions
 from toolpath.walked import Depths
 from zones.reach import Clearances
 
@@ -77,16 +78,18 @@ def test_a_pass_along_a_wall_begins_and_ends_on_an_arc():
     assert link.add(along(6.0))
     made = parts(link)
     k = [m for m, _ in made].index(Motion.CUT)
-    onto, cut, off = made[k - 1][1], made[k][1], made[k + 1][1]
-    assert (onto.motion, off.motion) == (Motion.APPROACH, Motion.LIFT)
-    assert onto.feed == off.feed == 800
-    for arc in (onto.points, off.points[::-1]):
+    cut = made[k][1]
+    onto, off = [t for _, t in made[k - 2:k]], [t for _, t in made[k + 1:k + 3]]
+    assert {t.motion for t in onto} == {Motion.APPROACH} and {t.motion for t in off} == {Motion.LIFT}
+    assert [t.feed for t in onto] == [3000, 800] and [t.feed for t in off] == [800, 3000]  # slow beside the wall
+    onto, off = (np.vstack([first.points, second.points[1:]]) for first, second in (onto, off))
+    for arc in (onto, off[::-1]):
         assert np.ptp(arc[:, 2]) == 0.0 and len(arc) >= 5
         assert np.isclose(abs(arc[0, 0] - arc[-1, 0]), 15.999 - arc[0, 1])  # a quarter
         assert (np.diff(arc[:, 1]) > 0.0).all()  # towards the wall all the way
-    assert onto.points[0, 0] < 6.0 < 24.0 < off.points[-1, 0]
+    assert onto[0, 0] < 6.0 < 24.0 < off[-1, 0]
     np.testing.assert_array_equal(cut.points[[0, -1]], along(6.0).points)
-    assert not link.field.blocked_by_cutter(np.vstack([onto.points, off.points])).any()
+    assert not link.field.blocked_by_cutter(np.vstack([onto, off])).any()
 
 
 def test_a_thicker_skin_takes_a_wider_arc_and_one_too_thick_takes_none():

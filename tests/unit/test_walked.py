@@ -236,3 +236,17 @@ def test_nothing_fresh_is_nothing_to_walk():
     line = Line(np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)]), False)
     assert still_to_walk(line, np.zeros(8, np.bool_)) == []
     assert still_to_walk(line, np.ones(8, np.bool_)) == [line]
+
+
+def test_near_a_place_the_lowest_of_each_cell_is_told_nearest_first():
+    depths = Depths(Lattice(0.0, 0.0, 0.5, 21, 11))
+    depths.cut(np.array([[1.0, 2.0, 3.0], [6.0, 2.0, 3.0]]))
+    depths.cut(np.array([[4.1, 2.1, 1.0], [4.1, 4.0, 2.0]]))
+    been = depths.near(np.array([4.0, 2.0]), 1.0)
+    assert len(been) and been[0, 2] == 1.0  # of both ways through the nearest cell the deeper one
+    np.testing.assert_allclose(been[0, :2], [4.1, 2.1])
+    far = np.hypot(*(been[:, :2] - [4.0, 2.0]).T)
+    assert (np.diff(far) >= 0.0).all() and far[-1] <= 1.0
+    for x, y, z in been:  # on one of both ways
+        assert z == 3.0 and y == 2.0 or np.isclose(z, 1.0 + (y - 2.1) / 1.9) and np.isclose(x, 4.1)
+    assert not len(depths.near(np.array([8.0, 5.0]), 1.0)) and not len(depths.near(np.array([-9.0, 5.0]), 1.0))
