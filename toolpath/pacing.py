@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.engaged import angles
+from toolpath.engaged import SKIN_SHARE, angles
 from toolpath.levels import stretch
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
 
@@ -75,10 +75,18 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
 
 
 def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
-    """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not."""
-    depth = np.ceil(stock.overlap(way, tool, least=0.0) / pace.layer * DEPTHS - 1e-9).astype(np.int64)
+    """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not.
+
+    Where nothing is engaged all of the front may be in what is skimmed, which counts as none. What is deeper than that
+    and not in front is what a row of nodes has missed: no thicker than ``SURE_RIM`` of a step, which a cutter that
+    breaks through it has in front of it over no more than 2 arccos (1 - thickness / radius).
+    """
+    over = stock.overlap(way, tool, least=0.0)
+    depth = np.ceil(over / pace.layer * DEPTHS - 1e-9).astype(np.int64)
     turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
-    turn[turn == 0] = round(math.pi / ANGLE)  # what is skimmed counts as none, and may be in all of the front
+    missed = 2.0 * math.acos(max(1.0 - SURE_RIM * stock.lattice.step / tool.radius, 0.0))
+    deep = over > SKIN_SHARE * tool.radius
+    turn[turn == 0] = np.where(deep, math.ceil(missed / ANGLE), round(math.pi / ANGLE))[turn == 0]
     kinds, place = np.unique(np.column_stack([depth, turn]), axis=0, return_inverse=True)
     known = np.array([pace.under(d * pace.layer / DEPTHS, t * ANGLE) for d, t in kinds.tolist()])
     levels = np.floor(np.log(np.maximum(known, pace.feed) / pace.feed) / math.log(STEP) + 1e-9)

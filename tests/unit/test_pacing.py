@@ -12,11 +12,12 @@ from geometry.bvh import TriangleTree
 from service.chain import cut_table
 from service.convert import parse_setup, tool_bodies
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.engaged import angles
-from toolpath.pacing import GUARD, STEP, Pace, paced
-from toolpath.stock import StockMap
+from toolpath.engaged import SKIN_SHARE, angles
+from toolpath.pacing import ANGLE, GUARD, STEP, Pace, paced
+from toolpath.stock import SURE_RIM, StockMap
 
 SLOT, FULL, AIR, LAYER = 100.0, 400.0, 3000.0, 1.0
+MISSED = 2.0 * math.acos(1.0 - SURE_RIM * 0.1 / 2.0)  # what a row of nodes may leave out, on a radius of 2
 
 
 def under(depth, angle):
@@ -58,6 +59,16 @@ def test_a_slot_goes_at_the_feed_a_strip_faster_and_air_like_a_link(body):
     assert (np.diff(joined[:, 0]) > 0.0).all()
 
 
+def test_stock_behind_a_cutter_that_comes_out_of_it_does_not_hold_it_back():
+    """Out of a block at X 12, as deep as a layer: what stands behind the axis is cut already, though the map shows it."""
+    stock = low(block(), lambda x, y: x > 12.0)
+    made = paced(np.array([[4.0, 15.0, 0.0], [20.0, 15.0, 0.0]]), stock, tool(4.0, 0.0), PACE)
+    assert [f for _, _, f in made[:1]] == [SLOT] and made[-1][0]
+    out = [(p, f) for air, p, f in made if not air and p[0, 0] > 12.0]
+    assert out and min(f for _, f in out) > 1.5 * SLOT  # no more than a row of nodes may have left out is in front
+    assert out[0][0][0, 0] < 13.0 and out[-1][0][-1, 0] > 14.0  # and not as in air before all of it is behind
+
+
 def test_no_place_is_gone_faster_than_what_stands_round_it_lets_the_tool():
     rng = np.random.default_rng(4)
     stock, body = block(), tool(4.0, 0.0)
@@ -71,7 +82,8 @@ def test_no_place_is_gone_faster_than_what_stands_round_it_lets_the_tool():
     at = np.linspace(0.0, s[-1], 4000)
     places = np.column_stack([np.interp(at, s, way[:, c]) for c in range(3)])
     depth, angle = stock.overlap(places, body), angles(stock, places, body)
-    most = np.array([under(max(d, 0.0), a or math.pi) for d, a in zip(depth, angle, strict=True)])
+    none = np.where(depth > SKIN_SHARE * body.radius, ANGLE * math.ceil(MISSED / ANGLE), math.pi)
+    most = np.array([under(max(d, 0.0), a or b) for d, a, b in zip(depth, angle, none, strict=True)])
     ends = np.cumsum([np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for _, p, _ in made])
     feed = np.array([f for _, _, f in made])[np.searchsorted(ends, at - 1e-9).clip(0, len(made) - 1)]
     slow = np.flatnonzero(depth > 0.0)
