@@ -4,10 +4,11 @@
 
 Parts are of the recipe random with two or three walls, up to three connections and every channel's least gap in that
 range, with their suggested tools; the machine is a table A/C (A -30 to 110 degrees). Each is planned and proved in a
-process of its own. What a part gave is kept as a line of ``rows.jsonl`` in the folder, so a broken run goes on where it
-stopped; a line holds a digest of the sources it was made with, and one made with others is told apart. A part that ends
-in an error or over the limit counts as not proved. ``benchmarks/five_axis_rows`` has those made so far: go on there
-with ``--out``, see them with ``--score-only``.
+process of its own; what others have written reads its files, as ``stepnc_family.py`` says, the form of AP238 going
+round with the seeds. What a part gave is kept as a line of ``rows.jsonl`` in the folder, so a broken run goes on where
+it stopped; a line holds a digest of the sources it was made with, and one made with others is told apart. A part that
+ends in an error or over the limit counts as not proved. ``benchmarks/five_axis_rows`` has those made so far: go on
+there with ``--out``, see them with ``--score-only``.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.family_score import digest_of  # noqa: E402
 from benchmarks.five_axis_gain import MACHINE, silent  # noqa: E402
+from benchmarks.stepnc_family import SCHEMAS as FORMS  # noqa: E402
+from benchmarks.stepnc_family import heard  # noqa: E402
 
 SOURCES = ["geometry", "zones", "toolpath", "output", "verify", "schemas", "service", "examples"]
 GAPS = (0.8, 6.0)  # mm
@@ -44,9 +47,10 @@ def planned(seed: int, folder: Path) -> dict[str, Any]:
     step, _, _ = made.write(folder)
     gaps = sorted(round(c["gap_min"], 3) for c in made.truth["channels"])
     facts: dict[str, Any] = {"seed": seed, "gaps": gaps, "connections": len(made.truth["connections"])}
+    form = list(FORMS)[seed % len(FORMS)]
+    machine = {**MACHINE, "ap238": form, "restart_points": True}
     try:
-        report = chain.plan(step, Setup.model_validate({**made.setup, "machine": MACHINE}), folder / "job",
-                            silent)
+        report = chain.plan(step, Setup.model_validate({**made.setup, "machine": machine}), folder / "job", silent)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
     zones = report["zones"]
@@ -55,7 +59,8 @@ def planned(seed: int, folder: Path) -> dict[str, Any]:
         "coverage": report["coverage"], "gouge": report["gouge_max_mm"], "zones": len(zones),
         "accesses": len({z["access"] for z in zones}),
         "flank": round(sum(z["area_mm2"] for z in zones if z["strategy"] == "flank"), 1),
-        "minutes": round(sum(s["machining_time_s"] for s in report["steps"]) / 60.0, 1)}
+        "minutes": round(sum(s["machining_time_s"] for s in report["steps"]) / 60.0, 1),
+        "files": dict(zip(("iso14649", form, "linuxcnc"), heard(folder / "job", form, True), strict=True))}
 
 
 def run(seed: int, limit: float) -> dict[str, Any]:
@@ -88,6 +93,10 @@ def score(rows: list[dict[str, Any]], sources: str) -> None:
     if proved:
         print(f"gouge of proved ones at most {max(r['gouge'] for r in proved):.4f} mm; seconds a part, median "
               f"{sorted(r['seconds'] for r in rows)[len(rows) // 2]:.0f}, most {max(r['seconds'] for r in rows):.0f}")
+    read = [r for r in proved if "files" in r]
+    if read:
+        print(f"files of {len(read)} of them read by others, without complaint "
+              f"{sum(all(said.startswith('ok') for said in r['files'].values()) for r in read)}")
     for r in rows:
         if r not in good:
             print(f"  seed {r['seed']}: {r['state']} {r.get('findings') or r.get('code', '')} "

@@ -116,22 +116,32 @@ def row(recipe: str, seed: int, machine: str, scallop: float | None, folder: Pat
     except CamError as refusal:
         return f"{form} | {refusal.code} | | | | |"
     found = "".join(f", {count} {kind}" for kind, count in report["finding_counts"].items())
-    out = [form, f"{report['state']}{found}", str(len(report["steps"]))]
+    return " | ".join([form, f"{report['state']}{found}", str(len(report["steps"])),
+                       *heard(folder / "out", form, machine != "3-axis")])
+
+
+def heard(folder: Path, form: str, tcp: bool) -> tuple[str, str, str]:
+    """What readers of others say to the files of a job in a folder: of ISO 14649, of AP238 and of LinuxCNC.
+
+    form : of AP238, in which its file is written; tcp : whether its programs turn
+
+    'ok' and how much there is, 'none' where the job has no such file, else what is said first that is no praise.
+    """
+    out = []
     for pattern, schema in (("job*.arm.stpnc", "iso14649_milling.exp"), ("job*.stpnc", SCHEMAS[form])):
-        files = [f for f in sorted((folder / "out").glob(pattern)) if pattern.endswith("arm.stpnc")
+        files = [f for f in sorted(folder.glob(pattern)) if pattern.endswith("arm.stpnc")
                  or not f.name.endswith("arm.stpnc")]
         said = [checked(f, schema) for f in files]
         out.append(next((s for s in said if s != "ok"), f"ok {sum(f.stat().st_size for f in files) / 1e6:.1f} MB")
                    if files else "none")
-    programs, heard, cut = sorted((folder / "out").glob("program*.linuxcnc.ngc")), [], folder / "cut.ngc"
+    programs, said, cut = sorted(folder.glob("program*.linuxcnc.ngc")), [], folder / "cut.ngc"
     for program in programs:
-        heard.append(interpreted(program, machine != "3-axis"))
+        said.append(interpreted(program, tcp))
         for text in from_labels(program.read_text()):
             cut.write_text(text)
-            heard.append(interpreted(cut, machine != "3-axis"))
-    labels = f"ok {len(programs)}, from {len(heard) - len(programs)} labels"
-    out.append(next((s for s in heard if s != "ok"), labels) if programs else "none")
-    return " | ".join(out)
+            said.append(interpreted(cut, tcp))
+    labels = f"ok {len(programs)}, from {len(said) - len(programs)} labels"
+    return out[0], out[1], next((s for s in said if s != "ok"), labels) if programs else "none"
 
 
 def seeds_of(words: list[str]) -> list[int]:
