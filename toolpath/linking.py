@@ -16,6 +16,7 @@ a pass would not it is first walked in skims above that.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -42,6 +43,7 @@ LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it betw
 MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
+MOST_OVER = 1.5  # layers: what stands over a pass, or a lane onto one, at most
 BEEN_NEAR = 0.5  # of the diameter: places so near that the tool has been to are looked at, to come down to a cut beside
 MOST_BEEN = 6  # of them
 BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
@@ -168,8 +170,27 @@ class Linker:
                     return False
         return True
 
+    def _stepped(self, points: F64, closed: bool) -> None:
+        """Take off layer by layer what stands over a line in a gap that the tool has been in and only just fits.
+
+        Elsewhere a pass begins in air, or goes down along itself, which takes what stands over it little by little.
+        """
+        tool, step = self.field.tool, self.motions.step_down
+        along = dense(points, LOOK_EVERY * tool.radius)
+        over = self.stock.overlap(along, tool, LOOK_RIM)
+        if (over.max() <= MOST_OVER * step or not len(self._been(points[0]))
+                or bool(self.stock.in_air(points[:1], tool)[0]) or next(self._air_beside(points), None) is not None):
+            return
+        for k in range(int(over.max() / step), 0, -1):
+            lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
+            for piece in pieces_where(lifted, over > k * step, tool.radius, 4.0 * tool.radius):
+                walk = thinned(piece.points, self.motions.tolerance)
+                if len(walk) > 1:
+                    self._one(walk, piece.closed, unless_over=True)
+
     def _pass(self, points: F64, closed: bool) -> bool:
         """Walk a line, skimmed before where it would have too much of the cutter in stock; False where it is not."""
+        self._stepped(points, closed)
         if self._one(points, closed, unless_over=True):
             return True
         line, tool = Line(points, closed), self.field.tool
@@ -251,7 +272,7 @@ class Linker:
                 return False
             tips = dense(arc, 0.3 * self.field.lattice.step)
             return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
-                    and self._lane(tips, 1.5 * self.motions.step_down))
+                    and self._lane(tips, MOST_OVER * self.motions.step_down))
 
         for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
             walked = arc if onto else np.ascontiguousarray(arc[::-1])
@@ -373,7 +394,7 @@ class Linker:
         """
         here, start, m = self.go.here(), points[0], self.motions
         sooner = 2.0 * (z - start[2]) / (math.tan(m.ramp_angle) * RAMP_SHARE * m.feed)
-        for q in self._beside_start(points):
+        for q in itertools.chain(self._air_beside(points), self._been_beside(start) if self._shallow(points) else ()):
             way = np.array([here, [*here[:2], z], [*q[:2], z], q])
             way = way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]]
             length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
@@ -388,14 +409,13 @@ class Linker:
         start = points[0]
         if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
             return start[None, :], points, False
-        q = next(self._beside_start(points), None)
+        q = next(self._air_beside(points), None)
+        if q is None and self._shallow(points):
+            q = next(self._been_beside(start), None)
         return None if q is None else (np.vstack([q, start]), points, False)
 
-    def _beside_start(self, points: F64) -> Iterator[F64]:
-        """Places (3,) as high as the start of a pass (n, 3), mm, that lead onto it straight.
-
-        First those in air, nearest first; then such as the tool has come down to before, as in a gap it only just fits.
-        """
+    def _air_beside(self, points: F64) -> Iterator[F64]:
+        """Places (3,) in air, as high as the start of a pass (n, 3), mm, that lead onto it straight; nearest first."""
         start, tool = points[0], self.field.tool
         ahead = points[1, :2] - start[:2]
         ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
@@ -406,15 +426,23 @@ class Linker:
                 q = np.array([*(start[:2] + far * side), start[2]])
                 if bool(self.stock.in_air(q[None, :], tool)[0]) and self._leads_onto(q, start):
                     yield q
-        yield from self._been_beside(start)
 
     def _been_beside(self, start: F64) -> Iterator[F64]:
         """Places (3,) as high as a start of a cut, mm, that the tool has come down to, straight beside it."""
-        been = self.depths.near(start[:2], BEEN_NEAR * self.field.tool.diameter)
-        for x, y, _ in been[been[:, 2] <= start[2]][:MOST_BEEN]:
+        for x, y, _ in self._been(start)[:MOST_BEEN]:
             q = np.array([x, y, start[2]])
-            if self._leads_onto(q, start):
-                yield q
+            if self._shallow(dense(np.vstack([q, start]), LOOK_EVERY * self.field.tool.radius)):
+                if self._leads_onto(q, start):
+                    yield q
+
+    def _been(self, start: F64) -> F64:
+        """Places (n, 3), mm, close to a start of a cut, that the tool has come down to, as deep or deeper."""
+        been = self.depths.near(start[:2], BEEN_NEAR * self.field.tool.diameter)
+        return been[been[:, 2] <= start[2]]
+
+    def _shallow(self, points: F64) -> bool:
+        """Whether no more than a layer stands over tips (n, 3), mm, not even as a skin on the walls beside them."""
+        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MOST_OVER * self.motions.step_down
 
     def _leads_onto(self, q: F64, start: F64) -> bool:
         """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
@@ -422,7 +450,7 @@ class Linker:
             return False
         t = np.linspace(0.0, 1.0, max(2, int(np.hypot(*(start - q)[:2]) / 0.2) + 1))[:, None]
         lane = q + t * (start - q)
-        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, 1.5 * self.motions.step_down)
+        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MOST_OVER * self.motions.step_down)
 
     def _lane(self, tips: F64, most: float) -> bool:
         """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
@@ -448,6 +476,8 @@ class Linker:
         above = max(float(self.depths.above(head).max()), 0.0)
         been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
         beside = max(float(been - points[0, 2]), 0.0)
+        if seen - beside > MOST_OVER * self.motions.step_down:
+            beside = math.inf
         for most in (min(beside, above, seen), min(above, seen), seen, max(seen, self.motions.step_down), highest):
             over = most + 0.1
             ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None

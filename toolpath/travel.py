@@ -148,7 +148,7 @@ class Travel:
                      + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
 
     def _onto_feed(self, start: F64) -> float:
-        """mm/min: the last of the way down to a place (3,), mm, that of the cut where nothing at all stands there."""
+        """mm/min: the last of the way down to a place (3,), mm, that of the cut where nothing stands in its way."""
         at, tool = start[None, :], self.field.tool
         stands = max(float(self.stock.overlap(at, tool, SURE_RIM, least=0.0)[0]),
                      float(self.stock.under_end(at, tool, least=0.0)[0]))
@@ -181,8 +181,8 @@ class Travel:
     def parts(self, way: F64, *, seen: bool) -> Iterator[tuple[bool, F64]]:
         """A way (n, 3), mm, in stretches, and whether each may be gone as fast as links go.
 
-        A stretch may where no stock is at it, not even between the nodes of the lattice. A shorter one than a share of
-        the diameter is not worth a word.
+        A stretch may where no stock is at it that is wider than a step of the lattice, wherever it stands between the
+        nodes. A shorter one than a share of the diameter is not worth a word.
 
         seen : also where the lattice shows none, some way behind the beginning and before the first that it shows
         """

@@ -82,6 +82,10 @@ def test_a_pass_along_a_wall_begins_and_ends_on_an_arc():
     onto, off = [t for _, t in made[k - 2:k]], [t for _, t in made[k + 1:k + 3]]
     assert {t.motion for t in onto} == {Motion.APPROACH} and {t.motion for t in off} == {Motion.LIFT}
     assert [t.feed for t in onto] == [3000, 800] and [t.feed for t in off] == [800, 3000]  # slow beside the wall
+    lat = link.stock.lattice
+    skin = next(y for y in lat.y0 + lat.step * np.arange(lat.ny) if y > 18 - 0.2)  # the first node of it
+    for quick in (onto[0], off[1]):
+        assert quick.points[:, 1].max() + 2.0 <= skin - 0.5 * lat.step  # half a cell off
     onto, off = (np.vstack([first.points, second.points[1:]]) for first, second in (onto, off))
     for arc in (onto, off[::-1]):
         assert np.ptp(arc[:, 2]) == 0.0 and len(arc) >= 5

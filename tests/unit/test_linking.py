@@ -497,13 +497,41 @@ def test_in_a_gap_it_only_just_fits_a_tool_comes_down_where_it_has_been():
     before = len(link.trajectories)
     assert link.add(loop(0.8, 1.0))
     new = link.trajectories[before:]
-    assert sum(t.length for t in new if t.motion is Motion.CUT) < 3.0 * loop(0.8, 1.0).length
+    cuts = [t.points for t in new if t.motion is Motion.CUT]
+    assert sum(t.length for t in new if t.motion is Motion.CUT) < 15.0 * loop(0.8, 1.0).length  # 30 down the ramp
+    heights = [8.0, *(float(p[-1, 2]) for p in cuts)]  # and no more than a layer and a half at once
+    assert heights[-1] == 1.0 and max(np.diff(heights[::-1])) <= 1.5
     link.keep_down([])
     before = len(link.trajectories)
     assert link.add(loop(0.8, 0.6))  # deeper than it has been: down along the pass from just above there
     new = link.trajectories[before:]
     assert max(t.points[0, 2] for t in new if t.motion is Motion.CUT) < 1.3
     assert steepest_cut(link) <= RAMP
+
+
+def test_the_last_bit_of_a_way_down_is_slow_where_something_stands_there():
+    """Slivers that may stand between the nodes, thin enough for the end to take, and none."""
+    for skin, feed in ((0.0, 800), (0.05, 200)):
+        link = linker(tool(4.0, 0.0), top=1.0)
+        link.stock.become(StockMap(link.stock.lattice, link.stock.top, link.stock.cover + skin, link.stock.part))
+        link.add(straight(5, 25, 10, 1.0))
+        down = [t for t in link.trajectories if t.motion is Motion.APPROACH and t.points[-1, 2] < t.points[0, 2]]
+        assert down[-1].feed == feed
+
+
+def test_no_way_in_leads_through_a_wall_from_where_the_tool_has_been():
+    """The wall is thinner than half the diameter: on its other side the tool has been deeper."""
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([5, 14.8, 0], [25, 15.2, 6]))
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 6.0]), 0.15)
+    link = Linker(field_of(mesh, tool(6.0, 0.0)), stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 1.0, 0.001),
+                  Depths(stock.lattice))
+    for y in (11.7, 18.3):
+        link.depths.cut(straight(10, 20, y, 0.5).points)
+    for x, y in ((15.0, 18.3), (15.0, 18.35)):
+        for q in link._been_beside(np.array([x, y, 1.0])):
+            assert q[1] > 15.2
+    assert not link._leads_onto(np.array([15.0, 11.7, 1.0]), np.array([15.0, 18.3, 1.0]))
+    assert not link._leads_onto(np.array([15.0, 15.0, 1.0]), np.array([15.0, 18.3, 1.0]))
 
 
 def test_a_way_down_goes_down_no_faster_than_straight_down_it_may():

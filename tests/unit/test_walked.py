@@ -250,3 +250,10 @@ def test_near_a_place_the_lowest_of_each_cell_is_told_nearest_first():
     for x, y, z in been:  # on one of both ways
         assert z == 3.0 and y == 2.0 or np.isclose(z, 1.0 + (y - 2.1) / 1.9) and np.isclose(x, 4.1)
     assert not len(depths.near(np.array([8.0, 5.0]), 1.0)) and not len(depths.near(np.array([-9.0, 5.0]), 1.0))
+    depths.cut(np.array([[8.0, 3.0, 2.0], [8.01, 3.0, 0.5], [8.02, 3.0, 1.5]]))
+    np.testing.assert_allclose(depths.near(np.array([8.0, 3.0]), 0.2), [[8.01, 3.0, 0.5]])
+    tried = depths.copied()
+    tried.cut(np.array([[8.01, 3.05, 0.0], [8.01, 3.06, 0.0]]))
+    np.testing.assert_allclose(depths.near(np.array([8.0, 3.0]), 0.2), [[8.01, 3.0, 0.5]])
+    depths.become(tried)
+    assert (depths.near(np.array([8.0, 3.0]), 0.2)[:, 1:] == [[3.06, 0.0]]).all()
