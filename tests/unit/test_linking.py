@@ -520,9 +520,9 @@ def test_the_last_bit_of_a_way_down_is_slow_where_something_stands_there():
 
 
 def test_no_way_in_leads_through_a_wall_from_where_the_tool_has_been():
-    """The wall is thinner than half the diameter: on its other side the tool has been deeper."""
-    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([5, 14.8, 0], [25, 15.2, 6]))
-    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 6.0]), 0.15)
+    """It is thin, and no higher over the pass than stock may be; on its other side the tool has been deeper."""
+    mesh = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([5, 14.8, 0], [25, 15.2, 2.0]))
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 2.0]), 0.15)
     link = Linker(field_of(mesh, tool(6.0, 0.0)), stock, Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 1.0, 0.001),
                   Depths(stock.lattice))
     for y in (11.7, 18.3):

@@ -62,11 +62,12 @@ def test_a_slot_goes_at_the_feed_a_strip_faster_and_air_like_a_link(body):
 def test_stock_behind_a_cutter_that_comes_out_of_it_does_not_hold_it_back():
     """Out of a block at X 12, as deep as a layer: what is behind the axis is cut already, though the map shows it."""
     stock = low(block(), lambda x, y: x > 12.0)
-    made = paced(np.array([[4.0, 15.0, 0.0], [20.0, 15.0, 0.0]]), stock, tool(4.0, 0.0), PACE)
+    fast = Pace(SLOT, AIR, lambda depth, angle: SLOT * LAYER * math.pi / max(depth * angle, 1e-3), LAYER)
+    made = paced(np.array([[4.0, 15.0, 0.0], [20.0, 15.0, 0.0]]), stock, tool(4.0, 0.0), fast)
     assert [f for _, _, f in made[:1]] == [SLOT] and made[-1][0]
     out = [(p, f) for air, p, f in made if not air and p[0, 0] > 12.0]
     # no more is in front than a row of nodes may have left out, and no less
-    assert out and all(1.5 * SLOT < f <= under(LAYER, MISSED) for p, f in out if p[-1, 0] < 13.5)
+    assert out and all(1.5 * SLOT < f <= SLOT * math.pi / MISSED for p, f in out if p[-1, 0] < 14.45)
     assert out[0][0][0, 0] < 13.0 and out[-1][0][-1, 0] > 14.0  # and not as in air before all of it is behind
 
 
