@@ -185,8 +185,10 @@ class Linker:
             lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
             for piece in pieces_where(lifted, over > k * step, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                if len(walk) > 1:
-                    self._one(walk, piece.closed, unless_over=True)
+                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # what still stands is out of its reach
+                    continue
+                for rest in self._unwalked(Line(walk, piece.closed)):
+                    self._one(rest.points, rest.closed, unless_over=True)
 
     def _pass(self, points: F64, closed: bool) -> bool:
         """Walk a line, skimmed before where it would have too much of the cutter in stock; False where it is not."""
