@@ -507,6 +507,10 @@ def test_in_a_gap_it_only_just_fits_a_tool_comes_down_where_it_has_been():
     new = link.trajectories[before:]
     assert max(t.points[0, 2] for t in new if t.motion is Motion.CUT) < 1.3
     assert steepest_cut(link) <= RAMP
+    link.stock.become(StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 8.0]), 0.15))
+    before = len(link.trajectories)
+    link._stepped(loop(0.8, 0.6).points, True)  # what still shows where it has been is out of its reach
+    assert len(link.trajectories) == before
 
 
 def test_the_last_bit_of_a_way_down_is_slow_where_something_stands_there():
