@@ -64,6 +64,7 @@ class JobResumed(ReportModel):
 
     plans: Annotated[int, Field(ge=0, description="Accesses that were planned already, counted again for each plan of "
                                                   "the job.")] = 0
+    steps: Annotated[int, Field(ge=0, description="Workingsteps of plans that were still under way.")] = 0
     proofs: Annotated[int, Field(ge=0, description="Proofs that were there already.")] = 0
 
 

@@ -64,6 +64,7 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
+from toolpath.underway import Keeper
 from verify.dialects import dialect_of
 from verify.likeness import carried
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
@@ -220,7 +221,8 @@ class _Span:
 
 
 def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
-          before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner) -> Side:
+          before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner,
+          keeper: Keeper) -> Side:
     """Plan the zones of one access.
 
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
@@ -236,7 +238,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
     made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                   lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed)
+                   lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed, keeper=keeper)
     stock.settle(last=True)
     lives = {t.id: t.life_min for t in ready.setup.tools if t.life_min is not None}
     used = worn(t for s in before for t in s.made.steps)

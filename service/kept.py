@@ -79,9 +79,9 @@ class Kept:
             except OSError:
                 pass  # it is refused again the next time
 
-    def took(self, kind: str) -> None:
+    def took(self, kind: str, count: int = 1) -> None:
         """Count what was taken over, and tell."""
-        self.taken[kind] += 1
+        self.taken[kind] += count
         if self.tell is not None:
             self.tell(dict(self.taken))
 

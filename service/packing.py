@@ -25,13 +25,14 @@ from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
+from toolpath.underway import FinishNow, LayersNow, PlanNow, StockNow, ToolNow, Ways
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
 from zones.reach import Lattice
 
 ALIGNED = 64
 CLASSES: dict[str, Any] = {c.__name__: c for c in (
     Plan, Workingstep, Trajectory, Arc, Rates, Bend, ZonePlan, Counterexamples, HighWall, Lattice, Proof, Finding,
-    Engagement, Spent, Support, ZoneProof, FaceProof)}
+    Engagement, Spent, Support, ZoneProof, FaceProof, PlanNow, StockNow, ToolNow, LayersNow, FinishNow, Ways)}
 ENUMS: dict[str, Any] = {e.__name__: e for e in (Motion, FindingKind)}
 PLAIN = (type(None), bool, int, float, str)
 

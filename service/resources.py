@@ -75,7 +75,7 @@ def _resumed(row: RowMapping) -> JobResumed | None:
     if not row["resumed_json"]:
         return None
     taken = json.loads(row["resumed_json"])
-    return JobResumed(plans=taken.get("plan", 0), proofs=taken.get("proof", 0))
+    return JobResumed(plans=taken.get("plan", 0), steps=taken.get("acts", 0), proofs=taken.get("proof", 0))
 
 
 def event_data(row: RowMapping) -> str:

@@ -1,9 +1,10 @@
-"""What a second attempt at a job takes over from the first: accesses that were planned, and proofs.
+"""What a second attempt at a job takes over from the first: accesses that were planned, acts of a plan, and proofs.
 
 Reading, zones and the samples of the proof are made again, and so are programs, for they follow from the plans. What
 is taken over is named by a digest of all it came from:
 
     plan    the job as prepared here, the access, the plans before it, what proofs found along it
+    acts    the same; what a plan has come to that is still under way, the newest of it alone
     proof   the job as prepared here, the very texts that were proved, who answers for each sample
 
 The job as prepared has its setup, our sources, the versions of the libraries that compute and the kind of processor in
@@ -15,10 +16,12 @@ from __future__ import annotations
 
 import hashlib
 import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
+from operator import itemgetter
 from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
@@ -37,13 +40,16 @@ from toolpath.counterexamples import Counterexamples
 from toolpath.family import Target
 from toolpath.plan import Plan
 from toolpath.stock import StockMap
+from toolpath.underway import NOTHING, Keeper, PlanNow
 from verify.model import NcProgram, Proof
 from zones.view import View
 
 log = structlog.get_logger(__name__)
 
 COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", "cadquery-ocp")  # whose versions a plan hangs on
-PLAN, PROOF = "plan", "proof"
+PLAN, ACTS, PROOF = "plan", "acts", "proof"
+ACTS_EVERY_S = 15.0  # how often a plan under way is kept at most
+ACTS_PAUSE = 60.0  # and not for so many times as long as that took the last time
 T = TypeVar("T")
 
 
@@ -59,19 +65,21 @@ class Resumed:
     def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[Target], samples: SurfaceSamples) -> None:
         self.kept, self.ready, self.checks, self.samples = kept, ready, checks, samples
 
-    def side(self, view: View, before: Sequence[Side], found: Counterexamples, make: Callable[[], Side]) -> Side:
+    def side(self, view: View, before: Sequence[Side], found: Counterexamples, make: Callable[[Keeper], Side]) -> Side:
         """The plan of an access: the one that is kept, else what ``make`` plans, which is kept then.
 
         before : the sides planned before it; found : what proofs found along it
+        make   : given who keeps the plan while it is under way
         """
         if not self.kept:
-            return make()
+            return make(NOTHING)
         name = _digest(self._prepared, view.id, *(s.name for s in before), pack(found))
-        side = self._taken(PLAN, name, partial(_side, view))
+        side = self.taken(PLAN, name, partial(_side, view))
         if side is None:
-            side = make()
+            side = make(_UnderWay(self, name))
             left = None if side.left is None else (side.left.lattice, side.left.top, side.left.cover)
-            self._keep(PLAN, name, (side.made, side.clearance, left))
+            if self.keep(PLAN, name, (side.made, side.clearance, left)):
+                self.kept.drop(ACTS, name)
         return replace(side, name=name)
 
     def proof(self, programs: Sequence[NcProgram], zone: NDArray[np.int32], make: Callable[[], Proof]) -> Proof:
@@ -83,34 +91,40 @@ class Resumed:
             return make()
         texts = [(p.name, p.dialect, p.work_offset, p.turn, p.text) for p in programs]
         name = _digest(self._prepared, pack((texts, zone)))
-        proof = self._taken(PROOF, name, partial(_checked, Proof))
+        proof = self.taken(PROOF, name, partial(_checked, Proof))
         if proof is None:
             proof = make()
-            self._keep(PROOF, name, proof)
+            self.keep(PROOF, name, proof)
         return proof
 
-    def _taken(self, kind: str, name: str, build: Callable[[Any], T]) -> T | None:
-        """What ``build`` makes of the value that is kept; None where none is, or one that it makes nothing of."""
+    def taken(self, kind: str, name: str, build: Callable[[Any], T],
+              count: Callable[[T], int] = lambda _: 1) -> T | None:
+        """What ``build`` makes of the value that is kept; None where none is, or one that it makes nothing of.
+
+        count : as how many that is told
+        """
         data = self.kept.get(kind, name)
         if data is None:
             return None
         try:
             found = build(unpack(data, self._known))
-        except (ValueError, KeyError, TypeError, IndexError) as error:
+        except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
             log.warning("what was kept cannot be read", kind=kind, error=f"{type(error).__name__}: {error}")
             self.kept.drop(kind, name)
             return None
-        self.kept.took(kind)
+        self.kept.took(kind, count(found))
         return found
 
-    def _keep(self, kind: str, name: str, value: object) -> None:
+    def keep(self, kind: str, name: str, value: object) -> bool:
+        """Keep a value for another attempt; False where that could not be done."""
         try:
             done = self.kept.put(kind, name, pack(value, self._known))
         except TypeError as error:  # a class that ``service.packing`` does not know: no reason for a job to fail
             log.warning("cannot be kept for another attempt", kind=kind, error=str(error))
-            return
+            return False
         if not done:
             log.warning("could not be kept for another attempt", kind=kind)
+        return done
 
     @cached_property
     def _known(self) -> Known:
@@ -128,6 +142,27 @@ class Resumed:
         for z, c in zip(self.ready.zones, self.checks, strict=True):
             told += [z.id, z.access, z.tool.id, z.tips, z.samples, c.points, c.normals, c.tips]
         return _digest(*told, self.samples.points, self.samples.normals)
+
+
+class _UnderWay(Keeper):
+    """Keeps a plan of an access while it is made, now and then, each time instead of the time before."""
+
+    def __init__(self, resumed: Resumed, name: str) -> None:
+        self.resumed, self.name = resumed, name
+        self.next = time.monotonic() + ACTS_EVERY_S
+
+    def taken(self, use: Callable[[PlanNow], T]) -> T | None:
+        """See ``Keeper``; told is how many workingsteps were made."""
+        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanNow, v)), len(v.steps)), itemgetter(1))
+        return None if found is None else found[0]
+
+    def done(self, now: Callable[[], PlanNow]) -> None:
+        """Keep it where the time for that has come."""
+        begun = time.monotonic()
+        if begun >= self.next:
+            self.resumed.keep(ACTS, self.name, now())
+            ended = time.monotonic()
+            self.next = ended + max(ACTS_EVERY_S, ACTS_PAUSE * (ended - begun))
 
 
 def _side(view: View, value: Any) -> Side:

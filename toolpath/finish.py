@@ -13,6 +13,7 @@ import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigz
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from toolpath.travel import Motions
+from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable import Form
 from zones.reach import TipField
@@ -80,11 +82,13 @@ class Finish:
 
     zone, checks, field, cut, stock, settings : as ``plan_job`` has them; faces : of the zone, exact and trimmed
     walked, depths : where its tool has been, shared by its zones
+    now : where it was when it was kept, to go on from there
     """
 
     def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
                  settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
-                 depths: Depths | None = None) -> None:
+                 depths: Depths | None = None, now: FinishNow | None = None) -> None:
+        anew = partial(Finish, zone, checks, field, cut, stock, settings, faces, walked, depths)
         self.full = cut = cut.finish or cut
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
@@ -95,7 +99,8 @@ class Finish:
         self.checks = checks
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
                                     margin=1.5 * settings.scallop_height)
-        self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points))
+        self.strategy = _once(_strategy(zone, checks, field, cut, settings), len(checks.points)) if now is None else (
+            _Strategy(now.strategy, now.side_step, _laid_later(anew, now.strategy), now.ordered, now.rejected))
         self.cut = self._eased(cut, self.strategy)
         self.faces = faces
         self.layers: Workingstep | None = None  # those that were measured
@@ -106,6 +111,20 @@ class Finish:
         self.met = np.zeros(len(checks.points), np.bool_)
         self.walked = Walked() if walked is None else walked
         self.depths = Depths(stock.lattice) if depths is None else depths
+        if now is not None:
+            self._go_on(now)
+
+    def now(self) -> FinishNow:
+        """Where it is, to go on with another time."""
+        s, layers = self.strategy, None if self.layers is None else self.layers.id
+        return FinishNow(self.zone.id, self.residual.residual, self.met, layers, self.step, self.settled,
+                         self.begun_with, self.passes, s.name, s.side_step, s.ordered, s.rejected)
+
+    def _go_on(self, now: FinishNow) -> None:
+        if len(now.residual) != len(self.met) or len(now.met) != len(self.met):
+            raise ValueError(f"what is kept of {now.zone} has other checks")
+        self.residual.residual, self.met = now.residual.copy(), now.met.copy()
+        self.step, self.settled, self.begun_with, self.passes = now.step, now.settled, now.begun_with, now.passes
 
     def measure(self, layers: Workingstep) -> None:
         """Count what layers have cut: where they leave no more than the scallop, as along slots, no pass follows."""
@@ -450,6 +469,20 @@ def _once(strategy: _Strategy, count: int) -> _Strategy:
         return kept[0]
 
     return replace(strategy, rounds=rounds)
+
+
+def _laid_later(anew: Callable[[], Finish], name: str) -> Rounds:
+    """The rounds of a strategy that was laid out before: again when the first is asked for, which may be never."""
+    @cache
+    def laid() -> Rounds:
+        fresh = anew()
+        if fresh.strategy.name == name:
+            return fresh.strategy.rounds
+        other, _ = fresh._along_borders()
+        assert other is not None and other.name == name, "what is laid out follows from the inputs of a plan alone"
+        return other.rounds
+
+    return lambda k, failing: laid()(k, failing)
 
 
 def turned(line: Line, settings: PlanSettings) -> Line:

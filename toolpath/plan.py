@@ -7,7 +7,7 @@ what it lacks: after the other zones of its tool, and, where more than the scall
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -30,6 +30,7 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
 from toolpath.strategies.isoparametric import Faces
+from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.walked import Depths, Walked
 from zones.machinable import Form
 from zones.reach import TipField
@@ -54,7 +55,7 @@ class Plan:
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: Keeper = NOTHING) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
@@ -65,52 +66,86 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     progress : called with the share done, 0 to 1
     first_step : number of the first workingstep
     trimmed  : exact faces by zone id, in the frame of the zones; zones that have none get no iso-parametric passes
+    keeper   : told after each act; where it knows a plan of the very same inputs that was under way, that is gone on
+               with, and ends as one that was never cut off
 
     Returns
     -------
     Plan
     """
-    steps: list[Workingstep] = []
     order = list(dict.fromkeys(z.tool.id for z in zones))
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
-    jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
-                     trimmed or {}, under) for tid in order]
-    bands = [*settings.planes, -math.inf]
-    done = 0
 
-    def following() -> str:
-        return f"S{len(steps) + first_step:02d}"
+    def begin(now: PlanNow | None = None) -> _Work:
+        jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
+                         trimmed or {}, under) for tid in order]
+        return _Work(jobs, stock, settings, now)
 
-    def tell(count: int) -> None:
-        nonlocal done
-        done += count
-        if progress is not None:
-            progress(AGAIN_SHARE * done / (len(zones) * len(bands)))
-
-    for plane in bands:
-        # a tool takes stock off for those after it too, so it is left out only where none of these has work here
-        last = max((k for k, job in enumerate(jobs) if job.has_work(plane)), default=-1)
-        for k, job in enumerate(jobs):
-            if k > last:
-                tell(len(job.zones))
-                continue
-            if settings.roughing:
-                steps.extend(job.layer(plane, len(steps) + first_step))
-            if not settings.finishing:
-                tell(len(job.zones))
-                continue
-            for zone in job.zones:
-                steps.extend(job.finish(zone, plane, following()))
-                tell(1)
-            for f in job.begun:
-                steps.extend(f.walk_again(following(), PASS_SHARE * settings.scallop_height))
-    begun = [f for job in jobs for f in job.begun]
-    for f in begun:  # stock that took another tool to get away: worth changing back for what would stay otherwise
-        steps.extend(f.walk_again(following(), settings.scallop_height))
+    work = keeper.taken(begin) or begin()
+    begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
+    for k, (finished, act) in enumerate(work.to_do()):
+        if k >= begun:
+            work.steps.extend(act(len(work.steps) + first_step))
+            work.acts = k + 1
+            keeper.done(work.now)
+        done += finished
+        if progress is not None and finished:
+            progress(AGAIN_SHARE * done / all_zones)
     if progress is not None:
         progress(1.0)
-    return Plan(tuple(steps), tuple(f.plan() for f in begun))
+    return Plan(tuple(work.steps), tuple(f.plan() for job in work.jobs for f in job.begun))
+
+
+Act = Callable[[int], list[Workingstep]]
+"""Something whole of a plan: given the number of the first workingstep it makes, these."""
+
+
+class _Work:
+    """A plan under way: acts done, the workingsteps they made, what each tool has done.
+
+    now : how far one like this came, to go on from there
+    """
+
+    def __init__(self, jobs: Sequence[_ToolJob], stock: StockMap, settings: PlanSettings,
+                 now: PlanNow | None = None) -> None:
+        self.jobs, self.stock, self.settings = jobs, stock, settings
+        self.acts, self.steps = 0, list[Workingstep]()
+        if now is not None:
+            self.acts, self.steps = now.acts, list(now.steps)
+            made = {s.id: s for s in self.steps}
+            for job, there in zip(jobs, now.tools, strict=True):
+                job.go_on(there, made)
+            stock.go_on(now.stock)  # last, for it is not made anew where the rest does not fit
+
+    def now(self) -> PlanNow:
+        """How far it is."""
+        return PlanNow(self.acts, tuple(self.steps), self.stock.now(), tuple(job.now() for job in self.jobs))
+
+    def to_do(self) -> Iterator[tuple[int, Act]]:
+        """All acts in their order, done or not, and how many zones of a band are finished with each."""
+        settings = self.settings
+        for plane in [*settings.planes, -math.inf]:
+            # a tool takes stock off for those after it too, so it is left out only where none of these has work here
+            last = max((k for k, job in enumerate(self.jobs) if job.has_work(plane)), default=-1)
+            for k, job in enumerate(self.jobs):
+                if k <= last and settings.roughing:
+                    yield 0, partial(job.layer, plane)
+                if k > last or not settings.finishing:
+                    yield len(job.zones), _nothing
+                    continue
+                for zone in job.zones:
+                    yield 1, partial(job.finish, zone, plane)
+                for zone in job.zones:
+                    yield 0, partial(job.again, zone, PASS_SHARE * settings.scallop_height)
+        for job in self.jobs:  # stock that took another tool to get away: worth changing back for what would stay else
+            for zone in job.zones:
+                yield 0, partial(job.again, zone, settings.scallop_height)
+
+
+def _nothing(number: int) -> list[Workingstep]:
+    del number
+    return []
 
 
 class _ToolJob:
@@ -143,7 +178,7 @@ class _ToolJob:
         number : of the first of the workingsteps, of which there are two at most
         """
         if self.layers is None:
-            self.layers = _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under)
+            self.layers = self._layers()
         made = self.layers.down_to(plane - self.under, number)
         self.layered.extend(made)
         for f in self.begun:
@@ -151,24 +186,56 @@ class _ToolJob:
                 f.measure(step)
         return made
 
-    def finish(self, zone: ZoneArea, plane: float, step_id: str) -> list[Workingstep]:
-        """The finish of a zone down to a height, mm."""
+    def finish(self, zone: ZoneArea, plane: float, number: int) -> list[Workingstep]:
+        """The finish of a zone down to a height, mm; number : of the first of the workingsteps."""
         self.stock.settle()
         f = self.finishes.get(zone.id)
         if f is None:
-            f = Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
-                       self.trimmed.get(zone.id, ()), self.walked, self.depths)
+            f = self._finish(zone)
             for layered in self.layered:
                 f.measure(layered)
             self.finishes[zone.id] = f
-        return f.walk(step_id, None if plane == -math.inf and not self.settings.planes else f.above(plane))
+        wanted = None if plane == -math.inf and not self.settings.planes else f.above(plane)
+        return f.walk(f"S{number:02d}", wanted)
+
+    def again(self, zone: ZoneArea, least: float, number: int) -> list[Workingstep]:
+        """Another go at a zone that has been begun, where more than ``least`` mm is left; number : of the first."""
+        f = self.finishes.get(zone.id)
+        return [] if f is None else f.walk_again(f"S{number:02d}", least)
+
+    def now(self) -> ToolNow:
+        """How far it is."""
+        return ToolNow(Ways.of(self.walked.ways), Ways.of(self.depths.ways),
+                       None if self.layers is None else self.layers.now(), tuple(s.id for s in self.layered),
+                       tuple(f.now() for f in self.begun))
+
+    def go_on(self, now: ToolNow, steps: Mapping[str, Workingstep]) -> None:
+        """Become what one like this, that had done nothing, had come to; steps : that were made, by id."""
+        for way in now.walked.lines():
+            self.walked.add(way)
+        for way in now.depths.lines():
+            self.depths.cut(way)
+        self.layered = [steps[s] for s in now.layered]
+        if now.layers is not None:
+            self.layers = self._layers(now.layers)
+        zones = {z.id: z for z in self.zones}
+        for there in now.finishes:
+            self.finishes[there.zone] = f = self._finish(zones[there.zone], there)
+            f.layers = None if there.layers is None else steps[there.layers]
+
+    def _layers(self, now: LayersNow | None = None) -> _Layers:
+        return _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under, now)
+
+    def _finish(self, zone: ZoneArea, now: FinishNow | None = None) -> Finish:
+        return Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
+                      self.trimmed.get(zone.id, ()), self.walked, self.depths, now)
 
 
 class _Layers:
     """The stock above all zones of a tool, taken off in depth layers, some of them at a time."""
 
     def __init__(self, zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, depths: Depths, under: float) -> None:
+                 settings: PlanSettings, depths: Depths, under: float, now: LayersNow | None = None) -> None:
         self.zones, self.field, self.cut, self.stock = zones, field, cut, stock
         self.settings, self.depths = settings, depths
         lat, tool = field.lattice, field.tool
@@ -180,9 +247,11 @@ class _Layers:
         self.bounded = cut.engaged < UNBOUNDED
         # the finish of a floor has the whole front in what is left on it
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
-        bottom, top, step = float(tips[:, 2].min()) + low, stock.highest, 0.85 * cut.step_down
-        self.swept, self.above, self.left = top, top, list[tuple[float, NDArray[np.bool_]]]()
-        if top <= bottom:
+        bottom, step = float(tips[:, 2].min()) + low, 0.85 * cut.step_down
+        self.top = top = stock.highest if now is None else now.top
+        self.swept, self.above = (top, top) if now is None else (now.swept, now.above)
+        self.left: list[tuple[float, NDArray[np.bool_]]] = []
+        if top <= bottom or now is not None and not now.left:
             return
         heights = layers.layer_heights(top, bottom, step)
         also = [f.bottom + low for f in zones if f.form is Form.LEVEL] if self.bounded else []
@@ -190,6 +259,12 @@ class _Layers:
         if also:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
         self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
+        if now is not None:
+            del self.left[:-now.left]
+
+    def now(self) -> LayersNow:
+        """How far they are."""
+        return LayersNow(self.top, self.swept, self.above, len(self.left))
 
     def down_to(self, lowest: float, number: int) -> list[Workingstep]:
         """The layers from ``lowest`` mm up that were not walked before, as one workingstep, and where even stock is to

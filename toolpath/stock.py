@@ -21,6 +21,7 @@ from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_leaning, standing
 from toolpath.piece import between, places_along
 from toolpath.shell import Shell
+from toolpath.underway import StockNow
 from zones.reach import Disc, Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
@@ -154,6 +155,31 @@ class StockMap:
         """Take over what a copy of this has come to."""
         self.top, self.cover, self._ceilings = other.top, other.cover, other._ceilings
         self._pooled, self._covered = other._pooled, other._covered
+
+    def now(self) -> StockNow:
+        """What is left, to go on with another time; as views where nothing else will do."""
+        if self._others is None:
+            return StockNow(self.top, self.cover, None, None)
+        cut = np.flatnonzero(self._others.known != [self.cover, self.top])
+        return StockNow(self.top, self.cover, cut, self._others.known.ravel()[cut])
+
+    def go_on(self, now: StockNow) -> None:
+        """Become what a map like this, cut so far by none, was left as.
+
+        Raises
+        ------
+        ValueError
+            That was no map like this.
+        """
+        shape, hollows = self.top.shape, self._others is not None
+        if now.top.shape != shape or now.cover.shape != shape or hollows != (now.cut is not None):
+            raise ValueError("the stock that is kept is not of this lattice")
+        if self._others is not None:
+            known = np.array([now.cover, now.top])
+            known.ravel()[now.cut] = now.settled
+            self._others.known = known
+        self.top, self.cover, self._ceilings = now.top.copy(), now.cover.copy(), None
+        self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)
 
     def left_by(self, others: Sequence[tuple[StockMap, F64]], lowest: float) -> None:
         """Lower the stock to what other maps of it, seen along other axes, have left.

@@ -31,9 +31,11 @@ class Depths:
         self._cells = np.full((lattice.ny, lattice.nx), math.inf)  # mm, the same by cell, along the moves too
         self._spots = np.zeros((lattice.ny, lattice.nx, 2))  # mm, X and Y of that
         self._moves: set[tuple[bytes, bytes]] = set()
+        self.ways: list[F64] = []  # as they were cut
 
     def cut(self, points: F64) -> None:
         """Remember a cut with the tip along points (n, 3), mm."""
+        self.ways.append(points)
         for place, z in zip(place_keys(points[:, :2]), points[:, 2].tolist(), strict=True):
             self._places[place] = min(z, self._places.get(place, math.inf))
         keys = _written(points)
@@ -76,12 +78,13 @@ class Depths:
         """The same, to be added to on its own."""
         out = Depths(self._lattice)
         out._places, out._moves = dict(self._places), set(self._moves)
-        out._cells, out._spots = self._cells.copy(), self._spots.copy()
+        out._cells, out._spots, out.ways = self._cells.copy(), self._spots.copy(), list(self.ways)
         return out
 
     def become(self, other: Depths) -> None:
         """Take over what a copy of this has come to."""
-        self._places, self._moves, self._cells, self._spots = other._places, other._moves, other._cells, other._spots
+        self._places, self._moves, self.ways = other._places, other._moves, other.ways
+        self._cells, self._spots = other._cells, other._spots
 
 
 class Walked:
@@ -93,9 +96,11 @@ class Walked:
 
     def __init__(self) -> None:
         self._moves: dict[int, list[tuple[F64, F64]]] = {}
+        self.ways: list[F64] = []  # as they were walked
 
     def add(self, points: F64) -> None:
         """Remember a way (n, 3), mm, that the tool has gone from end to end."""
+        self.ways.append(points)
         keys = _cells(points).tolist()
         for a, b, p, q in zip(keys[:-1], keys[1:], points[:-1], points[1:], strict=True):
             self._moves.setdefault(a, []).append((p, q))
@@ -144,12 +149,12 @@ class Walked:
     def copied(self) -> Walked:
         """The same, to be added to on its own."""
         out = Walked()
-        out._moves = {key: list(ends) for key, ends in self._moves.items()}
+        out._moves, out.ways = {key: list(ends) for key, ends in self._moves.items()}, list(self.ways)
         return out
 
     def become(self, other: Walked) -> None:
         """Take over what a copy of this has come to."""
-        self._moves = other._moves
+        self._moves, self.ways = other._moves, other.ways
 
 
 def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.plan import Plan, plan_job
 from toolpath.stock import StockMap
+from toolpath.underway import NOTHING, Keeper, PlanNow, StockNow
 from verify.model import NcProgram, Proof, Spent
 from zones.reach import Lattice
 
@@ -44,15 +47,26 @@ class Job:
         self.planned: list[str] = []
         self.proved = 0
 
-    def run(self, name: str, kept: Kept | None, plans: int = 99, proofs: int = 99) -> dict[str, bytes]:
-        """An attempt that ends before it plans or proves more than so often; returns its files."""
-        self.planned, self.proved = [], 0
+    def run(self, name: str, kept: Kept | None, plans: int = 99, proofs: int = 99, acts: int = 999) -> dict[str, bytes]:
+        """An attempt that ends before it plans or proves more than so often or after so many acts; its files."""
+        self.planned, self.proved, self.acts = [], 0, 0
 
-        def planner(zones: Any, *args: Any, **more: Any) -> Plan:
+        class Watched(Keeper):
+            def __init__(self, keeper: Keeper) -> None:
+                self.taken = keeper.taken  # type: ignore[method-assign]
+                self.keep = keeper.done
+
+            def done(_self, now: Callable[[], PlanNow]) -> None:
+                self.acts += 1
+                _self.keep(now)
+                if self.acts == acts:
+                    raise Cut
+
+        def planner(zones: Any, *args: Any, keeper: Keeper, **more: Any) -> Plan:
             if len(self.planned) == plans:
                 raise Cut
             self.planned.append(zones[0].access)
-            return plan_job(zones, *args, **more)
+            return plan_job(zones, *args, keeper=Watched(keeper), **more)
 
         def prove(*args: Any, **more: Any) -> Proof:
             if self.proved == proofs:
@@ -96,6 +110,28 @@ def test_an_attempt_goes_on_where_the_one_before_was_cut_off(tmp_path, monkeypat
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+def test_an_attempt_goes_on_in_the_middle_of_a_plan(tmp_path, monkeypatch):
+    """On five axes: the first access leans and is cut off once, the second is cut off twice and has its stock."""
+    monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
+    monkeypatch.setattr(resume, "ACTS_PAUSE", 0.0)
+    told: list[dict[str, int]] = []
+    job, kept = Job(tmp_path, monkeypatch, **TURNED), Kept(tmp_path / "kept")
+    plain = job.run("plain", None)
+    whole = job.acts
+    job.cut(kept, acts=3)
+    assert kinds(kept) == ["acts"] and job.planned == ["A1"]
+    done = 3
+    for acts, planned, left in ((whole // 2, ["A1", "A2"], ["acts", "plan"]), (2, ["A2"], ["acts", "plan"])):
+        job.cut(Kept(kept.folder, told.append), acts=acts)
+        done += acts
+        assert job.planned == planned and kinds(kept) == left
+    files = job.run("out", Kept(kept.folder, told.append))
+    assert files == plain and job.planned == ["A2"] and job.acts == whole - done > 2
+    assert kinds(kept) == ["plan", "plan", "proof"] and told[-1]["acts"] > 0 and told[-1]["plan"] == 1
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_rounds_are_gone_through_again_without_planning_or_proving(tmp_path, monkeypatch):
     """A job that is planned twice, for its first proof has something to say of the second access."""
     asked: list[int] = []
@@ -134,7 +170,7 @@ class Prepared:
     def resumed(self, kept: Kept, **changes: Any) -> Resumed:
         return Resumed(kept, replace(self.ready, **changes), self.checks, self.samples)
 
-    def side(self) -> Side:
+    def side(self, keeper: Keeper = NOTHING) -> Side:
         """A plan, with the stock as it leaves it."""
         self.made += 1
         left = StockMap(Lattice(0.0, 0.0, 0.5, 3, 2), np.arange(6.0).reshape(2, 3))
@@ -189,6 +225,73 @@ def test_what_is_whole_but_no_plan_is_made_again(prepared, tmp_path, words):
     assert prepared.asked(kept) == 1 and prepared.asked(kept) == 0
 
 
+UNDER_WAY = PlanNow(3, (), StockNow(np.zeros((2, 3)), np.ones((2, 3)), None, None), ())
+
+
+def test_a_plan_under_way_is_there_until_the_plan_is(prepared, tmp_path, monkeypatch):
+    monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
+    told: list[dict[str, int]] = []
+    kept = Kept(tmp_path / "kept", told.append)
+    found: list[PlanNow | None] = []
+
+    def make(keeper: Keeper, change: Callable[[], object] = lambda: None) -> Side:
+        found.append(keeper.taken(lambda now: now))
+        keeper.done(lambda: replace(UNDER_WAY, acts=len(found), steps=prepared.side().made.steps))
+        assert kinds(kept) == ["acts"]
+        change()
+        if len(found) < 4:
+            raise Cut
+        return prepared.side()
+
+    def harm() -> None:
+        (path,) = (tmp_path / "kept").iterdir()
+        path.write_bytes(path.read_bytes()[:-5])
+
+    for change in (lambda: None, harm, lambda: None):
+        with pytest.raises(Cut):
+            prepared.resumed(kept).side(prepared.view, (), NONE, partial(make, change=change))
+    prepared.resumed(kept).side(prepared.view, (), NONE, make)
+    assert [now and now.acts for now in found] == [None, 1, None, 3] and kinds(kept) == ["plan"]
+    assert told == [{"acts": 1}, {"acts": 2}]
+    prepared.resumed(kept).side(prepared.view, (), NONE, pytest.fail)
+
+
+def test_a_plan_under_way_is_written_down_now_and_then(prepared, tmp_path, monkeypatch):
+    """A quarter of a minute apart; farther where writing takes long, so that it takes next to nothing of the time."""
+    clock = [0.0]
+    monkeypatch.setattr(resume, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    written: list[float] = []
+
+    def now(seconds: float) -> PlanNow:
+        written.append(clock[0])
+        clock[0] += seconds
+        return UNDER_WAY
+
+    def make(keeper: Keeper) -> Side:
+        for k in range(4000):
+            clock[0] = max(clock[0], 0.1 * k)
+            keeper.done(partial(now, 0.0 if k < 500 else 2.0))
+        return prepared.side()
+
+    prepared.resumed(Kept(tmp_path / "kept")).side(prepared.view, (), NONE, make)
+    assert written == pytest.approx([15.0, 30.0, 45.0, 60.0, 182.0, 304.0], abs=0.2)
+
+
+@pytest.mark.parametrize("words", [b"null", b"[1,2]", b'{"c":["Plan",[],[]]}'])
+def test_what_is_no_plan_under_way_is_thrown_away(prepared, tmp_path, monkeypatch, words):
+    monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
+    kept = Kept(tmp_path / "kept")
+
+    def make(keeper: Keeper) -> Side:
+        keeper.done(lambda: UNDER_WAY)
+        (path,) = (tmp_path / "kept").iterdir()
+        kept.put(*path.name.split("-"), len(words).to_bytes(8, "little") + words)
+        assert keeper.taken(lambda now: now) is None and not path.exists()
+        return prepared.side()
+
+    prepared.resumed(kept).side(prepared.view, (), NONE, make)
+
+
 def test_what_came_from_anything_else_is_not_taken_over(prepared, tmp_path, monkeypatch):
     kept = Kept(tmp_path / "kept")
     assert prepared.asked(kept) == 1
@@ -222,7 +325,7 @@ def test_what_cannot_be_packed_or_written_does_not_stop_a_job(prepared, tmp_path
     assert prepared.asked(Kept(tmp_path / "file" / "kept")) == 1
     odd = Side(prepared.view, Plan((object(),), ()), 12.5, None)  # type: ignore[arg-type]
     kept = Kept(tmp_path / "kept")
-    assert prepared.resumed(kept).side(prepared.view, (), NONE, lambda: odd).made is odd.made
+    assert prepared.resumed(kept).side(prepared.view, (), NONE, lambda _: odd).made is odd.made
     assert not (tmp_path / "kept").exists()
 
 
