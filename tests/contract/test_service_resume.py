@@ -1,4 +1,4 @@
-"""A worker is killed when it has planned: the next attempt begins with the proof, and nobody sees that in the files."""
+"""A worker is killed while it plans or when it has planned: the next attempt goes on there, and no file shows it."""
 
 import json
 import os
@@ -123,10 +123,10 @@ def test_a_service_killed_in_a_proof_begins_the_next_attempt_with_it(serve, post
     _, client = serve()
     ready(client)
     found = ended(client, job)
-    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "proofs": 0})
+    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "steps": 0, "proofs": 0})
     assert what_was_done(data) == ["planned", "proved"] and nothing_is_kept(data)
     with client.stream("GET", job["links"]["events"]) as stream:
-        assert '"resumed": {"plans": 1, "proofs": 0}' in "".join(stream.iter_text())
+        assert '"resumed":{"plans":1,"steps":0,"proofs":0}' in "".join(stream.iter_text())
     files = files_of(client, found)
     assert files == plain(small, "worker", tmp_path) and "program.linuxcnc.ngc" in files
 
@@ -136,10 +136,24 @@ def test_a_child_killed_in_a_proof_is_started_again_with_it(serve, post, small, 
     _, client = serve()
     ready(client)
     found = ended(client, posted(client, post, small, "child"))
-    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 1, {"plans": 1, "proofs": 0})
+    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 1, {"plans": 1, "steps": 0, "proofs": 0})
     assert what_was_done(tmp_path / "data") == ["planned", "proved"] and nothing_is_kept(tmp_path / "data")
     calm = ended(client, posted(client, post, small, "nobody"))
     assert (calm["state"], calm["attempt"], calm["resumed"]) == ("proved", 1, None)
+
+
+@pytest.mark.slow
+def test_a_child_killed_in_a_plan_is_started_again_in_the_middle_of_it(serve, post, small, tmp_path):
+    _, client = serve()
+    ready(client)
+    found = ended(client, posted(client, post, small, "child in a plan"))
+    assert (found["state"], found["attempt"]) == ("proved", 1)
+    assert found["resumed"]["plans"] == found["resumed"]["proofs"] == 0 and found["resumed"]["steps"] >= 1
+    said, proved = what_was_done(tmp_path / "data")
+    assert proved == "proved" and nothing_is_kept(tmp_path / "data")
+    files = files_of(client, found)
+    assert files == plain(small, "child in a plan", tmp_path) and "program.linuxcnc.ngc" in files
+    assert int(said.partition(":")[2]) > 0
 
 
 @pytest.mark.slow
@@ -151,7 +165,7 @@ def test_a_worker_of_a_cluster_goes_on_with_what_another_one_planned(postgres, f
         until(lambda: client.get("/readyz").status_code == 200)
         found = ended(client, posted(client, post, small, "worker"))
         assert sum(w.poll() is not None for w in workers) == 1
-        assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "proofs": 0})
+        assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "steps": 0, "proofs": 0})
         assert what_was_done(tmp_path / "data") == ["planned", "proved"] and nothing_is_kept(tmp_path / "data")
         assert files_of(client, found) == plain(small, "worker", tmp_path)
     finally:

@@ -102,6 +102,12 @@ def angle_of_a_block() -> Case:
     return plan_part(corner(), [ball(3.0), tool(4.0, 0.0, "T2")], scallop=0.05, near_net=False)
 
 
+@cache
+def beside_a_block() -> Case:
+    """The shank of the tool meets stock that other zones have to take off first."""
+    return plan_part(corner(), [ball(3.0, neck=4.5, shank=8.0)], near_net=False, spare=6.0, density=8.0, scallop=0.05)
+
+
 def bounded(case: Case) -> dict[str, CutData]:
     fine = {t: CutData(10_000, 500, 200, 3000, 0.3 * f.tool.diameter, 1.2) for t, f in case.fields.items()}
     return {t: replace(c, feed=800, finish=c) for t, c in fine.items()}
@@ -132,13 +138,14 @@ JOBS: dict[str, Callable[[], Job]] = {
     "layers alone": lambda: Job(angle(), planes=(4.5,), finishing=False),
     "finish alone": lambda: Job(angle(), planes=(4.5,), roughing=False),
     "hollows": lambda: Job(angle_of_a_block(), seen_from_aside, planes=(4.5,)),
+    "short neck": lambda: Job(beside_a_block(), roughing=False),
     "along borders": along_borders,
     "engaged limit": lambda: Job(angle(), cut=bounded(angle()), planes=(4.5,)),
 }
-LONG = "engaged limit"
+LONG = ("engaged limit", "short neck")
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == LONG else n for n in JOBS])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in JOBS])
 def test_a_plan_cut_off_after_every_act_ends_as_one_that_was_not(name):
     job = JOBS[name]()
     states, kept, plan, end = job.whole()
@@ -147,6 +154,8 @@ def test_a_plan_cut_off_after_every_act_ends_as_one_that_was_not(name):
     assert plan.steps[0].id == "S04" and made[-1] == len(plan.steps) > 1
     hollows = [s.stock.cut is not None and len(s.stock.cut) > 0 for s in states]
     assert any(hollows) if name == "hollows" else not any(hollows)
+    met = any(f.met.any() for s in states for t in s.tools for f in t.finishes)
+    assert met or name != "short neck"
     along = [s.zone for s in plan.steps if s.strategy == "isoparametric"]
     assert along.count("Z1") == (2 if name == "along borders" else 0)  # once in each band
     job.broken(kept, end)

@@ -1,17 +1,22 @@
 """The real chain, but what the setup's label "kill" names dies once, of SIGKILL, when a job has been planned.
 
-"worker": the process that runs the child, which is the service itself where it is embedded; "child": the child. Every
-plan and every proof leaves a line in the file "done" beside the folders of what is kept.
+"worker": the process that runs the child, which is the service itself where it is embedded; "child": the child;
+"child in a plan": the child, after ``ACTS`` acts of the first plan. Every plan and every proof leaves a line in the file
+"done" beside the folders of what is kept, every plan that was under way with how many acts it still had to do.
 """
 
 import os
 import signal
 
 import service.chain as chain
+import service.resume as resume
 from service.chain import verify_program, zones_only  # noqa: F401
 from toolpath.plan import plan_job
+from toolpath.underway import Keeper
 
 PROVE = chain.prove
+ACTS = 3
+resume.ACTS_EVERY_S = resume.ACTS_PAUSE = 0.0  # each act is kept
 
 
 def plan(part_path, setup, out, progress, kept=None, **more):
@@ -22,17 +27,31 @@ def plan(part_path, setup, out, progress, kept=None, **more):
         with done.open("a") as handle:
             handle.write(f"{what}\n")
 
-    def planner(*args, **given):
-        made = plan_job(*args, **given)
-        said("planned")
+    def die(who):
+        mark = done.with_name("died")
+        if who and not mark.exists():
+            mark.touch()
+            os.kill(os.getppid() if who == "worker" else os.getpid(), signal.SIGKILL)
+            signal.pause()
+
+    class Watched(Keeper):
+        def __init__(self, keeper):
+            self.taken, self.keep, self.acts = keeper.taken, keeper.done, 0
+
+        def done(self, now):
+            self.keep(now)
+            self.acts += 1
+            if self.acts == ACTS and setup.labels["kill"] == "child in a plan":
+                die("child")
+
+    def planner(*args, keeper, **given):
+        watched = Watched(keeper)
+        made = plan_job(*args, keeper=watched, **given)
+        said(f"planned:{watched.acts}" if setup.labels["kill"] == "child in a plan" else "planned")
         return made
 
     def prove(*args, **given):
-        mark = done.with_name("died")
-        if setup.labels["kill"] != "nobody" and not mark.exists():
-            mark.touch()
-            os.kill(os.getppid() if setup.labels["kill"] == "worker" else os.getpid(), signal.SIGKILL)
-            signal.pause()
+        die({"worker": "worker", "child": "child"}.get(setup.labels["kill"]))
         proof = PROVE(*args, **given)
         said("proved")
         return proof
