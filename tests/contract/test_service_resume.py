@@ -19,6 +19,7 @@ from tests.step_files import write_step
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
 PATIENCE_S = 200.0
+PLANNED = {"plans": 1, "steps": 0, "proofs": 0}
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
 SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0}}
 PLAIN = """
@@ -123,7 +124,7 @@ def test_a_service_killed_in_a_proof_begins_the_next_attempt_with_it(serve, post
     _, client = serve()
     ready(client)
     found = ended(client, job)
-    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "steps": 0, "proofs": 0})
+    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, PLANNED)
     assert what_was_done(data) == ["planned", "proved"] and nothing_is_kept(data)
     with client.stream("GET", job["links"]["events"]) as stream:
         assert '"resumed":{"plans":1,"steps":0,"proofs":0}' in "".join(stream.iter_text())
@@ -136,7 +137,7 @@ def test_a_child_killed_in_a_proof_is_started_again_with_it(serve, post, small, 
     _, client = serve()
     ready(client)
     found = ended(client, posted(client, post, small, "child"))
-    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 1, {"plans": 1, "steps": 0, "proofs": 0})
+    assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 1, PLANNED)
     assert what_was_done(tmp_path / "data") == ["planned", "proved"] and nothing_is_kept(tmp_path / "data")
     calm = ended(client, posted(client, post, small, "nobody"))
     assert (calm["state"], calm["attempt"], calm["resumed"]) == ("proved", 1, None)
@@ -165,7 +166,7 @@ def test_a_worker_of_a_cluster_goes_on_with_what_another_one_planned(postgres, f
         until(lambda: client.get("/readyz").status_code == 200)
         found = ended(client, posted(client, post, small, "worker"))
         assert sum(w.poll() is not None for w in workers) == 1
-        assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, {"plans": 1, "steps": 0, "proofs": 0})
+        assert (found["state"], found["attempt"], found["resumed"]) == ("proved", 2, PLANNED)
         assert what_was_done(tmp_path / "data") == ["planned", "proved"] and nothing_is_kept(tmp_path / "data")
         assert files_of(client, found) == plain(small, "worker", tmp_path)
     finally:

@@ -1,8 +1,8 @@
 """The real chain, but what the setup's label "kill" names dies once, of SIGKILL, when a job has been planned.
 
 "worker": the process that runs the child, which is the service itself where it is embedded; "child": the child;
-"child in a plan": the child, after ``ACTS`` acts of the first plan. Every plan and every proof leaves a line in the file
-"done" beside the folders of what is kept, every plan that was under way with how many acts it still had to do.
+"child in a plan": the child, after ``ACTS`` acts of the first plan. Every plan and every proof leaves a line in the
+file "done" beside the folders of what is kept, with "child in a plan" a plan also how many acts it still had to do.
 """
 
 import os
