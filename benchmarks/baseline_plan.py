@@ -26,7 +26,6 @@ from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
-from toolpath.underway import NOTHING, Keeper
 from toolpath.walked import Depths, Walked
 from zones.reach import TipField
 from zones.zoning import ZoneArea
@@ -53,8 +52,8 @@ class Plain(Finish):
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Callable[[float], None] | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: Keeper = NOTHING) -> Plan:
-    """Plan all zones, tool by tool; arguments as of ``toolpath.plan.plan_job``, the last two are not looked at."""
+             trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
+    """Plan all zones, tool by tool; arguments as of ``toolpath.plan.plan_job``, ``trimmed`` is not looked at."""
     settings = replace(settings, turning=None, pattern=Pattern.ZIGZAG)
     steps: list[Workingstep] = []
     begun: list[Finish] = []

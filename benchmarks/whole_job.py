@@ -59,7 +59,7 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
     from geometry.errors import CamError
     from schemas.setup import Setup
     from service import chain
-    from toolpath.plan import plan_job
+    from toolpath.plan import Plan, plan_job
 
     if spacing is not None:
         usual = chain.proof_setup
@@ -74,10 +74,16 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
         if tool["diameter_mm"] >= BOUNDED:
             tool["max_engagement_deg"] = engaged
     stages = Stages()
+
+    def plain(*given: Any, keeper: Any, **named: Any) -> Plan:
+        """The baseline as the chain calls it today; it is planned in one go."""
+        del keeper
+        return baseline_plan.plan_job(*given, **named)
+
     facts = {"part": part, "axes": axes, "plan": plan, "spacing": spacing, "engaged_limit": engaged}
     try:
         report = chain.plan(step, Setup.model_validate(setup), folder / "job", stages,
-                            planner=baseline_plan.plan_job if plan == "baseline" else plan_job)
+                            planner=plain if plan == "baseline" else plan_job)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
     met = [t["engagement_deg"] | {"id": t["id"]} for t in report["tools"] if t["engagement_deg"]]
