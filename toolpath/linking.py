@@ -1,6 +1,7 @@
 """Passes joined to one safe motion: how the tool comes in, gets across and gets out.
 
-Stock that stands higher over a pass than the flutes reach is first walked off above it. Then, in this order of trying
+Stock that stands higher over a pass than the flutes reach is first walked off above it, and in a gap that the tool only
+just fits layer by layer. Then, in this order of trying
 1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
    more stock than a layer; down to a deeper level in air, there or beside its start, or along the pass itself, never
    steeper than the ramp angle.

@@ -64,19 +64,23 @@ class Travel:
     at: F64 | None = None
 
     def here(self) -> F64:
+        """(3,) mm, where the tool is; it has to be somewhere."""
         assert self.at is not None
         return self.at
 
     def feed(self, motion: Motion, points: F64, feed: float) -> None:
+        """Go along points (n, 3), mm, from where the tool is, at a feed, mm/min, and take off what is met."""
         self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
 
     def rapid(self, points: F64) -> None:
+        """Go along points (n, 3), mm, as a rapid; nothing is taken off."""
         self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
         self.at = points[-1]
 
     def lift(self) -> None:
+        """Up to the clearance plane, as a rapid from where no stock is beside the tool."""
         if self.at is None or self.at[2] >= self.motions.clearance - 1e-9:
             return
         x, y, z = self.at
@@ -87,6 +91,7 @@ class Travel:
             self.rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
     def come_down(self, start: F64) -> None:
+        """Get to a place (3,), mm, from above: straight over what is between, or by the clearance plane."""
         x, y, z = start
         way = self._across(start)
         if way is not None:
@@ -159,6 +164,7 @@ class Travel:
         return min(IN_FRONT * self.field.tool.diameter, MOST_IN_FRONT)
 
     def free_move(self, a: F64, b: F64, z: float) -> bool:
+        """Whether the tool is free, as ``free`` has it, straight from a to b, (2,) mm, at height z, mm."""
         n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
         return self.free(np.column_stack([a + t * (b - a), np.full(n, z)]))
@@ -171,6 +177,7 @@ class Travel:
         return not bool(self.stock.meets_bodies(tips, self.field.discs).any())
 
     def limit(self, tip: F64) -> float:
+        """mm: how low the tip may go at a place (3,), mm, for the part and what stands fixed."""
         return float(self.field.tips(tip[None, :2])[0])
 
     def nothing_stands(self, way: F64) -> bool:
