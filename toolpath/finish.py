@@ -34,6 +34,7 @@ from toolpath.posed import enters
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
+from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
@@ -205,7 +206,8 @@ class Finish:
         field, settings = self.field, self.settings
         met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
         assert settings.turning is not None
-        return Surroundings(met, settings.turning, self.stock.copied(), field.discs, field.clear)
+        skins = Skins(self.residual.copied(), settings.scallop_height, self.stock.lattice.step)
+        return Surroundings(met, settings.turning, self.stock.copied(), field.discs, field.clear, skins)
 
     def _led(self, step_id: str, name: str, runs: Sequence[tuple[Trajectory, ...]],
              wanted: NDArray[np.bool_]) -> list[Workingstep]:

@@ -25,6 +25,7 @@ from toolpath.piece import LEAST_PIECE, Piece, places_along, raised_poses, thinn
 from toolpath.posed import Blocked
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.shell import shells
+from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from zones.reach import Clearances, Disc
 
@@ -58,6 +59,7 @@ class Surroundings:
     stock   : StockMap as it stands; passes are taken off it, one after the other
     discs   : shank and holder with their clearance
     clear   : Clearances
+    skins   : what stands on the samples of the zone, taken off likewise; None where nobody measured it
     """
 
     enters: Blocked
@@ -65,6 +67,7 @@ class Surroundings:
     stock: StockMap
     discs: tuple[Disc, ...]
     clear: Clearances
+    skins: Skins | None = None
 
     def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
         """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
@@ -74,8 +77,28 @@ class Surroundings:
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
         """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank or
-        ``under`` mm under the end, as ``loaded`` has it."""
-        return loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick, under)
+        ``under`` mm under the end, as ``loaded`` has it, or neck, shank or holder may be in a skin on a wall."""
+        out = loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick, under)
+        free = np.flatnonzero(~out)
+        if self.skins is not None and len(free):
+            out[free] = self.skins.near(tips[free], axes[free], tool, self.discs, self.clear)
+        return out
+
+    def copied(self) -> Surroundings:
+        """The same with stock of its own."""
+        return replace(self, stock=self.stock.copied(), skins=None if self.skins is None else self.skins.copied())
+
+    def become(self, other: Surroundings) -> None:
+        """Take over the stock of a copy."""
+        self.stock.become(other.stock)
+        if self.skins is not None and other.skins is not None:
+            self.skins.become(other.skins)
+
+    def cut(self, tips: F64, axes: F64, tool: ToolBody) -> None:
+        """Take a pass off stock and skins."""
+        self.stock.cut_leaning(tips, axes, tool)
+        if self.skins is not None:
+            self.skins.cut_leaning(tips, axes, tool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +124,14 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
     refused: list[str] = []
     for name, piece in found:
         layers = lowered(piece, tool, around) if piece.on_end else [piece]
-        before = around.stock.copied() if len(layers) > 1 else None
+        before = around.copied() if len(layers) > 1 else None
         mine: list[tuple[Trajectory, ...]] = []
         for layer in layers:
             made, why = _walked(layer, tool, cut, settings, around)
             refused += [f"{name}: {reason}" for reason in why]
             mine += made
         if before is not None and not made:  # layers for nothing
-            around.stock.become(before)
+            around.become(before)
             mine = []
         runs += mine
     return Runs(tuple(runs), tuple(dict.fromkeys(refused)))
@@ -127,7 +150,7 @@ def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
         runs.append(made)
         for t in made:
             if t.motion is Motion.CUT and t.axes is not None:
-                around.stock.cut_leaning(t.points, t.axes, tool)
+                around.cut(t.points, t.axes, tool)
     return runs, refused
 
 

@@ -1,0 +1,124 @@
+"""Skins on walls that the lattice of the stock does not show, against neck, shank and holder of a leaning tool."""
+
+import numpy as np
+import pytest
+import shapely
+
+from geometry.bvh import TriangleTree
+from tests.hand_parts import ball, box_mesh
+from toolpath.kernels.skins import near
+from toolpath.leaning import Surroundings, free_parts
+from toolpath.piece import Piece
+from toolpath.residual import ResidualMap
+from toolpath.settings import PlanSettings, Turning
+from toolpath.skins import Skins, behind
+from toolpath.stock import StockMap
+from zones.reach import Clearances, Disc
+
+SCALLOP, STEP = 0.02, 0.15
+TOOL = ball(1.5, neck=15.0, shank=4.0, stickout=31.0)  # flutes 3 mm, neck 1.425: 0.0375 relieved, 0.01875 kept clear
+UPRIGHT = np.array([[0.0, 0.0, 1.0]])
+
+
+def wall():
+    """Samples of an upright wall in the plane y = 0, 10 mm long and 12 high, the tool at y < 0."""
+    x, z = (v.ravel() for v in np.meshgrid(np.arange(0.0, 10.01, 0.25), np.arange(0.0, 12.01, 0.25)))
+    points = np.column_stack([x, 0.0 * x, z])
+    return ResidualMap(points, np.tile([0.0, -1.0, 0.0], (len(x), 1)), margin=1.5 * SCALLOP)
+
+
+def beside(z, x=(1.0, 9.0), off=0.0):
+    """Tips of a pass along the wall, its flank on it, or off it by so many mm."""
+    at = np.arange(x[0], x[1] + 1e-9, 0.2)
+    return np.column_stack([at, np.full(len(at), -0.75 - off), np.full(len(at), z)])
+
+
+def near_of(skins, tips, discs=()):
+    return skins.near(tips, np.tile(UPRIGHT, (len(tips), 1)), TOOL, discs, Clearances())
+
+
+def test_a_body_is_near_what_it_is_nearer_to_than_its_room():
+    """Against the distance to a rectangle in the half plane through the axis."""
+    rng = np.random.default_rng(5)
+    tips, axes = rng.uniform(-2, 2, (40, 3)), rng.normal(size=(40, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    points, rooms = rng.uniform(-5, 5, (60, 3)), rng.uniform(0.0, 2.5, 60)
+    bodies = np.array([[0.5, 1.0, 3.0], [1.2, 3.0, 4.0], [2.0, 4.5, np.inf]])
+    got = np.zeros((40, 60), bool)
+    for i in range(60):
+        near(tips, axes, points[i:i + 1], rooms[i:i + 1], bodies, got[:, i])
+    q = points[None] - tips[:, None]
+    h = np.einsum("kij,kj->ki", q, axes)
+    rho = np.linalg.norm(q - h[..., None] * axes[:, None], axis=2)
+    boxes = [shapely.box(0.0, b, r, min(e, 99.0)) for r, b, e in bodies]
+    far = np.min([shapely.distance(box, shapely.points(rho, h)) for box in boxes], axis=0)
+    assert np.array_equal(got, far < rooms)
+    assert 0.05 < got.mean() < 0.6
+    whole = np.zeros(40, bool)
+    near(tips, axes, points, rooms, bodies, whole)
+    assert np.array_equal(whole, got.any(axis=1))
+
+
+def test_a_neck_is_kept_off_where_no_pass_has_been_until_one_has():
+    """The flank of the pass at z = 2 ends at 5, its neck is 0.0375 mm off the wall above: there nothing was cut."""
+    skins, tips = Skins(wall(), SCALLOP, STEP), beside(2.0)
+    assert near_of(skins, tips).all()
+    skins.cut_leaning(beside(8.0, (0.0, 10.0)), np.tile(UPRIGHT, (51, 1)), TOOL)  # cuts from 8.75 to 11
+    assert near_of(skins, tips).all()
+    skins.cut_leaning(beside(4.5, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)  # from 5.25 to 7.5, half the length
+    skins.cut_leaning(beside(6.0, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
+    skins.cut_leaning(beside(9.5, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
+    skins.cut_leaning(beside(3.5, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
+    met = near_of(skins, tips)
+    assert not met[tips[:, 0] < 4.2].any() and met[tips[:, 0] > 5.0].all()
+
+
+def test_what_a_finish_leaves_is_no_skin_and_more_is():
+    for left, want in ((SCALLOP, False), (1.3 * SCALLOP, True)):
+        residual = wall()
+        residual.residual[:] = left
+        skins = Skins(residual, SCALLOP, STEP)
+        assert near_of(skins, beside(2.0)).all() == want
+        assert not near_of(skins, beside(2.0, off=0.1)).any()
+
+
+@pytest.mark.parametrize(("radius", "want"), [(5.0, False), (6.7, True)])
+def test_a_holder_is_held_against_skins_too(radius, want):
+    residual = wall()
+    residual.residual[residual.points[:, 2] < 11.0] = 0.0
+    skins = Skins(residual, SCALLOP, STEP)
+    assert near_of(skins, beside(1.0, off=5.5), [Disc("holder", radius, 8.0)]).all() == want
+
+
+def test_a_copy_is_lowered_alone_and_taken_over():
+    skins = Skins(wall(), SCALLOP, STEP)
+    other = skins.copied()
+    for z in (3.5, 4.5, 6.0, 8.0, 9.5):
+        other.cut_leaning(beside(z, (0.0, 10.0)), np.tile(UPRIGHT, (51, 1)), TOOL)
+    tips = beside(2.0)
+    assert near_of(skins, tips).all() and not near_of(other, tips).any()
+    skins.become(other)
+    assert not near_of(skins, tips).any()
+
+
+def test_no_neck_has_no_body():
+    assert behind(ball(1.5, neck=3.0, stickout=20.0), (), Clearances()).shape == (0, 3)
+    assert behind(TOOL, (), Clearances()) == pytest.approx(np.array([[0.7125 + 0.01875, 3.0, 15.0]]))
+
+
+def test_a_pass_is_left_out_where_its_neck_would_rub():
+    """Seed 156 of the five-axis sweep: the band above was raised over part of its way, and the lattice saw nothing."""
+    part = TriangleTree(box_mesh([-2, -8, -2], [12, 4, 0]))
+    stock = StockMap.box(part, np.array([-2.0, -8.0, -2.0]), np.array([12.0, 4.0, 0.0]), STEP)
+    free = Turning(lambda a: np.ones(len(a), bool), lambda t, a: None, np.array([0.0, 0.0, 1.0]), -1e3)
+    skins = Skins(wall(), SCALLOP, STEP)
+    for z in (3.5, 4.5, 6.0, 8.0, 9.5):
+        skins.cut_leaning(beside(z, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
+    around = Surroundings(lambda tips, axes: np.zeros(len(tips), bool), free, stock, (), Clearances(), skins)
+    tips = beside(2.0)
+    axes = np.tile(UPRIGHT, (len(tips), 1))
+    piece = Piece(tips, axes, np.tile([[0.0, -1.0, 0.0]], (len(tips), 1)), 3.0)
+    settings = PlanSettings(SCALLOP, 0.002, 0.0, 0.0, 20.0, 19.0, np.radians(5.0), turning=free)
+    parts = free_parts(piece, TOOL, settings, around)
+    assert len(parts) == 1
+    assert parts[0].tips[:, 0].max() < 5.1 and parts[0].tips[:, 0].min() == pytest.approx(1.0)
