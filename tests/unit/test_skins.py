@@ -1,23 +1,33 @@
 """Skins on walls that the lattice of the stock does not show, against neck, shank and holder of a leaning tool."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from geometry.bvh import TriangleTree
-from tests.hand_parts import ball, box_mesh
+from tests.hand_parts import ball, box_mesh, low_walls, plan_part
+from toolpath.family import Target
+from toolpath.finish import Finish
 from toolpath.kernels.skins import near
-from toolpath.leaning import Surroundings, free_parts
+from toolpath.leaning import LOADED, Surroundings, free_parts, in_turn
 from toolpath.piece import Piece
 from toolpath.residual import ResidualMap
-from toolpath.settings import PlanSettings, Turning
+from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.skins import Skins, behind
 from toolpath.stock import StockMap
+from zones.machinable import Form
 from zones.reach import Clearances, Disc
 
 SCALLOP, STEP = 0.02, 0.15
 TOOL = ball(1.5, neck=15.0, shank=4.0, stickout=31.0)  # flutes 3 mm, neck 1.425: 0.0375 relieved, 0.01875 kept clear
+ABOVE = (9.5, 8.0, 6.0, 4.5, 3.5)  # tips of passes that cut the wall from 4.25 up, each with a free neck
 UPRIGHT = np.array([[0.0, 0.0, 1.0]])
+
+FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+               np.array([0.0, 0.0, 1.0]), -100.0)
+SETTINGS = PlanSettings(SCALLOP, 0.002, 0.0, 0.0, 20.0, 19.0, np.radians(5.0), turning=FREE)
 
 
 def wall():
@@ -93,7 +103,7 @@ def test_a_holder_is_held_against_skins_too(radius, want):
 def test_a_copy_is_lowered_alone_and_taken_over():
     skins = Skins(wall(), SCALLOP, STEP)
     other = skins.copied()
-    for z in (3.5, 4.5, 6.0, 8.0, 9.5):
+    for z in ABOVE:
         other.cut_leaning(beside(z, (0.0, 10.0)), np.tile(UPRIGHT, (51, 1)), TOOL)
     tips = beside(2.0)
     assert near_of(skins, tips).all() and not near_of(other, tips).any()
@@ -106,19 +116,58 @@ def test_no_neck_has_no_body():
     assert behind(TOOL, (), Clearances()) == pytest.approx(np.array([[0.7125 + 0.01875, 3.0, 15.0]]))
 
 
-def test_a_pass_is_left_out_where_its_neck_would_rub():
-    """Seed 156 of the five-axis sweep: the band above was raised over part of its way, and the lattice saw nothing."""
+def around_the_wall(skins):
+    """On a plate that no tool reaches, with nothing on it that the lattice shows."""
     part = TriangleTree(box_mesh([-2, -8, -2], [12, 4, 0]))
     stock = StockMap.box(part, np.array([-2.0, -8.0, -2.0]), np.array([12.0, 4.0, 0.0]), STEP)
-    free = Turning(lambda a: np.ones(len(a), bool), lambda t, a: None, np.array([0.0, 0.0, 1.0]), -1e3)
-    skins = Skins(wall(), SCALLOP, STEP)
-    for z in (3.5, 4.5, 6.0, 8.0, 9.5):
-        skins.cut_leaning(beside(z, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
-    around = Surroundings(lambda tips, axes: np.zeros(len(tips), bool), free, stock, (), Clearances(), skins)
-    tips = beside(2.0)
+    return Surroundings(lambda tips, axes: np.zeros(len(tips), bool), FREE, stock, (), Clearances(), skins)
+
+
+def pass_at(z, x=(1.0, 9.0)):
+    tips = beside(z, x)
     axes = np.tile(UPRIGHT, (len(tips), 1))
-    piece = Piece(tips, axes, np.tile([[0.0, -1.0, 0.0]], (len(tips), 1)), 3.0)
-    settings = PlanSettings(SCALLOP, 0.002, 0.0, 0.0, 20.0, 19.0, np.radians(5.0), turning=free)
-    parts = free_parts(piece, TOOL, settings, around)
-    assert len(parts) == 1
-    assert parts[0].tips[:, 0].max() < 5.1 and parts[0].tips[:, 0].min() == pytest.approx(1.0)
+    return Piece(tips, axes, np.tile([[0.0, -1.0, 0.0]], (len(tips), 1)), 3.0)
+
+
+def test_a_pass_is_left_out_where_its_neck_would_rub():
+    """Seed 156 of the five-axis sweep: the band above was raised over part of its way, and the lattice saw nothing."""
+    skins = Skins(wall(), SCALLOP, STEP)
+    for z in ABOVE:
+        skins.cut_leaning(beside(z, (0.0, 5.0)), np.tile(UPRIGHT, (26, 1)), TOOL)
+    (left,) = free_parts(pass_at(2.0), TOOL, SETTINGS, around_the_wall(skins))
+    assert left.tips[:, 0].max() < 5.1 and left.tips[:, 0].min() == pytest.approx(1.0)
+
+
+def test_passes_are_taken_off_the_skins_one_after_the_other():
+    def walked(*pieces):
+        made = in_turn([("F1", p) for p in pieces], TOOL, CutData(10_000, 800, 200, 3000, 0.75), SETTINGS,
+                       around_the_wall(Skins(wall(), SCALLOP, STEP)))
+        return [min(t.points[:, 2].min() for t in run) for run in made.runs], made.refused
+
+    above = [pass_at(z, (0.0, 10.0)) for z in ABOVE]
+    assert walked(pass_at(2.0)) == ([], (f"F1: {LOADED}",))
+    assert walked(*above, pass_at(2.0)) == (pytest.approx([*ABOVE, 2.0]), ())
+
+
+def test_surroundings_become_those_of_a_copy():
+    around = around_the_wall(Skins(wall(), SCALLOP, STEP))
+    other, one = around.copied(), pass_at(2.0)
+    for z in ABOVE:
+        other.cut(beside(z, (0.0, 10.0)), np.tile(UPRIGHT, (51, 1)), TOOL)
+    assert around.met(one.tips, one.axes, TOOL, 0.18).all()
+    around.become(other)
+    assert not around.met(one.tips, one.axes, TOOL, 0.18).any()
+
+
+def test_a_zone_knows_its_skins_as_it_measured_them():
+    c = plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")])
+    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    finish = Finish(zone, check, c.fields[zone.tool.id], CutData(10_000, 800, 200, 3000, 0.75), c.stock_before,
+                    replace(c.settings, turning=FREE))
+    finish.residual.residual[:7] = 0.001
+    skins = finish._surroundings().skins
+    assert np.array_equal(skins.residual.residual, finish.residual.residual)
+    assert (skins.finished, skins.most) == (c.settings.scallop_height, c.stock_before.lattice.step)
+    skins.cut_leaning(zone.tips, np.tile(UPRIGHT, (len(zone.tips), 1)), zone.tool)
+    assert not np.array_equal(skins.residual.residual, finish.residual.residual)
