@@ -396,12 +396,8 @@ def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lea
         return np.array([tip + aside, tip])
 
     if piece.on_end:
-        on_the_spot = [(tip[None], 0.0, skin)]
-        way = tip - piece.tips[1:]
-        way = way - (way @ axis)[:, None] * axis
-        size = np.linalg.norm(way, axis=1)
-        far = np.flatnonzero(size > LEAST_WAY)
-        return [*((straight(room * way[k] / size[k]), 0.0, 0.0) for k in far[:1].tolist()), *on_the_spot]
+        on_the_spot, ahead = [(tip[None], 0.0, skin)], _ahead(piece)
+        return on_the_spot if ahead is None else [(straight(-room * ahead), 0.0, 0.0), *on_the_spot]
     aside = piece.away[0] - (piece.away[0] @ axis) * axis
     aside /= np.linalg.norm(aside)
     down_the_wall = [(tip[None], thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []
@@ -409,22 +405,26 @@ def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lea
             (straight(0.25 * room * aside), 0.0, 0.0), *down_the_wall]
 
 
+def _ahead(piece: Piece) -> F64 | None:
+    """(3,) float64, unit: where a pass goes first, square to the tool; None where it stays where it begins."""
+    axis, way = piece.axes[0], piece.tips[1:] - piece.tips[0]
+    way = way - (way @ axis)[:, None] * axis
+    size = np.linalg.norm(way, axis=1)
+    far = np.flatnonzero(size > LEAST_WAY)
+    return way[far[0]] / size[far[0]] if len(far) else None
+
+
 def _arcs_onto(piece: Piece, tool: ToolBody, aside: F64, chord: float) -> list[F64]:
     """Arcs (k, 3), mm, onto the beginning of a pass, square to the tool there.
 
     aside : (3,) float64, unit, off the wall; chord : mm, what the chords of the arcs may be under them
     """
-    axis, tip = piece.axes[0], piece.tips[0]
-    way = piece.tips[1:] - tip
-    way = way - (way @ axis)[:, None] * axis
-    size = np.linalg.norm(way, axis=1)
-    far = np.flatnonzero(size > LEAST_WAY)
-    if not len(far):
+    ahead = _ahead(piece)
+    if ahead is None:
         return []
-    ahead = way[far[0]] / size[far[0]]
     off = aside - (aside @ ahead) * ahead
     if float(np.linalg.norm(off)) < SQUARE:
         return []
     length = float(np.linalg.norm(np.diff(piece.tips, axis=0), axis=1).sum())
     off /= np.linalg.norm(off)
-    return [arc_onto(tip, ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MOST_LEAD]
+    return [arc_onto(piece.tips[0], ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MOST_LEAD]
