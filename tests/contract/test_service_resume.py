@@ -113,6 +113,7 @@ def nothing_is_kept(data):
     return not list(data.glob("kept/*/*"))
 
 
+@pytest.mark.slow
 def test_a_service_killed_in_a_proof_begins_the_next_attempt_with_it(serve, post, small, tmp_path):
     process, client = serve()
     ready(client)

@@ -56,7 +56,7 @@ def test_from_a_standing_bar(part: Path, tmp_path: Path) -> None:
     assert not same["findings"]
 
 
-@pytest.mark.parametrize("direction", [[0, 1, 0], [0, 0.6, 0.8]])
+@pytest.mark.parametrize("direction", [pytest.param([0, 1, 0], marks=pytest.mark.slow), [0, 0.6, 0.8]])
 def test_from_a_bar_that_lies_or_leans_along_the_access(part: Path, tmp_path: Path, direction: list[float]) -> None:
     stock = {"kind": "cylinder", "cylinder_mm": BAR, "uncertainty_mm": 0.1}
     report = planned(part, tmp_path, stock=stock, access=[{"direction": direction}])

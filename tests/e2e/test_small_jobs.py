@@ -151,6 +151,7 @@ def test_warm_fails_where_the_small_part_is_not_proved(monkeypatch):
     assert problem["code"] == "not_as_installed" and problem["subjects"] == ["T1 cuts into the part"]
 
 
+@pytest.mark.slow
 def test_a_bull_nose_finishes_rounds_that_go_over_into_a_level_plane(tmp_path):
     """Its tip is not given by a contact on the level edge; both strategies are tried there and one is proved."""
     shape = cq.Workplane().box(10, 8, 4, centered=False).edges("|Y and >Z").fillet(2)

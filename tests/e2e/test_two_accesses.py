@@ -67,6 +67,7 @@ def test_each_access_has_its_zones_and_half_of_the_walls(job: tuple[Path, Setup,
     assert report["connections"][0]["walls"] == ["W1", "W1"]
 
 
+@pytest.mark.slow
 def test_a_program_is_proved_along_its_own_access(frame: Path, job: tuple[Path, Setup, dict[str, Any]]) -> None:
     out, setup, _ = job
     text = (out / "program.A2.linuxcnc.ngc").read_text()

@@ -85,7 +85,7 @@ def test_contacts_lie_on_triangle_and_tool(shape, tool):
         assert depth(stack, p - [0, 0, 1e-9], *(tip[:2] + (stop - 1e-7) * d), tip[2]) <= 0.0
 
 
-@pytest.mark.parametrize("tool", ["ball", "flat", "bull"])
+@pytest.mark.parametrize("tool", [pytest.param("ball", marks=pytest.mark.slow), "flat", "bull"])
 def test_stop_is_the_first_lift_of_the_naive_drop(tool):
     radius, corner = CUTTERS[tool]
     for seed in range(30):

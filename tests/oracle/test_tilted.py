@@ -125,7 +125,7 @@ def questions(mesh, seed):
     return frames, np.einsum("kij,kj->ki", frames, np.vstack(tips))
 
 
-@pytest.mark.parametrize("shape", [*SHAPES, "strips"])
+@pytest.mark.parametrize("shape", [*SHAPES, pytest.param("strips", marks=pytest.mark.slow)])
 def test_what_is_left_out_and_what_blocked_last_change_no_answer(shape):
     """Against a tree of a single leaf, every triangle of which is asked, each question alone; with any threads."""
     mesh = strips() if shape == "strips" else SHAPES[shape]()

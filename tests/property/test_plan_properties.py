@@ -131,6 +131,7 @@ def test_what_stock_of_another_zone_was_in_the_way_of_is_finished_after_that_zon
     assert left[0].max() > c.settings.scallop_height >= left[1].max()
 
 
+@pytest.mark.slow
 def test_stock_that_another_tool_takes_away_sends_the_first_one_back():
     longer = ball(3.0, "T2", neck=3.0, shank=3.0, stickout=25.0)
     c = plan_part(low_walls(), [held(), longer], roughing=False, near_net=False)

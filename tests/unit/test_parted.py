@@ -208,6 +208,7 @@ def test_a_part_of_a_map_is_the_map(given):
         assert mine == pytest.approx(by * whole, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_the_proof_finds_no_more_left_and_no_deeper_cut_on_a_parted_surface():
     surface, body = hollow(crossed), tool(6.0, 0.0)
     iso = passes_along_y(surface)
