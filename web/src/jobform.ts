@@ -5,6 +5,7 @@ import { add, el, field, fill } from "./dom";
 type ToolRow = Partial<Record<keyof Tool, unknown>> & { id: string; kind: string; diameter_mm: number; holder?: unknown };
 
 const KEPT = "zonemill-tools";
+const AS_GIVEN = ""; // of a field: what the setup says, which the field has no word for
 const HOLDER = [{ diameter_mm: 14, diameter_top_mm: 20, length_mm: 12 }, { diameter_mm: 24, diameter_top_mm: 24, length_mm: 30 }];
 const FIRST: ToolRow[] = [
   { id: "T1", number: 1, kind: "flat", diameter_mm: 6, flutes: 4, flute_length_mm: 18, neck_diameter_mm: 5.8, neck_length_mm: 24, shank_diameter_mm: 6, stickout_mm: 40, holder: HOLDER },
@@ -20,14 +21,16 @@ const COLUMNS: { key: string; title: string; hint: string }[] = [
 ];
 
 export function jobForm(): HTMLElement {
-  let tools: ToolRow[] = kept();
+  let tools: (ToolRow | string)[] = kept();
   let rest: Record<string, unknown> = {};
   const part = el("input", { type: "file", id: "part", accept: ".step,.stp,.STEP,.STP", required: true });
   const order = el("input", { type: "text", id: "order", maxlength: 100, placeholder: "for example 4711, impeller" });
   const material = el("select", { id: "material" }, el("option", { value: "Ti-6Al-4V" }, "Ti-6Al-4V"));
   const scallop = el("input", { type: "number", id: "scallop", min: 0.001, max: 1, step: "any", value: 0.02 });
-  const stock = el("select", { id: "stock" }, el("option", { value: "part_offset" }, "the part grown by a margin"), el("option", { value: "box" }, "a box round the part"), el("option", { value: "cylinder" }, "a bar round the part"));
+  const stock = el("select", { id: "stock" }, el("option", { value: "part_offset" }, "the part grown by a margin"), el("option", { value: "box" }, "a box round the part"), el("option", { value: "cylinder" }, "a bar round the part"), el("option", { value: "step" }, "a STEP file"));
   const margin = el("input", { type: "number", id: "margin", min: 0, max: 100, step: "any", value: 1 });
+  const blank = el("input", { type: "file", id: "blank", accept: ".step,.stp,.STEP,.STP" });
+  const blankField = field("Blank, a STEP file", blank);
   const control = el("select", { id: "control" }, ...["linuxcnc", "fanuc", "haas", "siemens", "heidenhain"].map((d) => el("option", { value: d }, d)));
   const table = el("div", { class: "tools" });
   const json = el("textarea", { id: "json", rows: 10, spellcheck: "false", class: "mono" });
@@ -37,12 +40,20 @@ export function jobForm(): HTMLElement {
 
   const setup = (): Record<string, unknown> => {
     const quality = { ...(rest.quality as object | undefined), scallop_height_mm: Number(scallop.value) };
-    const machine = { kind: "3-axis", ...(rest.machine as object | undefined), dialects: [control.value] };
-    const blank = { ...(rest.stock as object | undefined), kind: stock.value, margin_mm: Number(margin.value) };
-    const labels = { ...(rest.labels as object | undefined), ...(order.value ? { order: order.value } : {}) };
-    return { ...rest, tools: tools.map(clean), quality, machine, stock: blank, material: material.value, labels };
+    const given = typeof rest.machine === "object" ? (rest.machine as { dialects?: string[] }) : {};
+    // the field is the control the proof runs for, the first; others of the setup stay
+    const dialects = [control.value, ...(given.dialects ?? []).slice(1).filter((d) => d !== control.value)];
+    const machine = control.value === AS_GIVEN ? rest.machine : { kind: "3-axis", ...given, dialects };
+    const start: Record<string, unknown> = { ...(rest.stock as object | undefined), kind: stock.value, margin_mm: Number(margin.value) };
+    for (const [kind, key] of [["box", "box_mm"], ["cylinder", "cylinder_mm"], ["step", "step_file"]] as const) if (kind !== stock.value) delete start[key];
+    const labels: Record<string, unknown> = { ...(rest.labels as object | undefined) };
+    if (order.value) labels.order = order.value;
+    else delete labels.order;
+    return { ...rest, tools: tools.map(clean), quality, machine, stock: start, material: material.value === AS_GIVEN ? rest.material : material.value, labels };
   };
   const show = (): void => {
+    blankField.hidden = stock.value !== "step";
+    blank.required = !blankField.hidden;
     json.value = JSON.stringify(setup(), null, 1);
   };
   const drawTools = (): void => {
@@ -54,21 +65,22 @@ export function jobForm(): HTMLElement {
   };
   const take = (s: Partial<Setup> & Record<string, unknown>): void => {
     const { tools: t, ...others } = s;
-    if (Array.isArray(t)) tools = t as unknown as ToolRow[];
+    if (Array.isArray(t)) tools = t as unknown as (ToolRow | string)[];
     rest = others;
+    // what a setup leaves out is as the service takes it, not as the job before had it
     const q = s.quality as { scallop_height_mm?: number } | undefined;
-    if (q?.scallop_height_mm) scallop.value = String(q.scallop_height_mm);
+    scallop.value = String(q?.scallop_height_mm ?? 0.01);
     const b = s.stock as { kind?: string; margin_mm?: number } | undefined;
-    if (b?.kind && [...stock.options].some((o) => o.value === b.kind)) stock.value = b.kind;
-    if (b?.margin_mm !== undefined) margin.value = String(b.margin_mm);
-    const m = s.machine as { dialects?: string[] } | undefined;
-    if (m?.dialects?.[0]) control.value = m.dialects[0];
-    if (typeof s.material === "string") {
-      if (![...material.options].some((o) => o.value === s.material)) material.appendChild(el("option", { value: s.material }, s.material));
-      material.value = s.material;
-    }
+    choose(stock, b?.kind ?? "part_offset");
+    margin.value = String(b?.margin_mm ?? margin.defaultValue);
+    const m = s.machine as { dialects?: string[] } | string | undefined;
+    if (typeof m === "string") choose(control, AS_GIVEN, `of ${m}`);
+    else choose(control, m?.dialects?.[0] ?? "linuxcnc");
+    const material_ = s.material as { name?: string } | string | undefined;
+    if (typeof material_ === "object") choose(material, AS_GIVEN, `${material_.name ?? "its own"}, of the setup`);
+    else choose(material, material_ ?? "Ti-6Al-4V");
     const l = s.labels as { order?: string } | undefined;
-    if (l?.order) order.value = l.order;
+    order.value = l?.order ?? "";
     drawTools();
   };
   const file = el("input", { type: "file", id: "setupfile", accept: ".json,application/json", onchange: async () => {
@@ -100,7 +112,7 @@ export function jobForm(): HTMLElement {
   } },
     el("h2", {}, "New job"),
     el("div", { class: "fields" }, field("Part, a STEP file", part), field("Order", order),
-      field("Material", material), field("Height of scallops, mm", scallop), field("Blank", stock), field("Margin, mm", margin),
+      field("Material", material), field("Height of scallops, mm", scallop), field("Blank", stock), blankField, field("Margin, mm", margin),
       field("Control", control)),
     el("h3", { id: "toolshead" }, "Tools"), el("p", { class: "hint" }, "Lengths in mm from the tip upwards. The stoutest tool that reaches a place is taken for it."), table,
     el("details", {}, el("summary", {}, "A setup from a file, or as text"),
@@ -113,6 +125,8 @@ export function jobForm(): HTMLElement {
     const body = new FormData();
     body.append("part", chosen, chosen.name);
     body.append("setup", new Blob([JSON.stringify(setup())], { type: "application/json" }), "setup.json");
+    const start = blank.files?.[0];
+    if (stock.value === "step" && start) body.append("stock", start, start.name);
     send.disabled = dry.disabled = true;
     fill(answer, el("p", {}, "Sending…"));
     try {
@@ -124,6 +138,14 @@ export function jobForm(): HTMLElement {
     }
   }
   return form;
+}
+
+/** Chooses a value, one the page does not know too: what a setup asks for is not changed on its way. */
+function choose(select: HTMLSelectElement, value: string, words = value): void {
+  const known = [...select.options].find((o) => o.value === value);
+  if (known) known.textContent = value === AS_GIVEN ? words : known.textContent;
+  else select.appendChild(el("option", { value }, words));
+  select.value = value;
 }
 
 /** What is wrong with a setup, each with the field it is about. */
@@ -145,9 +167,18 @@ async function materials(select: HTMLSelectElement): Promise<void> {
   }
 }
 
-function toolTable(tools: ToolRow[], changed: () => void, redraw: () => void): HTMLElement {
+function toolTable(tools: (ToolRow | string)[], changed: () => void, redraw: () => void): HTMLElement {
   const body = el("tbody");
+  const remove = (i: number): HTMLElement => el("td", {}, el("button", { type: "button", "aria-label": `Remove tool ${i + 1}`, onclick: () => {
+    tools.splice(i, 1);
+    redraw();
+    changed();
+  } }, "✕"));
   tools.forEach((t, i) => {
+    if (typeof t === "string") {
+      add(body, el("tr", {}, el("td", { colspan: COLUMNS.length + 1, class: "shelf" }, t, " ", el("span", { class: "hint" }, "of the library")), remove(i)));
+      return;
+    }
     const row = el("tr");
     for (const c of COLUMNS) {
       const label = `${c.hint}, tool ${i + 1}`;
@@ -164,24 +195,22 @@ function toolTable(tools: ToolRow[], changed: () => void, redraw: () => void): H
       });
       add(row, el("td", { "data-title": c.title }, input));
     }
+    const own = Array.isArray(t.holder) && t.holder.length ? t.holder : HOLDER;
     const holder = el("input", { type: "checkbox", "aria-label": `Holder, tool ${i + 1}`, checked: Array.isArray(t.holder) && t.holder.length > 0 });
     holder.addEventListener("change", () => {
-      t.holder = holder.checked ? structuredClone(HOLDER) : [];
+      t.holder = holder.checked ? structuredClone(own) : [];
       changed();
     });
     add(row, el("td", { "data-title": "Holder" }, holder));
-    add(row, el("td", {}, el("button", { type: "button", "aria-label": `Remove tool ${i + 1}`, onclick: () => {
-      tools.splice(i, 1);
-      redraw();
-      changed();
-    } }, "✕")));
+    add(row, remove(i));
     add(body, row);
   });
   return el("div", {}, el("table", { "aria-labelledby": "toolshead" }, el("thead", {}, el("tr", {}, ...COLUMNS.map((c) => el("th", { scope: "col", title: c.hint }, c.title)), el("th", { scope: "col", title: "A holder of 14 to 24 mm, or the one of the setup" }, "Holder"), el("th", { scope: "col" }, el("span", { class: "sr" }, "Remove")))), body),
     el("p", { class: "buttons" },
       el("button", { type: "button", onclick: () => {
-        const last = tools[tools.length - 1] ?? FIRST[0]!;
-        const number = Math.max(0, ...tools.map((t) => Number(t.number ?? 0))) + 1;
+        const own = tools.filter((t) => typeof t !== "string");
+        const last = own[own.length - 1] ?? FIRST[0]!;
+        const number = Math.max(0, ...own.map((t) => Number(t.number ?? 0))) + 1;
         tools.push({ ...structuredClone(last), id: `T${number}`, number });
         redraw();
         changed();
@@ -194,15 +223,16 @@ function toolTable(tools: ToolRow[], changed: () => void, redraw: () => void): H
 }
 
 /** A tool as the setup takes it: without what its kind does not have. */
-function clean(t: ToolRow): ToolRow {
+function clean(t: ToolRow | string): ToolRow | string {
+  if (typeof t === "string") return t;
   const out = { ...t };
   if (out.kind !== "bull") delete out.corner_radius_mm;
   return out;
 }
 
-function kept(): ToolRow[] {
+function kept(): (ToolRow | string)[] {
   try {
-    const found = JSON.parse(localStorage.getItem(KEPT) ?? "null") as ToolRow[] | null;
+    const found = JSON.parse(localStorage.getItem(KEPT) ?? "null") as (ToolRow | string)[] | null;
     if (Array.isArray(found) && found.length) return found;
   } catch {
     // what was kept cannot be read: begin anew
@@ -210,6 +240,6 @@ function kept(): ToolRow[] {
   return structuredClone(FIRST);
 }
 
-function keepTools(tools: ToolRow[]): void {
+function keepTools(tools: (ToolRow | string)[]): void {
   localStorage.setItem(KEPT, JSON.stringify(tools));
 }
