@@ -68,12 +68,19 @@ export function showRefusal(place: HTMLElement, error: unknown, again: () => voi
 
 function keyForm(error: Refusal, again: () => void): HTMLElement {
   const input = el("input", { type: "password", id: "key", autocomplete: "off", required: true });
+  const wrong = el("p", { class: "bad", role: "alert" });
   return el("form", { class: "refusal", onsubmit: (event: Event) => {
     event.preventDefault();
-    keep(input.value.trim());
+    const key = input.value.trim();
+    // a header takes nothing else, and what was copied from a message often has more in it than is seen
+    if (!/^[\x21-\x7e]+$/.test(key)) {
+      wrong.textContent = "A key is of plain letters, figures and underscores, without spaces. Copy it once more.";
+      return;
+    }
+    keep(key);
     again();
   } },
     el("h2", {}, "This service asks for a key"),
     el("p", {}, hasKey() ? error.message : "Its operator makes one with: zonemill keys create. It is kept in this tab only, and forgotten with it."),
-    el("label", { for: "key" }, "Key"), input, el("button", { type: "submit", class: "main" }, "Use it"));
+    el("label", { for: "key" }, "Key"), input, wrong, el("button", { type: "submit", class: "main" }, "Use it"));
 }

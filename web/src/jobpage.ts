@@ -1,11 +1,13 @@
 // One job: progress while it runs, then the picture with all that belongs to it.
-import { FINAL, ask, follow, get, type Job, type JobFiles } from "./api";
+import { FINAL, Refusal, ask, follow, get, type Job, type JobFiles } from "./api";
 import { el, fill } from "./dom";
 import { dryCheck } from "./drycheck";
 import { head, showRefusal } from "./frame";
 import { JobView } from "./jobview";
-import { readView } from "./viewfile";
+import { BrokenView, readView } from "./viewfile";
 import { STATE_WORDS, fileList, stateBadge } from "./words";
+
+const PICTURES = [["preview.png", "The part with its zones, and the tool paths"], ["deviation.png", "What the proof measured on the part"]] as const;
 
 export async function jobPage(app: HTMLElement, id: string): Promise<void> {
   const title = el("h1", { class: "title" }, "Job");
@@ -28,7 +30,7 @@ export async function jobPage(app: HTMLElement, id: string): Promise<void> {
         el("p", {}, el("a", { href: "/" }, "All jobs"))));
       return;
     }
-    await show(app, main, title, job, again);
+    await show(main, job, again);
   } catch (error) {
     showRefusal(main, error, again);
   }
@@ -50,10 +52,10 @@ async function wait(main: HTMLElement, job: Job): Promise<void> {
     words.textContent = `${Math.round(100 * progress)} %, ${stage || "waiting for its turn"}`;
   };
   say(job.stage, job.progress);
-  await follow(job, (event) => say(event.stage, event.progress), new AbortController().signal);
+  await follow(job, (event) => say(event.stage, event.progress), (why) => (words.textContent = `${why} This page asks again by itself.`));
 }
 
-async function show(app: HTMLElement, main: HTMLElement, title: HTMLElement, job: Job, again: () => void): Promise<void> {
+async function show(main: HTMLElement, job: Job, again: () => void): Promise<void> {
   const opened = performance.now();
   const files = await get<JobFiles>(`/v1/jobs/${job.id}/files`);
   const view = files.items.find((f) => f.name === "view.bin");
@@ -64,7 +66,13 @@ async function show(app: HTMLElement, main: HTMLElement, title: HTMLElement, job
       fileList(files), el("p", {}, el("a", { href: "/" }, "All jobs"))));
     return;
   }
-  const page = new JobView(job, files);
+  let page: JobView;
+  try {
+    page = new JobView(job, files);
+  } catch {
+    fill(main, await flat(files, "This browser draws nothing in three dimensions: it has no WebGL 2, or has it switched off.", again));
+    return;
+  }
   fill(main, ...page.nodes);
   document.body.classList.add("viewing");
   page.start();
@@ -81,8 +89,25 @@ async function show(app: HTMLElement, main: HTMLElement, title: HTMLElement, job
     });
     page.finish(bytes, performance.now() - opened);
   } catch (error) {
-    showRefusal(main, error, again);
+    document.body.classList.remove("viewing");
+    if (error instanceof Refusal) showRefusal(main, error, again);
+    else fill(main, await flat(files, error instanceof BrokenView ? error.message : "The file with the picture is damaged.", again));
   }
-  void app;
-  void title;
+}
+
+/** What a job has to show without the picture: why there is none, the drawn pictures, and the files. */
+async function flat(files: JobFiles, why: string, again: () => void): Promise<HTMLElement> {
+  const drawn = await Promise.all(PICTURES.map(async ([name, words]) => {
+    const file = files.items.find((f) => f.name === name);
+    if (!file) return null;
+    try {
+      return el("img", { src: URL.createObjectURL(await (await ask(file.href)).blob()), alt: words });
+    } catch {
+      return null; // it stands in the list of files
+    }
+  }));
+  return el("div", { class: "flat" },
+    el("div", { class: "refusal", role: "alert" }, el("h2", {}, "The picture cannot be shown"), el("p", {}, why),
+      el("button", { type: "button", onclick: again }, "Try again")),
+    ...drawn, el("section", {}, el("h2", {}, "Files"), fileList(files)));
 }

@@ -1,5 +1,5 @@
 // All jobs with their progress as it goes, and the form for a new one.
-import { FINAL, ask, follow, get, type Job, type JobPage } from "./api";
+import { FINAL, Refusal, ask, follow, get, type Job, type JobPage } from "./api";
 import { el, fill } from "./dom";
 import { head, showRefusal } from "./frame";
 import { jobForm } from "./jobform";
@@ -37,11 +37,11 @@ const STREAMS = 3; // at a time: a browser keeps six connections to a host, and 
 let streams = 0;
 
 /** Follows a job by its events, or where many run by asking now and then; returns it as it ended. */
-async function watch(job: Job, say: (now: { progress: number; stage: string }) => void): Promise<Job> {
+async function watch(job: Job, say: (now: { progress: number; stage: string }) => void, lost: (why: string) => void): Promise<Job> {
   if (streams < STREAMS) {
     streams++;
     try {
-      await follow(job, say, new AbortController().signal);
+      await follow(job, say, lost);
     } finally {
       streams--;
     }
@@ -49,11 +49,22 @@ async function watch(job: Job, say: (now: { progress: number; stage: string }) =
   }
   for (;;) {
     await new Promise((resume) => setTimeout(resume, 4000));
-    const now = await get<Job>(job.links.self);
+    let now: Job;
+    try {
+      now = await get<Job>(job.links.self);
+    } catch (error) {
+      if (error instanceof Refusal && error.status >= 400 && error.status < 500 && error.status !== 429) throw error;
+      lost(error instanceof Refusal ? error.message : "The connection was lost.");
+      continue;
+    }
     if (FINAL.has(now.state)) return now;
     say(now);
-    if (streams < STREAMS) return watch(now, say);
+    if (streams < STREAMS) return watch(now, say, lost);
   }
+}
+
+function told(error: unknown): string {
+  return error instanceof Refusal ? error.message : "The connection was lost; load the page again.";
 }
 
 const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
@@ -68,13 +79,13 @@ function row(job: Job): HTMLElement {
     fill(node, el("h3", {}, el("a", { href: `/v1/jobs/${j.id}/view` }, order)), stateBadge(j.state),
       el("span", { class: "where" }, `${KINDS[j.kind] ?? j.kind}, ${new Date(j.created_at).toLocaleString()}`),
       running ? bar : null, running ? words : null,
-      running ? el("button", { type: "button", onclick: () => void ask(j.links.self, { method: "DELETE" }) }, "Cancel") : null,
+      running ? el("button", { type: "button", onclick: () => void ask(j.links.self, { method: "DELETE" }).catch((error: unknown) => (words.textContent = told(error))) }, "Cancel") : null,
       j.error ? el("p", { class: "where" }, j.error.detail) : null);
     if (running)
       void watch(j, (now) => {
         bar.value = now.progress;
         words.textContent = `${Math.round(100 * now.progress)} % ${now.stage}`;
-      }).then(draw, () => (words.textContent = "the connection was lost; load the page again"));
+      }, (why) => (words.textContent = why)).then(draw, (error: unknown) => (words.textContent = told(error)));
   };
   draw(job);
   return node;

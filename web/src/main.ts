@@ -5,4 +5,10 @@ import { listPage } from "./listpage";
 
 const app = document.getElementById("app")!;
 const job = /^\/v1\/jobs\/([^/]+)\/view\/?$/.exec(location.pathname);
-void (job ? jobPage(app, decodeURIComponent(job[1]!)) : listPage(app));
+let id = job?.[1] ?? "";
+try {
+  id = decodeURIComponent(id);
+} catch {
+  // an address that is none: the service has no job of that name, and says so
+}
+void (job ? jobPage(app, id) : listPage(app));

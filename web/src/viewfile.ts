@@ -125,14 +125,35 @@ export type Table = Record<string, Int32Array>;
 
 const MAGIC = "ZMVIEW1\n";
 
-async function inflate(data: Uint8Array<ArrayBuffer>): Promise<Uint8Array> {
-  const stream = new Blob([data]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
+const MOST_HEAD = 1 << 28; // bytes
+
+/** A file this page cannot show, and what to do. */
+export class BrokenView extends Error {}
+
+/** The bytes that were packed, which are no more than `most`. */
+async function inflate(data: Uint8Array<ArrayBuffer>, most: number): Promise<Uint8Array> {
+  const reader = new Blob([data]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  let size = 0;
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    size += value.length;
+    if (size > most) throw new BrokenView("The file with the picture is damaged: there is more in it than it says.");
+    parts.push(value);
+  }
+  return new Uint8Array(await new Blob(parts).arrayBuffer());
+}
+
+/** Bytes of the columns of a chunk. */
+function bytesOf(columns: ColumnEntry[]): number {
+  return columns.reduce((sum, [, rows, k, width]) => sum + rows * k * width, 0);
 }
 
 /** The columns of a chunk, rows of k values one behind the other. */
 export function columnsOf(raw: Uint8Array, entries: ColumnEntry[]): Table {
   const table: Table = {};
+  if (raw.length !== bytesOf(entries)) throw new BrokenView("The file with the picture is damaged: there is less in it than it says.");
   let at = 0;
   for (const [name, rows, k, width, form] of entries) {
     const out = new Int32Array(rows * k);
@@ -164,7 +185,7 @@ class Bytes {
   async take(count: number): Promise<Uint8Array<ArrayBuffer>> {
     while (this.size < count) {
       const { done, value } = await this.reader.read();
-      if (done) throw new Error("the file with the picture was cut off on its way; load the page again");
+      if (done) throw new BrokenView("The file with the picture was cut off. Load the page again; where that does not help, the file itself is damaged.");
       this.held.push(value);
       this.size += value.length;
       this.total += value.length;
@@ -193,10 +214,10 @@ export async function readView(
   const bytes = new Bytes(body.getReader());
   const start = await bytes.take(12);
   if (new TextDecoder().decode(start.subarray(0, 8)) !== MAGIC)
-    throw new Error("the file with the picture has another form than this page knows; load the page again");
+    throw new BrokenView("The file with the picture has another form than this page knows. Load the page again; where that does not help, another version made it.");
   const length = new DataView(start.buffer).getUint32(8, true);
-  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length)))) as ViewHead;
+  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MOST_HEAD))) as ViewHead;
   onHead(head);
-  for (const entry of head.chunks) onChunk(entry, columnsOf(await inflate(await bytes.take(entry.size)), entry.columns));
+  for (const entry of head.chunks) onChunk(entry, columnsOf(await inflate(await bytes.take(entry.size), bytesOf(entry.columns)), entry.columns));
   return bytes.total;
 }

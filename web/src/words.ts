@@ -14,7 +14,8 @@ export function stateBadge(state: string): HTMLElement {
 
 export function fileList(files: JobFiles): HTMLElement {
   return el("ul", { class: "files" }, ...files.items.filter((f) => f.name !== "view.bin").map((f) =>
-    el("li", {}, el("button", { type: "button", class: "link", onclick: () => void download(f.href, f.name) }, f.name),
+    el("li", {}, el("button", { type: "button", class: "link", onclick: (e: Event) => void download(f.href, f.name).catch((error: unknown) =>
+      (e.target as Element).parentElement!.append(el("p", { role: "alert", class: "bad" }, error instanceof Error ? error.message : String(error)))) }, f.name),
       ` ${f.size_bytes > 1e6 ? `${(f.size_bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(f.size_bytes / 1e3)} kB`}`)));
 }
 
@@ -34,7 +35,7 @@ export function whereOf(f: ViewFinding): string {
 /** What would do for an entry of the remainder, in words. */
 export function needs(r: ViewRest): string {
   const w = r.would_need as { kind?: string; diameter_mm?: number; neck_length_mm?: number; stickout_mm?: number; corner_radius_mm?: number };
-  if (!w.kind) return r.why_left ?? "";
+  if (!w.kind) return [r.tool_at_hand ? `${r.tool_at_hand} would reach it` : "", r.why_left ?? ""].filter(Boolean).join(": ");
   if (w.diameter_mm === undefined) return `needs ${w.kind.replace(/^other /, "another ")}`;
   const neck = w.neck_length_mm !== undefined ? `, neck ${w.neck_length_mm} mm` : "";
   return `needs a ${w.kind} of ${w.diameter_mm} mm${neck}`;
