@@ -60,5 +60,7 @@ export function figure(value: number | null | undefined, digits: number, unit = 
 }
 
 export function percent(value: number | null | undefined): string {
-  return value === null || value === undefined ? "–" : `${(100 * value).toFixed(1)}\u202f%`;
+  if (value === null || value === undefined) return "–";
+  const words = (100 * value).toFixed(1);
+  return `${value < 1 && words === "100.0" ? ">\u202f99.9" : words}\u202f%`; // all of it is said of all of it alone
 }

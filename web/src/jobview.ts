@@ -23,7 +23,7 @@ export class JobView {
   private bar = el("div", { class: "timebar" });
   private legend = el("div", { class: "legend" });
   private slider = el("input", { type: "range", min: 0, max: 1000, value: 1000, step: 1, "aria-label": "Time of machining" });
-  private clock = el("output", { class: "clock" });
+  private clock = el("output", { class: "clock", "aria-live": "off" }); // the slider says the same
   private play = el("button", { type: "button", class: "play", "aria-label": "Play" }, "▶");
   private speed = el("select", { "aria-label": "Speed of playing" });
   private modes: Record<Mode, HTMLInputElement>;
@@ -45,9 +45,13 @@ export class JobView {
   private playing = 0;
   private labels: { node: HTMLElement; place: Vector3 }[] = [];
   private program: { name: string; lines: string[] } | null = null;
-  private programBox = el("pre", { class: "program", tabindex: 0, "aria-label": "Lines of the program at this time", hidden: true });
+  private lineWanted = { name: "", line: 0 };
+  private programBox = el("pre", { class: "program", tabindex: 0, role: "group", "aria-label": "Lines of the program at this time", hidden: true });
   private freeTimer = 0;
   private look: Look;
+  private ready = false;
+  private written = 0; // when the address was
+  private writing = 0;
 
   constructor(private job: Job, private files: JobFiles) {
     this.picture = new Picture(this.stage);
@@ -58,7 +62,7 @@ export class JobView {
     canvas.setAttribute("aria-label", "The part. Arrow keys turn it, shift and arrows move it, plus and minus come nearer, F shows all of it, question mark lists the keys.");
     add(this.stage, this.names, this.ring, this.busy, this.legend, this.toolButtons());
     this.modes = { zones: this.radio("zones"), walls: this.radio("walls"), deviation: this.radio("deviation") };
-    this.nodes = [el("div", { class: "left" }, this.stage, this.status, this.bar), this.panel];
+    this.nodes = [el("div", { class: "left" }, this.stage, this.status, this.bar), this.programBox, this.panel];
     canvas.addEventListener("keydown", (e) => this.key(e));
     let down: { x: number; y: number } | null = null;
     canvas.addEventListener("pointerdown", (e) => (down = { x: e.clientX, y: e.clientY }));
@@ -69,6 +73,11 @@ export class JobView {
     this.picture.onDraw = () => this.placeNames();
     this.picture.onMove = () => this.remember();
     onTheme(() => this.paint());
+    // a link to another look of the same job changes the address alone
+    addEventListener("hashchange", () => {
+      const look = lookOf(location.hash);
+      if (this.ready && look.c && this.stage.isConnected) this.take(look);
+    });
   }
 
   start(): void {
@@ -107,28 +116,43 @@ export class JobView {
           this.labels.push({ node, place: new Vector3(...w.at_mm) });
         }
     const bad = h.state === "unproved" && h.findings.length > 0;
-    this.setMode(this.look.m ?? (bad || h.kind === "verify" ? "deviation" : "zones"));
-    this.picture.above(this.legend.offsetHeight);
+    this.setMode(bad || h.kind === "verify" ? "deviation" : "zones");
     this.picture.fit();
-    if (this.look.c) this.picture.pose = this.look.c;
-    if (this.look.s) {
-      this.sectionAxis.value = String(this.look.s[0]);
-      this.sectionPlace.value = String(Math.round(1000 * this.look.s[1]));
-      this.sectionFlip.checked = this.look.s[2] === 1;
-      this.cut();
-    }
-    if (this.look.p !== undefined) {
-      const wanted = new Set(this.look.p.split(".").map(Number));
-      this.stepBoxes.forEach((box, i) => (box.checked = wanted.has(i)));
-    }
-    this.showSteps();
+    this.show(this.look);
     this.say(this.summary(h));
   }
 
+  /** Colours, camera, section and steps of a look; what it does not name stays. */
+  private show(look: Look): void {
+    if (look.m) this.setMode(look.m);
+    if (look.c) this.picture.pose = look.c;
+    if (look.s) {
+      this.sectionAxis.value = String(look.s[0]);
+      this.sectionPlace.value = String(Math.round(1000 * look.s[1]));
+      this.sectionFlip.checked = look.s[2] === 1;
+      this.cut();
+    }
+    if (look.p !== undefined) {
+      const wanted = new Set(look.p.split(".").filter(Boolean).map(Number));
+      this.stepBoxes.forEach((box, i) => (box.checked = wanted.has(i)));
+    }
+    this.showSteps();
+  }
+
+  /** All of a look, with what it leaves out put away. */
+  private take(look: Look): void {
+    this.sectionAxis.value = "";
+    this.cut();
+    this.show({ p: "", ...look });
+    this.setTime(look.t ?? null);
+  }
+
   private summary(h: ViewHead): string {
-    if (h.findings.length) return `${h.findings.length} ${h.findings.length === 1 ? "finding" : "findings"}: the program is not handed out. Choose one in the list to go there.`;
+    const found = `${h.findings.length} ${h.findings.length === 1 ? "finding" : "findings"}`;
+    if (h.findings.length) return `${found}${h.withheld ? ": the program is not handed out" : " in this program"}. Choose one in the list to go there.`;
     if (h.kind === "verify") return "Nothing was found. The map shows what the program leaves on the part.";
-    return h.remainder.length ? "Proved. What is hatched red stays: no tool of the setup gets there, and the list says why." : "Proved and complete.";
+    if (!h.remainder.length) return "Proved and complete.";
+    return h.remainder.some((r) => r.tool_at_hand) ? "Proved. What is hatched red stays, and the list says why." : "Proved. What is hatched red stays: no tool of the setup gets there, and the list says why.";
   }
 
   roughDone(ms: number): void {
@@ -142,7 +166,9 @@ export class JobView {
     const left = this.nodes[0]!;
     left.dataset.bytes = String(bytes);
     left.dataset.ready = String(Math.round(ms));
+    this.ready = true;
     if (this.look.t !== undefined) this.setTime(this.look.t);
+    this.remember();
     (window as unknown as { zonemill: unknown }).zonemill = { picture: this.picture, frame: () => this.picture.timed(), moving: () => this.picture.timedMoving() };
   }
 
@@ -246,7 +272,7 @@ export class JobView {
         this.stepBoxes[i] = box;
         add(list, el("li", {}, box, el("label", { for: box.id }, swatch(css(toolColour(Math.max(0, tools.indexOf(s.tool))))),
           el("strong", {}, s.id), ` ${[s.zone ?? (operation ? "several zones" : ""), s.strategy, operation ? `T${s.tool}` : toolWords(h, s.tool)].filter(Boolean).join(", ")}`),
-          el("button", { type: "button", class: "link where", "aria-label": `Go to the start of ${s.id}`, onclick: () => this.setTime(s.start_s, true) }, duration(s.end_s - s.start_s))));
+          el("button", { type: "button", class: "link where", "aria-label": `${duration(s.end_s - s.start_s)}, go to the start of ${s.id}`, onclick: () => this.setTime(s.start_s, true) }, duration(s.end_s - s.start_s))));
       }
       rows.push(el("div", { class: "operation" }, all, el("label", { for: all.id }, el("strong", {}, operation || "Program"), ` (${mine.length})`)), list);
     }
@@ -286,9 +312,11 @@ export class JobView {
 
   private sharing(): HTMLElement {
     return el("p", {}, el("button", { type: "button", onclick: () => {
-      this.remember();
-      void navigator.clipboard?.writeText(location.href).then(() => this.say("The link is copied. It opens this job with this look."),
-        () => this.say("The address of this page is the link."));
+      this.write();
+      // a browser has a clipboard only over https and on this machine
+      const copied = navigator.clipboard ? navigator.clipboard.writeText(location.href) : Promise.reject(new Error("no clipboard"));
+      copied.then(() => this.say("The link is copied. It opens this job with this look."),
+        () => this.say("The browser lets no page copy here. The address of this page is the link."));
     } }, "Copy link"), " ", el("button", { type: "button", onclick: () => {
       const a = el("a", { href: this.picture.png(), download: `${this.job.id}.png` });
       a.click();
@@ -302,6 +330,7 @@ export class JobView {
   }
 
   private setMode(mode: Mode): void {
+    if (mode === "zones" && this.head?.kind === "verify") return; // it has none
     this.modes[mode].checked = true;
     this.picture.setMode(mode);
     this.names.hidden = mode === "deviation";
@@ -311,7 +340,9 @@ export class JobView {
 
   private buildLegend(mode: Mode): void {
     const h = this.head;
-    if (h) fill(this.legend, ...legendOf(h, mode, new Set([...this.shown()].map((i) => h.steps[i]!.tool)), this.stockShown));
+    if (!h) return;
+    fill(this.legend, ...legendOf(h, mode, new Set([...this.shown()].map((i) => h.steps[i]!.tool)), this.stockShown));
+    this.picture.above(this.legend.offsetHeight);
   }
 
   private shown(): Set<number> {
@@ -358,7 +389,7 @@ export class JobView {
       el("button", { type: "button", "aria-label": "Next step", onclick: () => jump(1) }, "»"),
       this.slider, this.speed,
       el("button", { type: "button", "aria-label": "Put the tool away", title: "Put the tool away", onclick: () => this.setTime(null) }, "✕"),
-      this.picture.hasStock ? el("span", { class: "stockbox" }, this.stock, el("label", { for: "stock" }, "Stock")) : null, this.clock, this.programBox);
+      this.picture.hasStock ? el("span", { class: "stockbox" }, this.stock, el("label", { for: "stock" }, "Stock")) : null, this.clock);
     this.tell(null);
   }
 
@@ -403,10 +434,23 @@ export class JobView {
   /** The lines of the program round the one that runs, where the job hands its program out. */
   private async showProgram(name: string, line: number): Promise<void> {
     const file = this.files.items.find((f) => f.name === name);
-    if (!file) return;
+    if (!file) {
+      this.programBox.hidden = true;
+      return;
+    }
+    this.lineWanted = { name, line };
     if (this.program?.name !== name) {
-      this.program = { name, lines: [] };
-      this.program.lines = (await (await ask(file.href)).text()).split("\n");
+      const program = (this.program = { name, lines: [] as string[] });
+      this.programBox.hidden = true;
+      try {
+        program.lines = (await (await ask(file.href)).text()).split("\n");
+      } catch {
+        if (this.program === program) this.program = null; // the next move of the slider asks again
+        return;
+      }
+      // the slider may have gone on meanwhile
+      if (this.program === program && this.seconds !== null) void this.showProgram(this.lineWanted.name, this.lineWanted.line);
+      return;
     }
     const lines = this.program.lines;
     if (!lines.length || this.seconds === null) return;
@@ -439,7 +483,7 @@ export class JobView {
   }
 
   private name(): void {
-    this.play.textContent = this.playing ? "⏸" : "▶";
+    this.play.textContent = this.playing ? "❚❚" : "▶";
     this.play.setAttribute("aria-label", this.playing ? "Pause" : "Play");
   }
 
@@ -559,8 +603,19 @@ export class JobView {
     }, 120);
   }
 
+  /** The look into the address, soon: browsers refuse a page that changes it more than a few times a second. */
   private remember(): void {
-    if (!this.head) return;
+    if (!this.ready || this.writing) return;
+    const soon = this.written + 500 - performance.now();
+    if (soon <= 0) this.write();
+    else this.writing = window.setTimeout(() => this.write(), soon);
+  }
+
+  private write(): void {
+    clearTimeout(this.writing);
+    this.writing = 0;
+    if (!this.ready || !this.stage.isConnected) return;
+    this.written = performance.now();
     const q = [`c=${this.picture.pose.join(",")}`];
     q.push(`m=${this.mode}`);
     if (this.seconds !== null) q.push(`t=${this.seconds.toFixed(1)}`);

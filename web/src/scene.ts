@@ -79,6 +79,8 @@ export class Picture {
   constructor(place: HTMLElement) {
     this.renderer = new WebGLRenderer({ antialias: !drawnBySoftware(), powerPreference: "high-performance" });
     this.canvas = this.renderer.domElement;
+    // a phone takes the graphics card away from a page that was put aside, and gives it back
+    this.canvas.addEventListener("webglcontextrestored", () => this.ask());
     place.appendChild(this.canvas);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
@@ -619,7 +621,10 @@ export class Picture {
     return [...this.camera.position.toArray(), ...this.controls.target.toArray()].map((v) => Math.round(v * 100) / 100);
   }
 
+  /** One from which nothing can be seen is not taken. */
   set pose(p: number[]) {
+    const off = new Vector3(p[0]! - p[3]!, p[1]! - p[4]!, p[2]! - p[5]!).length();
+    if (!(off > this.camera.near && off < this.camera.far)) return;
     this.camera.position.set(p[0]!, p[1]!, p[2]!);
     this.controls.target.set(p[3]!, p[4]!, p[5]!);
     this.controls.update();

@@ -1,0 +1,62 @@
+"""The page under bad treatment: phones, links that are pasted, broken files and streams, setups it has no fields for.
+
+``web/tests/harm.mjs`` does the harm; here is what it needs.
+"""
+
+import json
+import subprocess
+
+import pytest
+
+from service.server import background, settings_with
+from tests.e2e.test_page import FOLDER, ROOT, browser, node, shown
+from tests.e2e.test_withheld import call, part  # noqa: F401
+
+HARM = ROOT / "web" / "tests" / "harm.mjs"
+pytestmark = [pytest.mark.timeout(600), pytest.mark.network]
+
+
+@pytest.fixture(scope="module")
+def harm():
+    """Run the driver; returns what it says."""
+    if not (FOLDER / "index.html").is_file():
+        pytest.skip("the page is not built: make web")
+    if node() is None or not (ROOT / "web" / "node_modules" / "playwright-core").is_dir():
+        pytest.skip("no Node with playwright-core here: make web")
+    if browser() is None:
+        pytest.skip("no Chromium here: apt-get install chromium, or set CHROMIUM")
+
+    def run(what, url, *more):
+        done = subprocess.run([node(), str(HARM), what, url, *(str(m) for m in more)], capture_output=True, text=True,
+                              timeout=400, cwd=ROOT / "web")
+        assert done.returncode == 0, done.stderr[-3000:]
+        return json.loads(done.stdout.strip().splitlines()[-1])
+
+    return run
+
+
+def test_a_job_is_seen_on_bad_days(harm, part, tmp_path):  # noqa: F811
+    assert call(part, tmp_path).exit_code == 0
+    with shown(tmp_path / "out") as url:
+        harm("folder", url, tmp_path)
+
+
+def test_the_form_changes_no_setup_and_the_page_outlives_its_connection(harm, tmp_path):
+    flat = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
+    setups = [
+        {"tools": [flat], "quality": {"scallop_height_mm": 0.4}, "stock": {"kind": "box", "margin_mm": 3},
+         "machine": {"kind": "5-axis", "dialects": ["siemens", "heidenhain"]}, "labels": {"order": "of before"}},
+        {"tools": ["lib:em4", flat], "machine": "lib:vmc@2", "material": {"name": "own steel", "kc11_n_mm2": 1500},
+         "stock": {"kind": "step", "step_file": "blank.step"}},
+        {"tools": ["lib:em4"]},
+    ]
+    files = [tmp_path / f"setup{k}.json" for k in range(len(setups))]
+    for file, setup in zip(files, setups, strict=True):
+        file.write_text(json.dumps(setup))
+    with background(settings_with({"host": "127.0.0.1", "port": 0, "data_dir": tmp_path / "data"})) as url:
+        first, second, third = harm("service", f"{url}/", *files)["setups"]
+    assert "box_mm" not in second["stock"] and second["labels"] == {}
+    # what a setup leaves out is the service's own, not that of the setup before
+    assert first["quality"]["scallop_height_mm"] == 0.4 and third["quality"]["scallop_height_mm"] == 0.01
+    assert third["stock"] == {"kind": "part_offset", "margin_mm": 1} and third["material"] == "Ti-6Al-4V"
+    assert third["machine"] == {"kind": "3-axis", "dialects": ["linuxcnc"]} and third["labels"] == {}

@@ -1,0 +1,185 @@
+// Treats the page badly, as networks, phones, old links and odd files do. Called by tests/e2e/test_page_harm.py:
+//   node harm.mjs folder URL SHOTS      a proved job with a program
+//   node harm.mjs service URL SETUP.json [SETUP.json ...]      a service without jobs; each setup goes through the form
+// Prints one line of JSON; exits with 1 and says why where something is not as it should be.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { accessible, complaints, fits, open, picture, ready, verdict } from "./browser.mjs";
+
+const [what, url, ...rest] = process.argv.slice(2);
+const forgive = (pattern) => complaints.splice(0, complaints.length, ...complaints.filter((c) => !pattern.test(c)));
+const pose = (page) => page.evaluate(() => window.zonemill.picture.pose);
+
+async function folder() {
+  const stem = (name) => join(rest[0], `${name}.png`);
+  const said = {};
+
+  // a phone with the bars of its browser, upright and lying, with the tool and the lines of the program shown
+  for (const [width, height] of [[390, 664], [844, 390]]) {
+    const { browser, page } = await open(url, width, height);
+    await page.goto(`${url}#t=20`);
+    await ready(page);
+    await page.locator(".program").waitFor();
+    await fits(page, width);
+    const [stage, pinned] = await page.evaluate(() => [".stage", ".left"].map((c) => document.querySelector(c).getBoundingClientRect().height));
+    assert(stage >= 200, `the picture is ${stage} px high on a screen of ${width} by ${height}`);
+    if (width < 500) assert(pinned <= 0.72 * height, `${pinned} of ${height} px never scroll away, and leave nothing for the lists`);
+    await page.screenshot({ path: stem(`phone-${width}`) });
+    said[width] = [Math.round(stage), Math.round(pinned)];
+    await browser.close();
+  }
+
+  const { browser, page } = await open(url, 1280, 800, { before: () => {
+    Object.defineProperty(navigator, "clipboard", { value: undefined });
+    const replace = history.replaceState.bind(history);
+    window.replaced = 0;
+    history.replaceState = (...all) => (window.replaced++, replace(...all));
+  } });
+  await page.goto(url);
+  await ready(page);
+
+  // a link that is pasted where the job is open already
+  const look = "#c=60,-10,40,8,6,2&m=walls&t=12.5&s=0,0.4,1&p=1";
+  await page.evaluate((l) => (location.hash = l), look);
+  await page.waitForFunction(() => document.querySelector(".clock").textContent.startsWith("0:13 of") || document.querySelector(".clock").textContent.startsWith("0:12 of"));
+  assert.deepEqual(await pose(page), [60, -10, 40, 8, 6, 2]);
+  assert(await page.isChecked("#mode-walls") && await page.isChecked("#sflip") && await page.isChecked("#step-1") && !(await page.isChecked("#step-0")));
+  assert.equal(await page.locator("#saxis").evaluate((s) => s.value), "0");
+  await page.evaluate(() => (location.hash = "#c=50,-10,40,8,6,2&m=zones"));
+  await page.waitForFunction(() => document.querySelector(".clock").textContent.includes("in all"));
+  assert.equal(await page.locator("#saxis").evaluate((s) => s.value), "");
+  // from inside the target nothing is seen, and the skip link is no look
+  await page.evaluate(() => (location.hash = "#c=1,1,1,1,1,1&m=zones"));
+  await page.waitForTimeout(100);
+  assert.deepEqual(await pose(page), [50, -10, 40, 8, 6, 2]);
+
+  // browsers stop a page that writes the address at every frame
+  await page.getByLabel("Speed of playing").selectOption("10");
+  await page.evaluate(() => (window.replaced = 0));
+  await page.locator(".play").click();
+  await page.waitForTimeout(3000);
+  await page.locator(".play").click();
+  said.replaced = await page.evaluate(() => window.replaced);
+  assert(said.replaced >= 1 && said.replaced <= 8, `the address was written ${said.replaced} times in 3 s`);
+
+  // over http, or where it is forbidden, there is no clipboard
+  await page.locator("summary", { hasText: "Share and keys" }).click();
+  await page.getByRole("button", { name: "Copy link" }).click();
+  await page.getByText("The address of this page is the link").waitFor();
+
+  // a phone takes the card away and gives it back
+  await page.waitForFunction(() => window.zonemill.picture.coarse === 1);
+  const before = await picture(page);
+  await page.evaluate(() => new Promise((done) => {
+    const canvas = document.querySelector(".stage canvas");
+    const lose = canvas.getContext("webgl2").getExtension("WEBGL_lose_context");
+    canvas.addEventListener("webglcontextrestored", () => {
+      // only what the page does by itself counts
+      window.drawn = 0;
+      const of = window.zonemill.picture;
+      const draw = of.onDraw;
+      of.onDraw = () => (window.drawn++, draw());
+      setTimeout(done, 500);
+    });
+    lose.loseContext();
+    setTimeout(() => lose.restoreContext(), 200);
+  }));
+  assert(await page.evaluate(() => window.drawn) >= 1, "nothing is drawn after the card came back");
+  assert.equal(await picture(page), before);
+  forgive(/Context Lost|Context Restored|CONTEXT_LOST/i);
+  await browser.close();
+
+  // a file that is none, one cut off, one that holds less than it says; and a browser that draws nothing in 3D
+  const whole = new Uint8Array(await (await fetch(url.replace(/\/view$/, "/files/view.bin"))).arrayBuffer());
+  const length = new DataView(whole.buffer).getUint32(8, true);
+  const bad = whole.slice();
+  bad.fill(0x55, 12 + length, 12 + length + 400);
+  const long = whole.slice(0, 4000);
+  new DataView(long.buffer).setUint32(8, 0xfffffff0, true);
+  for (const [name, bytes, words] of [["none", new TextEncoder().encode("<!doctype html>".repeat(9)), /another form/], ["cut", whole.slice(0, whole.length - 100), /cut off/],
+    ["long", long, /cut off/], ["bad", bad, /damaged/], ["no-webgl", whole, /WebGL/]]) {
+    const { browser, page } = await open(url, 390, 664, { before: name === "no-webgl" ? () => {
+      HTMLCanvasElement.prototype.getContext = () => null;
+    } : undefined });
+    await page.route("**/files/view.bin", (route) => route.fulfill({ body: Buffer.from(bytes), contentType: "application/octet-stream" }));
+    await page.goto(url);
+    await page.getByText("The picture cannot be shown").waitFor();
+    const told = await page.locator(".refusal").textContent();
+    assert(words.test(told), `${name}: ${told}`);
+    await page.getByRole("button", { name: "report.json" }).waitFor();
+    await page.waitForFunction(() => [...document.images].length === 2 && [...document.images].every((i) => i.naturalWidth > 100));
+    await fits(page, 390);
+    await accessible(page, name);
+    await page.screenshot({ path: stem(`flat-${name}`) });
+    forgive(/WebGL/);
+    await browser.close();
+  }
+  return said;
+}
+
+async function service() {
+  const { browser, page } = await open(url, 1280, 800);
+  const said = { setups: [] };
+  await page.goto(url);
+  await page.waitForSelector(".newjob");
+
+  // a setup comes out of the form as it went in, whatever the one before had
+  await page.locator("summary", { hasText: "A setup from a file" }).click();
+  for (const file of rest) {
+    await page.setInputFiles("#setupfile", file);
+    await page.getByText("is in the fields").waitFor();
+    const got = JSON.parse(await page.locator("#json").inputValue());
+    for (const [key, value] of Object.entries(JSON.parse(readFileSync(file, "utf8"))))
+      if (typeof value === "object" && !Array.isArray(value)) for (const [k, v] of Object.entries(value)) assert.deepEqual(got[key][k], v, `${file}: ${key}.${k}`);
+      else assert.deepEqual(got[key], value, `${file}: ${key}`);
+    said.setups.push(got);
+    await page.getByText("is in the fields").evaluate((p) => p.remove());
+  }
+  await accessible(page, "form");
+
+  // a stream of events that breaks, and a service that is away for a while
+  const job = (state) => ({ id: "j1", kind: "plan", state, stage: "zones", progress: 0.1, labels: { order: "<img src=x onerror=alert(1)>" }, created_at: "2026-01-01T00:00:00Z",
+    error: state === "failed" ? { title: "Out of <b>time</b>", detail: "it took too long" } : null, links: { self: "/v1/jobs/j1", events: "/v1/jobs/j1/events" } });
+  let asked = 0;
+  let state = "running";
+  await page.route("**/v1/jobs/j1", (route) => route.fulfill({ json: job(state) }));
+  await page.route("**/v1/jobs/j1/events", (route) => {
+    asked++;
+    if (asked === 1) return route.fulfill({ body: `event: progress\ndata: ${JSON.stringify({ stage: "paths", progress: 0.42 })}\nid: 7\n\n`, contentType: "text/event-stream" });
+    if (asked === 2) return route.abort("connectionreset");
+    if (asked === 3) return route.fulfill({ status: 503, body: "" });
+    state = "failed";
+    return route.fulfill({ body: `event: end\ndata: ${JSON.stringify({ stage: "done", progress: 1 })}\n\n`, contentType: "text/event-stream" });
+  });
+  await page.goto(new URL("/v1/jobs/j1/view", url).href);
+  await page.getByText("42 %, paths").waitFor();
+  await page.getByText("asks again by itself").waitFor();
+  await page.getByText("it took too long").waitFor();
+  assert.equal(asked, 4);
+  // names are words, whatever stands in them
+  assert.equal(await page.locator(".title").evaluate((t) => t.firstChild.textContent), "<img src=x onerror=alert(1)>");
+  assert.equal(await page.locator("main img, main b, header img").count(), 0);
+  forgive(/ERR_CONNECTION_RESET|503/);
+
+  // an address that is none
+  await page.goto(new URL("/v1/jobs/%E0%A4%A/view", url).href);
+  await page.locator(".refusal").waitFor();
+  forgive(/404|400/);
+
+  // a key with what no header takes, as it comes out of a message, and then another
+  await page.route("**/v1/jobs?*", (route) => route.fulfill({ status: 401, json: { title: "No key", status: 401, detail: "send a key" } }));
+  await page.goto(url);
+  await page.fill("#key", "zm_\u200bab");
+  await page.getByRole("button", { name: "Use it" }).click();
+  await page.getByText("Copy it once more").waitFor();
+  assert.equal(await page.evaluate(() => sessionStorage.length), 0);
+  await page.fill("#key", "zm_ab");
+  await page.getByRole("button", { name: "Use it" }).click();
+  await page.waitForFunction(() => sessionStorage.length === 1);
+  forgive(/401/);
+  await browser.close();
+  return said;
+}
+
+await verdict({ folder, service }[what]);
