@@ -22,7 +22,8 @@ from service.version import VERSION
 from service.viewfile import Chunk, write_view
 from service.viewmesh import GRID as MESH_GRID
 from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
-from service.viewpaths import AXIS_UNIT, Way, path_chunks, way_of
+from service.viewpaths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
+from service.viewpaths import GRID as PATH_GRID
 from service.viewstock import stock_chunk
 from verify.model import NcProgram, Proof, ProofSetup
 from verify.sequence import Reading, read_all
@@ -155,11 +156,18 @@ def _named(ready: Prepared, name: str, faces: Sequence[int]) -> dict[str, Any]:
 
 
 def _finding(f: Mapping[str, Any], way: Way, open_: bool) -> dict[str, Any]:
-    """A finding of the report with the time at which it happens."""
-    place = f.get("tip") or f.get("point")
-    when = way.when(f["program"], f["line"], place)
+    """A finding of the report with the time at which it happens, and how the tool stands then."""
     keep = {k: f[k] for k in ("kind", "message", "program", "line", "zone", "face", "point", "depth", "limit", "count")}
-    return keep | {"time_s": None if when is None else round(when, 3 if open_ else 0)}
+    # the place of a gouge is on the part; the tool is below it
+    stand = way.stand(f["program"], f["line"], f.get("tip") or f.get("point"),
+                      0.0 if f.get("tip") or f["kind"] != "gouge" else f["depth"])
+    if stand is None:
+        return keep | {"time_s": None, "step": None, "tip_mm": None, "axis": None}
+    # seconds of a job that is not proved are whole, and in one a tool goes far: its place is on the grid of such ways
+    grid, digits = (PATH_GRID, 3) if open_ else (COARSE, 0)
+    return keep | {"time_s": round(stand.seconds, digits), "step": stand.step,
+                   "tip_mm": [round(grid * round(v / grid), 3) + 0.0 for v in stand.tip.tolist()],
+                   "axis": [round(v, 6) + 0.0 for v in stand.axis.tolist()]}
 
 
 def tool_shape(tool: ToolBody) -> dict[str, Any]:

@@ -32,6 +32,16 @@ BOOL = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
+class Stand:
+    """How a tool stands at a moment: seconds from the start of the job, row of the steps, tip (3,) mm, axis (3,)."""
+
+    seconds: float
+    step: int
+    tip: F64
+    axis: F64
+
+
+@dataclass(frozen=True, eq=False)
 class Way:
     """All moves of a job one after the other, setup frame.
 
@@ -56,20 +66,28 @@ class Way:
     steps: tuple[dict[str, Any], ...]
     names: tuple[str, ...]
 
-    def when(self, program: str, line: int, place: Sequence[float] | None) -> float | None:
-        """Seconds at which a line is run, where it is nearest to a place, (3,) mm; None where there is no such line."""
+    def stand(self, program: str, line: int, place: Sequence[float] | None, deep: float = 0.0) -> Stand | None:
+        """How the tool stands on a line, where it is nearest to a place; None where there is no such line.
+
+        place : (3,) mm; None: where the line begins
+        deep  : mm that the tool is to be beyond the place, along its axis
+        """
         if program not in self.names or line < 1:
             return None
         rows = np.flatnonzero((self.line == line) & (self.program == self.names.index(program)))
         if not len(rows):
             return None
-        if place is None:
-            return float(self.begun[rows[0]])
-        way = self.end[rows] - self.start[rows]
-        size = np.maximum((way * way).sum(axis=1), 1e-12)
-        share = np.clip(((np.asarray(place) - self.start[rows]) * way).sum(axis=1) / size, 0.0, 1.0)
-        near = int(np.argmin(np.linalg.norm(self.start[rows] + share[:, None] * way - place, axis=1)))
-        return float(self.begun[rows[near]] + share[near] * (self.ended[rows[near]] - self.begun[rows[near]]))
+        near, part = 0, 0.0
+        if place is not None:
+            way, to = self.end[rows] - self.start[rows], np.asarray(place) - deep * self.axis[rows]
+            size = np.maximum((way * way).sum(axis=1), 1e-12)
+            share = np.clip(((to - self.start[rows]) * way).sum(axis=1) / size, 0.0, 1.0)
+            near = int(np.argmin(np.linalg.norm(self.start[rows] + share[:, None] * way - to, axis=1)))
+            part = float(share[near])
+        row = int(rows[near])
+        tip = self.start[row] + part * (self.end[row] - self.start[row])
+        return Stand(float(self.begun[row] + part * (self.ended[row] - self.begun[row])), int(self.step[row]), tip,
+                     self.axis[row])
 
 
 def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation: F64,
@@ -148,7 +166,7 @@ def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[C
         line = _Line(way, rows)
         first.append(_chunk(line.thinned(rough), k, 0, low, grid, open_, turned))
         if open_:
-            then.append(_chunk(line.thinned(FINE), k, 1, low, grid, open_, turned))
+            then.append(_chunk(line.thinned(FINE, by_line=True), k, 1, low, grid, open_, turned))
     return first, then, steps, grid
 
 
@@ -171,18 +189,24 @@ class _Line:
             self.place[to], self.time[to] = places, times
             self.axis[to], self.line[to] = way.axis[rows[move]], way.line[rows[move]]
 
-    def thinned(self, tolerance: float) -> tuple[F64, I64, F64, F64, I64]:
-        """Rows that are kept where the way may be off by a tolerance, mm."""
-        keep = thinned(self.place, self.kind, tolerance, np.linalg.norm(np.diff(self.axis, axis=0), axis=1))
+    def thinned(self, tolerance: float, *, by_line: bool = False) -> tuple[F64, I64, F64, F64, I64]:
+        """Rows that are kept where the way may be off by a tolerance, mm.
+
+        by_line : the end of each line of the program stays. Feeds change from line to line, on straight ways too, and
+                  the tool is to be where the program has it at a second, and that line to be the one that is told
+        """
+        keep = thinned(self.place, self.kind, tolerance, np.linalg.norm(np.diff(self.axis, axis=0), axis=1),
+                       self.line if by_line else None)
         return self.place[keep], self.kind[keep], self.time[keep], self.axis[keep], self.line[keep]
 
 
-def thinned(place: F64, kind: I64, tolerance: float, turned: F64 | None = None) -> I64:
+def thinned(place: F64, kind: I64, tolerance: float, turned: F64 | None = None, line: I64 | None = None) -> I64:
     """Rows of a polyline that are kept: every row left out is within the tolerance of the line that is left.
 
     place  : (n, 3) float64, mm; kind : (n,) int64, what leads to each row; rows at which it changes stay
     tolerance : mm
     turned : (n - 1,) float64, rad, by which the tool turns on the way to the next row; such rows stay
+    line   : (n,) int64, of the program; the last row of each stays
 
     Returns (k,) int64 row numbers.
 
@@ -198,6 +222,8 @@ def thinned(place: F64, kind: I64, tolerance: float, turned: F64 | None = None) 
     fixed[1:-1] = (kind[1:-1] != kind[2:]) | (kind[1:-1] == START)
     if turned is not None and len(place) > 2:
         fixed[1:-1] |= (turned[:-1] > 1e-6) | (turned[1:] > 1e-6)
+    if line is not None:
+        fixed[:-1] |= line[:-1] != line[1:]
     while len(rows) > 2:
         before = len(rows)
         for parity in (0, 1):
@@ -235,4 +261,4 @@ def _chunk(rows: tuple[F64, I64, F64, F64, I64], step: int, lod: int, low: F64, 
     return Chunk("path", {"step": step, "lod": lod}, columns)
 
 
-__all__ = ["Way", "path_chunks", "thinned", "way_of"]
+__all__ = ["Stand", "Way", "path_chunks", "thinned", "way_of"]

@@ -96,6 +96,10 @@ def test_an_unproved_job_is_shown_without_its_program(part, tmp_path, monkeypatc
     (found,) = [f for f in report["findings"] if f["kind"] == "gouge"]
     assert gouge["line"] == found["line"] and gouge["point"] == found["point"]
     assert 0 < gouge["time_s"] <= head["seconds"] and gouge["program"] == PROGRAMS[0]
+    # whole seconds do not say where the tool is: that is told, as coarsely as its way is
+    assert head["steps"][gouge["step"]]["id"] == report["steps"][-1]["id"]
+    assert gouge["tip_mm"] == [3.0, 6.0, 1.5] and gouge["axis"] == [0.0, 0.0, 1.0]
+    assert [f["tip_mm"] for f in head["findings"] if f["kind"] == "residual"] == [None] * 4
     left = [head["left_unit_mm"] * c["left"].min() for w, c in zip(head["chunks"], chunks, strict=True)
             if w["kind"] == "mesh"]
     assert min(left) == pytest.approx(-0.5, abs=0.01)

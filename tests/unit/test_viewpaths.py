@@ -94,9 +94,37 @@ def test_moves_belong_to_the_steps_of_the_plan(way):
 
 def test_a_line_is_found_in_time_and_place(way):
     row = int(np.flatnonzero(way.line == 10)[0])
-    assert way.when("p.ngc", 10, (5.0, 0.0, 5.0)) == pytest.approx(0.5 * (way.begun[row] + way.ended[row]))
-    assert way.when("p.ngc", 10, None) == way.begun[row]
-    assert way.when("p.ngc", 1, None) is None and way.when("other", 10, None) is None
+    stand = way.stand("p.ngc", 10, (5.0, 0.0, 5.0))
+    assert stand.seconds == pytest.approx(0.5 * (way.begun[row] + way.ended[row])) and stand.step == 0
+    assert np.allclose(stand.tip, [5, 0, 5]) and np.allclose(stand.axis, [0, 0, 1])
+    assert way.stand("p.ngc", 10, None).seconds == way.begun[row]
+    assert way.stand("p.ngc", 1, None) is None and way.stand("other", 10, None) is None
+
+
+def test_at_a_gouge_the_tool_is_below_the_place(way):
+    down = TEXT.split("\n").index("G1 Z5 F100") + 1
+    # half a mm below what is left of the part there; without, the descent is nearest where it has cut nothing yet
+    assert way.stand("p.ngc", down, (1.0, 0.0, 5.5), 0.5).tip[2] == pytest.approx(5.0)
+    assert way.stand("p.ngc", down, (1.0, 0.0, 5.5)).tip[2] == pytest.approx(5.5)
+
+
+def test_at_each_second_the_tool_is_where_the_program_has_it(demo_tool):
+    """A straight way with another feed on every line: seconds do not go with the way."""
+    feeds = (100, 1500, 60, 900, 2000, 30)
+    text = TEXT.replace("G1 X20\n", "".join(f"G1 X{11 + k} F{f}\n" for k, f in enumerate(feeds)))
+    way = read_way(NcProgram("p.ngc", text), demo_tool[0], [demo_tool[1]], STEPS)
+    low = np.array([-5.0, -5.0, 0.0])
+    first, then, _, grid = path_chunks(way, low, open_=True)
+    chunk = then[0].columns
+    time, line = chunk["time"].rows()[:, 0] / 1000.0, chunk["line"].rows()[:, 0]
+    place = chunk["place"].rows() * grid + low
+    for row in np.flatnonzero((way.step == 0) & way.feed):
+        middle = 0.5 * (way.begun[row] + way.ended[row])
+        drawn = [np.interp(middle, time, place[:, c]) for c in range(3)]
+        assert np.linalg.norm(drawn - 0.5 * (way.start[row] + way.end[row])) < 0.01
+        assert line[np.searchsorted(time, middle)] == way.line[row]
+    # the rough level, which is only looked at, keeps neither
+    assert len(first[0].columns["kind"].rows()) < len(time) - len(feeds) + 2
 
 
 def test_of_a_proved_job_both_levels_with_lines(way):
