@@ -6,7 +6,7 @@ import { add, duration, el, figure, fill, percent, swatch } from "./dom";
 import { colourOf, onTheme, reducedMotion } from "./frame";
 import { legendOf } from "./legend";
 import { lookOf, type Look } from "./look";
-import { Picture, type Mode, type P3 } from "./scene";
+import { Picture, type Mode, type P3, type Place } from "./scene";
 import type { ViewFinding, ViewHead } from "./viewfile";
 import { fileList, keyTable, needs, toolWords, whereOf } from "./words";
 
@@ -59,8 +59,8 @@ export class JobView {
     const canvas = this.picture.canvas;
     canvas.tabIndex = 0;
     canvas.setAttribute("role", "application");
-    canvas.setAttribute("aria-label", "The part. Arrow keys turn it, shift and arrows move it, plus and minus come nearer, F shows all of it, question mark lists the keys.");
-    add(this.stage, this.names, this.ring, this.busy, this.legend, this.toolButtons());
+    canvas.setAttribute("aria-label", "The part. Arrow keys turn it, shift and arrows move it, plus and minus come nearer, Enter says what is under the cross, F shows all of it, question mark lists the keys.");
+    add(this.stage, el("div", { class: "aim", "aria-hidden": "true" }), this.names, this.ring, this.busy, this.legend, this.toolButtons());
     this.modes = { zones: this.radio("zones"), walls: this.radio("walls"), deviation: this.radio("deviation") };
     this.nodes = [el("div", { class: "left" }, this.stage, this.status, this.bar), this.programBox, this.panel];
     canvas.addEventListener("keydown", (e) => this.key(e));
@@ -343,6 +343,7 @@ export class JobView {
     if (!h) return;
     fill(this.legend, ...legendOf(h, mode, new Set([...this.shown()].map((i) => h.steps[i]!.tool)), this.stockShown));
     this.picture.above(this.legend.offsetHeight);
+    this.stage.style.setProperty("--covered", `${this.legend.offsetHeight}px`);
   }
 
   private shown(): Set<number> {
@@ -393,18 +394,17 @@ export class JobView {
     this.tell(null);
   }
 
-  private setTime(seconds: number | null, ensure = false): void {
+  private setTime(seconds: number | null, ensure = false, known: Place | null = null): void {
     const h = this.head!;
     this.seconds = seconds === null ? null : Math.min(h.seconds, Math.max(0, seconds));
     if (this.seconds !== null) {
-      const step = h.steps.findIndex((s) => this.seconds! <= s.end_s);
-      const box = this.stepBoxes[step < 0 ? h.steps.length - 1 : step];
+      const box = this.stepBoxes[(known ?? this.picture.at(this.seconds))?.step ?? -1];
       if (box && !box.checked && (ensure || this.shown().size === 0 || this.playing)) {
         box.checked = true;
         this.showSteps();
       }
     }
-    const here = this.picture.time(this.seconds);
+    const here = this.picture.time(this.seconds, known);
     const stock = here !== null && this.stock.checked && this.picture.hasStock;
     if (stock !== this.stockShown) {
       this.stockShown = stock;
@@ -415,7 +415,7 @@ export class JobView {
     this.remember();
   }
 
-  private tell(here: ReturnType<Picture["at"]>): void {
+  private tell(here: Place | null): void {
     const h = this.head!;
     if (!here || this.seconds === null) {
       this.clock.textContent = `${duration(h.seconds)} in all; move the slider to see the tool`;
@@ -495,12 +495,20 @@ export class JobView {
     this.chosen = i;
     this.findingButtons.forEach((b, k) => b.setAttribute("aria-pressed", String(k === i)));
     this.findingButtons[i]!.scrollIntoView({ block: "nearest", behavior: reducedMotion() ? "auto" : "smooth" });
-    if (f.time_s !== null) this.setTime(f.time_s, true);
-    const here = f.time_s === null ? null : this.picture.at(f.time_s);
+    // a finding of the whole part has no second, and no tool
+    const here = f.time_s === null ? null : this.stands(f);
+    this.setTime(f.time_s, true, here);
     const tool = here && this.head!.tools.find((t) => t.number === this.head!.steps[here.step]!.tool);
     // far enough away that the tool does not hide the place
     if (f.point) this.goTo(f.point, Math.max(0.09 * this.picture.size, 2.5, 1.6 * (tool?.diameter_mm ?? 0)), f);
     this.say(whereOf(f));
+  }
+
+  /** How the tool stands at a finding. Its second alone does not say it: the way is thinned, and that of a job that is not proved coarse. */
+  private stands(f: ViewFinding): Place | null {
+    const at = this.picture.at(f.time_s!);
+    if (!f.tip_mm || !f.axis || f.step === undefined || f.step === null) return at;
+    return { step: f.step, place: new Vector3(...f.tip_mm), axis: new Vector3(...f.axis).normalize(), line: this.head!.withheld ? null : f.line };
   }
 
   private goTo(point: P3, radius: number, f: ViewFinding | null): void {
@@ -516,6 +524,7 @@ export class JobView {
     if (!h || !hit) {
       this.ring.hidden = true;
       this.marked = null;
+      if (h) this.say(this.measuring ? "There is nothing of the part; choose a place on it" : "There is nothing of the part");
       return;
     }
     if (this.measuring) {
@@ -535,6 +544,13 @@ export class JobView {
     this.marked = hit.point.clone();
     this.ring.hidden = false;
     this.ring.dataset.words = "";
+    if (hit.cut || hit.spare !== null) {
+      const of = hit.spare === null ? "part" : "stock at this time";
+      this.say([hit.cut ? `Cut face of the ${of}` : "Stock at this time",
+        `X ${hit.point.x.toFixed(2)} Y ${hit.point.y.toFixed(2)} Z ${hit.point.z.toFixed(2)}`].join(" · "));
+      this.picture.ask();
+      return;
+    }
     const what = hit.label < 0 ? undefined : h.labelled[hit.label];
     const wall = h.walls.find((w) => w.faces.includes(hit.face))?.id ?? h.connections.find((c) => c.faces.includes(hit.face))?.id;
     const rest = what?.remainder === undefined ? undefined : h.remainder[what.remainder];
@@ -544,6 +560,12 @@ export class JobView {
       `X ${hit.point.x.toFixed(2)} Y ${hit.point.y.toFixed(2)} Z ${hit.point.z.toFixed(2)}`];
     this.say(words.filter(Boolean).join(" · "));
     this.picture.ask();
+  }
+
+  /** What a click does, at the cross in the middle, for who has no pointer. */
+  private aim(): void {
+    const box = this.picture.canvas.getBoundingClientRect();
+    this.click(box.left + 0.5 * box.width, box.top + 0.5 * (box.height - this.legend.offsetHeight));
   }
 
   private setMeasuring(on: boolean): void {
@@ -571,11 +593,11 @@ export class JobView {
       "+": () => p.nudge(0, 0, 0, 0, 0.85), "=": () => p.nudge(0, 0, 0, 0, 0.85), "-": () => p.nudge(0, 0, 0, 0, 1 / 0.85),
       f: () => p.fit(), "7": () => p.fit([0, -0.001, 1]), "1": () => p.fit([0, -1, 0.02]), "3": () => p.fit([1, 0, 0.02]),
       z: () => this.setMode("zones"), w: () => this.setMode("walls"), d: () => this.setMode("deviation"),
-      m: () => this.setMeasuring(!this.measuring), " ": () => this.toggle(),
+      m: () => this.setMeasuring(!this.measuring), Enter: () => this.aim(), " ": () => this.toggle(),
       n: () => this.choose(Math.min(this.findingButtons.length - 1, this.chosen + 1)), p: () => this.choose(Math.max(0, this.chosen - 1)),
       Escape: () => (this.setMeasuring(false), this.setTime(null)),
       ".": () => this.setTime((this.seconds ?? 0) + 1, true), ",": () => this.setTime((this.seconds ?? this.head!.seconds) - 1, true),
-      "?": () => this.say("Arrows turn, shift and arrows move, + and − near; F all, 7 top, 1 front, 3 side; Z W D colours; N P findings; space plays, comma and full stop one second; M measures; Escape ends."),
+      "?": () => this.say("Arrows turn, shift and arrows move, + and − near; F all, 7 top, 1 front, 3 side; Z W D colours; N P findings; space plays, comma and full stop one second; Enter says what is under the cross, M measures from cross to cross; Escape ends."),
     };
     const act = done[e.key.length === 1 ? e.key.toLowerCase() : e.key];
     if (act && this.head) {

@@ -15,6 +15,14 @@ import type { ChunkEntry, Table, ViewHead } from "./viewfile";
 export type Mode = "zones" | "walls" | "deviation";
 export type P3 = [number, number, number];
 
+/** Where the tip is, along which axis, and what leads there. */
+export interface Place {
+  step: number;
+  place: Vector3;
+  axis: Vector3;
+  line: number | null;
+}
+
 /** What is kept of one workingstep. */
 interface Way {
   lod: number;
@@ -27,8 +35,11 @@ interface Way {
   rapid: LineSegments;
 }
 
+/** A place that is seen; `cut`: on the plane of the section; `spare`: on stock, so many mm out of the part, up to a step of its grid. */
 export interface Hit {
   point: Vector3;
+  cut: boolean;
+  spare: number | null;
   face: number;
   label: number;
   left: number;
@@ -299,7 +310,7 @@ export class Picture {
     for (const label of labels ?? []) {
       const known = this.parts.get(label);
       if (!known) continue;
-      const through = new Mesh(known.mesh.geometry, new MeshBasicMaterial({ color: 0xe0007a, transparent: true, opacity: 0.28, depthTest: false, depthWrite: false, side: DoubleSide }));
+      const through = new Mesh(known.mesh.geometry, new MeshBasicMaterial({ color: 0xe0007a, transparent: true, opacity: 0.28, depthTest: false, depthWrite: false, side: DoubleSide, clippingPlanes: this.cutting ? [this.plane] : [] }));
       through.renderOrder = 5;
       this.shine.add(through);
     }
@@ -417,11 +428,17 @@ export class Picture {
 
   private clip(): void {
     const s = this.section;
-    const on = s.lengthSq() > 0 && (s.x !== 0 || s.y !== 0 || s.z !== 0);
     this.plane.set(new Vector3(-s.x, -s.y, -s.z), s.w);
     this.renderer.localClippingEnabled = true;
-    if (this.edges) (this.edges.material as LineBasicMaterial).clippingPlanes = on ? [this.plane] : [];
+    const planes = this.cutting ? [this.plane] : [];
+    if (this.edges) (this.edges.material as LineBasicMaterial).clippingPlanes = planes;
+    for (const m of this.shine.children) ((m as Mesh).material as MeshBasicMaterial).clippingPlanes = planes;
   }
+
+  private get cutting(): boolean {
+    return this.section.x !== 0 || this.section.y !== 0 || this.section.z !== 0;
+  }
+
 
   // --- the stock in time
 
@@ -468,7 +485,7 @@ export class Picture {
   // --- the tool in time -------------------------------------------------------------------------------------------
 
   /** Where the tip is at a second, and along which axis; null where the tool is on no way. */
-  at(seconds: number): { step: number; row: number; place: Vector3; axis: Vector3; line: number | null; kind: number } | null {
+  at(seconds: number): Place | null {
     const head = this.head!;
     let step = head.steps.findIndex((s) => seconds <= s.end_s);
     if (step < 0) step = head.steps.length - 1;
@@ -491,13 +508,13 @@ export class Picture {
         new Vector3(...(a.subarray(3 * row, 3 * row + 3) as unknown as P3)), share);
     const own = head.steps[step]!.axis;
     const axis = w.axis ? pick(w.axis).normalize() : new Vector3(...(own ?? [0, 0, 1]));
-    return { step, row, place: pick(w.place), axis, line: w.line ? w.line[row]! : null, kind: w.kind[row]! };
+    return { step, place: pick(w.place), axis, line: w.line ? w.line[row]! : null };
   }
 
-  /** Puts the tool where it is at a second; null: no tool, all of the way as done. */
-  time(seconds: number | null): ReturnType<Picture["at"]> {
+  /** Puts the tool where it is at a second, or to a place that is known better; null: no tool, all of the way as done. */
+  time(seconds: number | null, known: Place | null = null): Place | null {
     this.shared.now!.value = seconds ?? Infinity;
-    const here = seconds === null ? null : this.at(seconds);
+    const here = seconds === null ? null : (known ?? this.at(seconds));
     this.tool.visible = here !== null;
     this.cutStock(here ? seconds : null);
     if (here) {
@@ -633,19 +650,53 @@ export class Picture {
 
   // --- what is under the pointer --------------------------------------------------------------------------------------
 
-  private cast(caster: Raycaster): Intersection | null {
-    const s = this.section;
-    for (const hit of caster.intersectObjects([...this.parts.values()].map((p) => p.mesh), false))
-      if (s.x * hit.point.x + s.y * hit.point.y + s.z * hit.point.z <= s.w) return hit;
+  /** The first facet of the part on a ray that the section leaves; `rough`: of the first level, many times faster. */
+  private cast(caster: Raycaster, rough = false): Intersection | null {
+    const meshes = [...this.parts].map(([label, { mesh }]) => (rough ? (this.roughPart.get(label) ?? mesh) : mesh));
+    return caster.intersectObjects(meshes, false).find((hit) => this.kept(hit.point)) ?? null;
+  }
+
+  /** The first facet of the stock on a ray that is drawn. */
+  private castStock(caster: Raycaster): { hit: Intersection; spare: number } | null {
+    if (!this.stock?.mesh.visible) return null;
+    const spares = this.stock.mesh.geometry.attributes.spare as BufferAttribute;
+    for (const hit of caster.intersectObject(this.stock.mesh, false)) {
+      if (!this.kept(hit.point) || !hit.face || !hit.barycoord) continue;
+      const { a, b, c } = hit.face;
+      const spare = hit.barycoord.x * spares.getX(a) + hit.barycoord.y * spares.getX(b) + hit.barycoord.z * spares.getX(c);
+      if (spare >= this.stock.least) return { hit, spare };
+    }
     return null;
   }
 
-  /** The place of the part under a point of the page, CSS pixels. */
+  /** Whether a ray came upon a facet from inside, so that what is seen there is the cut face. */
+  private isCut(caster: Raycaster, hit: Intersection): boolean {
+    if (!this.cutting || !hit.face) return false;
+    return hit.face.normal.clone().transformDirection(hit.object.matrixWorld).dot(caster.ray.direction) > 0;
+  }
+
+  /** The place of part or stock that is seen under a point of the page, CSS pixels. */
   pick(x: number, y: number): Hit | null {
+    this.camera.updateMatrixWorld(); // it may have moved since the last picture
+    // a ray through an edge may slip between its facets, as in the middle of an even part
+    return this.pickAt(x, y) ?? this.pickAt(x + 0.31, y + 0.17) ?? this.pickAt(x - 0.17, y - 0.31);
+  }
+
+  private pickAt(x: number, y: number): Hit | null {
     const box = this.canvas.getBoundingClientRect();
     const caster = new Raycaster();
     caster.setFromCamera(new Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height), this.camera);
     const hit = this.cast(caster);
+    const stock = this.castStock(caster);
+    const onStock = stock !== null && (hit === null || stock.hit.distance < hit.distance);
+    const seen = onStock ? stock.hit : hit;
+    if (!seen) return null;
+    const cut = this.isCut(caster, seen);
+    if (cut || onStock) {
+      // what shows of the inside lies farther than the face that is cut
+      const point = (cut && caster.ray.intersectPlane(this.plane, new Vector3())) || seen.point;
+      return { point, cut, spare: onStock ? stock.spare : null, face: -1, label: -1, left: 0, judged: 0 };
+    }
     if (!hit?.face) return null;
     const mesh = hit.object as Mesh;
     const g = mesh.geometry;
@@ -653,7 +704,7 @@ export class Picture {
       hit.point.distanceToSquared(new Vector3().fromBufferAttribute(g.attributes.position as BufferAttribute, c)) <
       hit.point.distanceToSquared(new Vector3().fromBufferAttribute(g.attributes.position as BufferAttribute, best)) ? c : best);
     return {
-      point: hit.point, face: (mesh.userData.face as Int32Array)[corner]!, label: mesh.userData.label as number,
+      point: hit.point, cut: false, spare: null, face: (mesh.userData.face as Int32Array)[corner]!, label: mesh.userData.label as number,
       left: (g.attributes.left_ as BufferAttribute).getX(corner), judged: (g.attributes.judged as BufferAttribute).getX(corner),
     };
   }
@@ -670,12 +721,12 @@ export class Picture {
     return this.section.x * p.x + this.section.y * p.y + this.section.z * p.z <= this.section.w;
   }
 
-  /** Whether nothing of the part stands before a place. */
+  /** Whether nothing of the part stands before a place, as far as the rough level tells. */
   free(p: Vector3): boolean {
     const d = this.camera.position.clone().sub(p);
     const far = d.length();
     d.normalize();
-    return this.cast(new Raycaster(p.clone().addScaledVector(d, 0.01 * this.size), d, 0, far)) === null;
+    return this.cast(new Raycaster(p.clone().addScaledVector(d, 0.02 * this.size), d, 0, far), true) === null;
   }
 
   /** A straight line between two places that the part does not hide; null takes it away. */

@@ -1,5 +1,5 @@
 // The stock as it is drawn. To look at only: the proof has a finer model.
-import { BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial } from "three";
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial, Sphere, Vector3 } from "three";
 import { STOCK } from "./colours";
 import { noNet, surface, type Net } from "./field";
 import { States, type Course } from "./states";
@@ -31,15 +31,21 @@ const SHOWN = 0.08; // of a step: stock that stands out of the part by less is n
 
 export class Stock {
   readonly mesh: Mesh;
+  /** mm that stock stands out of the part where it is drawn. */
+  readonly least: number;
   private readonly states: States;
   private net: Net = noNet();
 
   /** allowed : mm of stock on the part that are as good as none */
   constructor(entry: ChunkEntry, t: Table, section: { value: unknown }, allowed: number) {
     this.states = new States(entry, t);
+    this.least = Math.max(SHOWN * entry.step_mm!, allowed);
     const material = new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: Math.max(SHOWN * entry.step_mm!, allowed) }, base: { value: new Color(...STOCK) } } as never });
+      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: this.least }, base: { value: new Color(...STOCK) } } as never });
     this.mesh = new Mesh(new BufferGeometry(), material);
+    const { nx, ny, nz, step, origin } = this.states.grid; // what a ray looks at, whatever the surface is just now
+    const half = new Vector3(nx, ny, nz).multiplyScalar(0.5 * step);
+    this.mesh.geometry.boundingSphere = new Sphere(new Vector3(...origin).add(half), half.length());
     this.mesh.frustumCulled = false;
     const r = entry.rotation!;
     // rows of the rotation are the axes of the grid in the setup frame

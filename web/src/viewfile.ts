@@ -55,6 +55,10 @@ export interface ViewFinding {
   limit: number;
   count: number;
   time_s: number | null;
+  /** How the tool stands then; files of earlier versions do not say it. */
+  step?: number | null;
+  tip_mm?: [number, number, number] | null;
+  axis?: [number, number, number] | null;
 }
 
 export interface ViewZone {

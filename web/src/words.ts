@@ -43,7 +43,7 @@ export function needs(r: ViewRest): string {
 
 export function keyTable(): HTMLElement {
   const rows: [string, string][] = [["arrows", "turn"], ["shift + arrows", "move"], ["+ −", "nearer, farther"], ["F 7 1 3", "all, top, front, side"],
-    ["Z W D", "zones, walls, deviation"], ["N P", "next finding, the one before"], ["space", "play, pause"], [", .", "one second back, on"], ["M", "measure"], ["Esc", "put tool and ruler away"]];
+    ["Z W D", "zones, walls, deviation"], ["N P", "next finding, the one before"], ["space", "play, pause"], [", .", "one second back, on"], ["Enter", "what is under the cross"], ["M", "measure"], ["Esc", "put tool and ruler away"]];
   return el("table", { class: "keys" }, el("caption", {}, "Keys, while the picture has the focus"), el("tbody", {}, ...rows.map(([k, w]) => el("tr", {}, el("th", { scope: "row" }, el("kbd", {}, k)), el("td", {}, w)))));
 }
 

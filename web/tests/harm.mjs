@@ -54,6 +54,36 @@ async function folder() {
   await page.waitForTimeout(100);
   assert.deepEqual(await pose(page), [50, -10, 40, 8, 6, 2]);
 
+  // what is under the pointer is what is seen there: stock while there is some, and the plane where the section cuts
+  const seen = async (hash) => {
+    await page.evaluate((l) => (location.hash = l), hash);
+    await page.waitForTimeout(300);
+    return page.evaluate(() => {
+      const box = document.querySelector(".stage canvas").getBoundingClientRect();
+      const out = [];
+      for (let i = 0; i < 40; i++) for (let j = 0; j < 30; j++) out.push(window.zonemill.picture.pick(box.left + (box.width * (i + 0.5)) / 40, box.top + (box.height * (j + 0.5)) / 30));
+      return out.filter(Boolean).map((h) => ({ ...h, point: h.point.toArray() }));
+    });
+  };
+  const from = "#c=20,-25,25,8,6,2&m=zones";
+  const whole_ = await seen(from);
+  assert(whole_.length > 40 && whole_.every((h) => !h.cut && h.spare === null && h.face > 0));
+  const stocked = await seen(`${from}&t=3`);
+  assert(stocked.filter((h) => h.spare > 0.1).length > 20 && stocked.some((h) => h.point[2] > 4.3), "the blank stands 0.5 mm over the part, and is not met");
+  const cut = (await seen(`${from}&s=1,0.5,1`)).filter((h) => h.cut);
+  assert(cut.length > 20 && cut.every((h) => Math.abs(h.point[1] - 6) < 1e-3), "a cut face lies in the plane of the section");
+
+  // by keys alone: what is under the cross, and a distance of two such places
+  await page.evaluate((l) => (location.hash = l), from);
+  await page.locator("canvas").focus();
+  for (const key of ["f", "7", "Enter"]) await page.keyboard.press(key);
+  assert(await page.locator(".aim").isVisible());
+  assert.match(await page.locator(".status").textContent(), /^Face F\d+ .* X 8\.0\d Y 6\.0\d Z/);
+  for (const key of ["m", "Enter", "Shift+ArrowRight", "Shift+ArrowRight", "Enter"]) await page.keyboard.press(key);
+  const distance = /Distance ([\d.]+) mm: X ([-\d.]+), Y ([-\d.]+)/.exec(await page.locator(".status").textContent());
+  assert(distance && Math.abs(Number(distance[2])) > 0.5 && Math.abs(Number(distance[3])) < 0.05, await page.locator(".status").textContent());
+  await page.keyboard.press("Escape");
+
   // browsers stop a page that writes the address at every frame
   await page.getByLabel("Speed of playing").selectOption("10");
   await page.evaluate(() => (window.replaced = 0));
