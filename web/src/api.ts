@@ -1,4 +1,5 @@
 // The HTTP interface, with the key of whoever looks at the page. The key is kept for this tab only.
+import { keep, kept } from "./kept";
 import type { components } from "./wire";
 
 export type Job = components["schemas"]["Job"];
@@ -22,18 +23,17 @@ export class Refusal extends Error {
   }
 }
 
-export function keep(key: string): void {
-  if (key) sessionStorage.setItem(KEY, key);
-  else sessionStorage.removeItem(KEY);
+export function useKey(key: string): void {
+  keep("sessionStorage", KEY, key || null);
 }
 
 export function hasKey(): boolean {
-  return sessionStorage.getItem(KEY) !== null;
+  return kept("sessionStorage", KEY) !== null;
 }
 
 export async function ask(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = new Headers(init.headers);
-  const key = sessionStorage.getItem(KEY);
+  const key = kept("sessionStorage", KEY);
   if (key) headers.set("Authorization", `Bearer ${key}`);
   let answer: Response;
   try {

@@ -59,8 +59,7 @@ export function figure(value: number | null | undefined, digits: number, unit = 
   return value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit ? `\u202f${unit}` : ""}`;
 }
 
+/** A share of 0..1, rounded down as on the sheet, so that 100 % is all of it. */
 export function percent(value: number | null | undefined): string {
-  if (value === null || value === undefined) return "–";
-  const words = (100 * value).toFixed(1);
-  return `${value < 1 && words === "100.0" ? ">\u202f99.9" : words}\u202f%`; // all of it is said of all of it alone
+  return value === null || value === undefined ? "–" : `${Math.floor(1e4 * value + 1e-9) / 100}\u202f%`;
 }

@@ -1,13 +1,14 @@
 // What every page has: its head, its theme, the field for a key, and words for what was refused.
-import { Refusal, hasKey, keep } from "./api";
+import { Refusal, hasKey, useKey } from "./api";
 import { el, fill } from "./dom";
+import { keep, kept } from "./kept";
 
 export type Theme = "auto" | "light" | "dark";
 const THEME = "zonemill-theme";
 
 export function theme(): Theme {
-  const kept = localStorage.getItem(THEME);
-  return kept === "light" || kept === "dark" ? kept : "auto";
+  const chosen = kept("localStorage", THEME);
+  return chosen === "light" || chosen === "dark" ? chosen : "auto";
 }
 
 export function isDark(): boolean {
@@ -36,7 +37,7 @@ export function colourOf(name: string): string {
 /** The head of a page; `more` stands at its right end. */
 export function head(title: Node, ...more: Node[]): HTMLElement {
   const button = el("button", { type: "button", class: "quiet", onclick: () => {
-    localStorage.setItem(THEME, isDark() ? "light" : "dark");
+    keep("localStorage", THEME, isDark() ? "light" : "dark");
     apply();
     name();
   } });
@@ -77,7 +78,7 @@ function keyForm(error: Refusal, again: () => void): HTMLElement {
       wrong.textContent = "A key is of plain letters, figures and underscores, without spaces. Copy it once more.";
       return;
     }
-    keep(key);
+    useKey(key);
     again();
   } },
     el("h2", {}, "This service asks for a key"),

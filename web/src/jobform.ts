@@ -1,6 +1,7 @@
 // A part and a setup without JSON: the fields most jobs need, a table of tools, and the rest as text for who wants it.
 import { Refusal, ask, type Job, type Setup, type Tool } from "./api";
 import { add, el, field, fill } from "./dom";
+import { keep, kept } from "./kept";
 
 type ToolRow = Partial<Record<keyof Tool, unknown>> & { id: string; kind: string; diameter_mm: number; holder?: unknown };
 
@@ -21,7 +22,7 @@ const COLUMNS: { key: string; title: string; hint: string }[] = [
 ];
 
 export function jobForm(): HTMLElement {
-  let tools: (ToolRow | string)[] = kept();
+  let tools: (ToolRow | string)[] = keptTools();
   let rest: Record<string, unknown> = {};
   const part = el("input", { type: "file", id: "part", accept: ".step,.stp,.STEP,.STP", required: true });
   const order = el("input", { type: "text", id: "order", maxlength: 100, placeholder: "for example 4711, impeller" });
@@ -230,9 +231,9 @@ function clean(t: ToolRow | string): ToolRow | string {
   return out;
 }
 
-function kept(): (ToolRow | string)[] {
+function keptTools(): (ToolRow | string)[] {
   try {
-    const found = JSON.parse(localStorage.getItem(KEPT) ?? "null") as (ToolRow | string)[] | null;
+    const found = JSON.parse(kept("localStorage", KEPT) ?? "null") as (ToolRow | string)[] | null;
     if (Array.isArray(found) && found.length) return found;
   } catch {
     // what was kept cannot be read: begin anew
@@ -241,5 +242,5 @@ function kept(): (ToolRow | string)[] {
 }
 
 function keepTools(tools: (ToolRow | string)[]): void {
-  localStorage.setItem(KEPT, JSON.stringify(tools));
+  keep("localStorage", KEPT, JSON.stringify(tools));
 }

@@ -127,6 +127,7 @@ export interface ViewHead {
 
 export type Table = Record<string, Int32Array>;
 
+const NEWEST = 2; // version of a file that this page knows
 const MAGIC = "ZMVIEW1\n";
 
 const MOST_HEAD = 1 << 28; // bytes
@@ -221,6 +222,7 @@ export async function readView(
     throw new BrokenView("The file with the picture has another form than this page knows. Load the page again; where that does not help, another version made it.");
   const length = new DataView(start.buffer).getUint32(8, true);
   const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MOST_HEAD))) as ViewHead;
+  if (head.version > NEWEST) throw new BrokenView("A later version made the file with the picture. Look at it with that one.");
   onHead(head);
   for (const entry of head.chunks) onChunk(entry, columnsOf(await inflate(await bytes.take(entry.size), bytesOf(entry.columns)), entry.columns));
   return bytes.total;

@@ -1,6 +1,6 @@
 // What is said of jobs, findings and what stays.
 import { ask, type JobFiles } from "./api";
-import { el } from "./dom";
+import { el, percent } from "./dom";
 import type { ViewFinding, ViewHead, ViewRest } from "./viewfile";
 
 export const STATE_WORDS: Record<string, string> = {
@@ -32,13 +32,33 @@ export function whereOf(f: ViewFinding): string {
   return `${f.kind}: ${f.message}${f.line ? `; ${f.program} line ${f.line}` : ""}${at}`;
 }
 
-/** What would do for an entry of the remainder, in words. */
+const OTHERS: Record<string, string> = { "other access": "another tool axis", "other process": "another process" };
+
+interface Need {
+  kind?: string;
+  diameter_mm?: number;
+  corner_radius_mm?: number;
+  neck_length_mm?: number;
+  shank_diameter_mm?: number;
+  stickout_mm?: number;
+  share?: number;
+  slenderness?: number;
+  access?: string;
+}
+
+/** What would do for an entry of the remainder, in words; as much as the sheet says (service/sheettables.py). */
 export function needs(r: ViewRest): string {
-  const w = r.would_need as { kind?: string; diameter_mm?: number; neck_length_mm?: number; stickout_mm?: number; corner_radius_mm?: number };
-  if (!w.kind) return [r.tool_at_hand ? `${r.tool_at_hand} would reach it` : "", r.why_left ?? ""].filter(Boolean).join(": ");
-  if (w.diameter_mm === undefined) return `needs ${w.kind.replace(/^other /, "another ")}`;
-  const neck = w.neck_length_mm !== undefined ? `, neck ${w.neck_length_mm} mm` : "";
-  return `needs a ${w.kind} of ${w.diameter_mm} mm${neck}`;
+  const w = r.would_need as Need;
+  const round = w.kind === "bull" ? ` with a corner of ${w.corner_radius_mm} mm` : "";
+  return [
+    r.why_left,
+    r.tool_at_hand && `${r.tool_at_hand} would reach it`,
+    w.diameter_mm !== undefined && `needs a ${w.kind} of ${w.diameter_mm} mm${round}, neck ${w.neck_length_mm} mm, shank ${w.shank_diameter_mm} mm, stickout ${w.stickout_mm} mm`,
+    w.diameter_mm !== undefined && (w.share ?? 1) < 1 && `for ${percent(w.share)} of it`,
+    w.diameter_mm === undefined && w.kind && `needs ${OTHERS[w.kind] ?? w.kind}`,
+    w.slenderness !== undefined && `as a tool would be ${w.slenderness.toFixed(1)} times as long as thick`,
+    w.access && `along ${w.access}`,
+  ].filter(Boolean).join(", ") || "no tool would reach it";
 }
 
 export function keyTable(): HTMLElement {

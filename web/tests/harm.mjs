@@ -84,6 +84,29 @@ async function folder() {
   assert(distance && Math.abs(Number(distance[2])) > 0.5 && Math.abs(Number(distance[3])) < 0.05, await page.locator(".status").textContent());
   await page.keyboard.press("Escape");
 
+  // at any second the tool is on the line of the program that is told
+  const text = (await (await fetch(url.replace(/\/view$/, "/files/program.linuxcnc.ngc"))).text()).split("\n");
+  const ends = [[NaN, NaN, NaN]]; // behind each line
+  for (const line of text) {
+    const words = line.replace(/\(.*?\)/g, "");
+    assert(!/G0?[23]\b/.test(words), "this looks at straight lines only");
+    ends.push(ends.at(-1).map((v, c) => Number(new RegExp(`${"XYZ"[c]}(-?[\\d.]+)`).exec(words)?.[1] ?? v)));
+  }
+  said.lines = 0;
+  for (let t = 5; t < 140; t += 2.3) {
+    await page.getByLabel("Time of machining").evaluate((s, v) => {
+      s.value = String(v);
+      s.dispatchEvent(new Event("input", { bubbles: true }));
+    }, Math.round(10 * t));
+    const [, x, y, z, line] = /X (\S+) Y (\S+) Z (\S+) · line (\d+)/.exec(await page.locator(".clock").textContent()).map(Number);
+    const [a, b, p] = [ends[line - 1], ends[line], [x, y, z]];
+    const way = b.map((v, c) => v - a[c]);
+    const share = Math.min(1, Math.max(0, way.reduce((sum, v, c) => sum + v * (p[c] - a[c]), 0) / Math.max(1e-12, way.reduce((sum, v) => sum + v * v, 0))));
+    const off = Math.hypot(...way.map((v, c) => a[c] + share * v - p[c]));
+    assert(off < 0.01, `at ${t} s the tool is ${off} mm from line ${line}, ${text[line - 1]}`);
+    said.lines++;
+  }
+
   // browsers stop a page that writes the address at every frame
   await page.getByLabel("Speed of playing").selectOption("10");
   await page.evaluate(() => (window.replaced = 0));
@@ -149,6 +172,21 @@ async function folder() {
 }
 
 async function service() {
+  // a browser that keeps nothing for anybody shows the page all the same
+  const { browser: poor, page: bare } = await open(url, 390, 664, { before: () => {
+    for (const shelf of ["localStorage", "sessionStorage"]) Object.defineProperty(window, shelf, { get: () => {
+      throw new DOMException("denied", "SecurityError");
+    } });
+  } });
+  const LONG = "W".repeat(200); // as long as a label may be
+  await bare.route("**/v1/jobs?*", (route) => route.fulfill({ json: { items: [{ id: "j2", kind: "plan", state: "failed", stage: "", progress: 0, labels: { order: LONG }, created_at: "2026-01-01T00:00:00Z",
+    error: { title: "", detail: LONG }, links: {} }], next_cursor: null } }));
+  await bare.goto(url);
+  await bare.getByRole("button", { name: "Use dark colours" }).click();
+  await bare.locator(".jobrow").waitFor();
+  await fits(bare, 390);
+  await poor.close();
+
   const { browser, page } = await open(url, 1280, 800);
   const said = { setups: [] };
   await page.goto(url);
