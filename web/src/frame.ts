@@ -64,7 +64,9 @@ export function showRefusal(place: HTMLElement, error: unknown, again: () => voi
     el("h2", {}, problem.title ?? "That did not work"),
     el("p", {}, error instanceof Error ? error.message : String(error)),
     problem.remedy ? el("p", {}, el("strong", {}, "What to do: "), problem.remedy) : null,
-    el("button", { type: "button", onclick: again }, "Try again")));
+    el("p", { class: "buttons" }, el("button", { type: "button", onclick: again }, "Try again"),
+      // a job of another key is none to this one
+      error instanceof Refusal && error.status === 404 && hasKey() ? el("button", { type: "button", onclick: () => fill(place, keyForm(error, again)) }, "Use another key") : null)));
 }
 
 function keyForm(error: Refusal, again: () => void): HTMLElement {

@@ -21,7 +21,8 @@ const COLUMNS: { key: string; title: string; hint: string }[] = [
   { key: "shank_diameter_mm", title: "Shank Ø", hint: "Diameter of the shank, mm" }, { key: "stickout_mm", title: "Stickout", hint: "Tip to holder nose, mm" },
 ];
 
-export function jobForm(): HTMLElement {
+/** `onKeyless` is called where a job was refused for want of a key; `again` asks for what the form has from the service. */
+export function jobForm(onKeyless: () => void): { node: HTMLElement; again: () => void } {
   let tools: (ToolRow | string)[] = keptTools();
   let rest: Record<string, unknown> = {};
   const part = el("input", { type: "file", id: "part", accept: ".step,.stp,.STEP,.STP", required: true });
@@ -135,10 +136,11 @@ export function jobForm(): HTMLElement {
       location.assign(`/v1/jobs/${job.id}/view`);
     } catch (error) {
       refuse(answer, error);
+      if (error instanceof Refusal && error.status === 401) onKeyless();
       send.disabled = dry.disabled = false;
     }
   }
-  return form;
+  return { node: form, again: () => void materials(material) };
 }
 
 /** Chooses a value, one the page does not know too: what a setup asks for is not changed on its way. */
@@ -154,9 +156,10 @@ function refuse(place: HTMLElement, error: unknown): void {
   const problem = error instanceof Refusal ? error.problem : {};
   const list = el("ul");
   if (Array.isArray(problem.measured))
-    for (const m of problem.measured as { at?: string; problem?: string }[]) if (m && m.at) add(list, el("li", {}, el("strong", {}, m.at), ` ${m.problem ?? ""}`));
+    for (const m of problem.measured as ({ at?: unknown; problem?: string } | string | null)[]) if (m && typeof m === "object" && typeof m.at === "string") add(list, el("li", {}, el("strong", {}, m.at), ` ${m.problem ?? ""}`));
+  const remedy = error instanceof Refusal && error.status === 401 ? "give the key under Jobs on this page, and send once more" : problem.remedy;
   fill(place, el("div", { class: "refusal", role: "alert" }, el("h3", {}, problem.title ?? "The job was not taken"), el("p", {}, error instanceof Error ? error.message : String(error)), list,
-    problem.remedy ? el("p", {}, el("strong", {}, "What to do: "), problem.remedy) : null));
+    remedy ? el("p", {}, el("strong", {}, "What to do: "), remedy) : null));
 }
 
 async function materials(select: HTMLSelectElement): Promise<void> {

@@ -8,17 +8,23 @@ import { stateBadge } from "./words";
 export async function listPage(app: HTMLElement): Promise<void> {
   document.title = "Jobs · zonemill";
   const list = el("div", { class: "jobs" });
-  const main = el("main", { id: "main", class: "list" }, jobForm(), el("section", { "aria-labelledby": "jobs" }, el("h2", { id: "jobs" }, "Jobs"), list));
+  const again = (): void => {
+    fill(list);
+    void load(list, again);
+    form.again(); // what was written into it stays
+  };
+  const form = jobForm(again);
+  const main = el("main", { id: "main", class: "list" }, form.node, el("section", { "aria-labelledby": "jobs" }, el("h2", { id: "jobs" }, "Jobs"), list));
   fill(app, head(el("h1", { class: "title" }, "Jobs")), main);
-  await load(app, list);
+  await load(list, again);
 }
 
-async function load(app: HTMLElement, list: HTMLElement, cursor = ""): Promise<void> {
+async function load(list: HTMLElement, again: () => void, cursor = ""): Promise<void> {
   let page: JobPage;
   try {
     page = await get<JobPage>(`/v1/jobs?limit=30${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
   } catch (error) {
-    showRefusal(list, error, () => void listPage(app));
+    showRefusal(list, error, again);
     return;
   }
   if (!cursor && !page.items.length) fill(list, el("p", { class: "hint" }, "There are none yet. Post a part above, or run make demo."));
@@ -27,7 +33,7 @@ async function load(app: HTMLElement, list: HTMLElement, cursor = ""): Promise<v
     const next = page.next_cursor;
     const more = el("button", { type: "button", onclick: () => {
       more.remove();
-      void load(app, list, next);
+      void load(list, again, next);
     } }, "Older jobs");
     list.appendChild(more);
   }

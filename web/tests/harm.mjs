@@ -246,6 +246,31 @@ async function service() {
   await page.getByRole("button", { name: "Use it" }).click();
   await page.waitForFunction(() => sessionStorage.length === 1);
   forgive(/401/);
+
+  // what was written into the form stays while a key is given, and a key that may not submit is told so
+  let status = 401;
+  await page.unroute("**/v1/jobs?*");
+  await page.route("**/v1/jobs?*", (route) => (status === 401 ? route.fulfill({ status, json: { title: "No key", status, detail: "send a key" } }) : route.continue()));
+  await page.route("**/v1/jobs", (route) => route.fulfill({ status, json: { title: "Refused", status, detail: "this key may not submit", measured: ["read"], remedy: "ask for more" } }));
+  await page.goto(url);
+  await page.setInputFiles("#part", { name: "p.step", mimeType: "model/step", buffer: Buffer.from("ISO-10303-21;") });
+  await page.fill("#order", "4711");
+  await page.locator("button.main", { hasText: "Plan and prove" }).click();
+  await page.getByText("give the key under Jobs").waitFor();
+  status = 403;
+  await page.fill("#key", "zm_cd");
+  await page.getByRole("button", { name: "Use it" }).click();
+  await page.getByText("There are none yet").waitFor();
+  assert.equal(await page.inputValue("#order"), "4711");
+  assert.equal(await page.evaluate(() => document.getElementById("part").files.length), 1);
+  await page.locator("button.main", { hasText: "Plan and prove" }).click();
+  await page.getByText("this key may not submit").waitFor();
+  assert(await page.locator("button.main", { hasText: "Plan and prove" }).isEnabled());
+  // a link to a job of another key
+  await page.goto(new URL("/v1/jobs/none/view", url).href);
+  await page.getByRole("button", { name: "Use another key" }).click();
+  await page.locator("#key").waitFor();
+  forgive(/40[134]/);
   await browser.close();
   return said;
 }
