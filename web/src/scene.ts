@@ -5,7 +5,8 @@ import {
   ShaderMaterial, Vector2, Vector3, Vector4, WebGLRenderer, LineBasicMaterial, LinearSRGBColorSpace, GLSL3, type Intersection,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER, STEPS, UNCUT, toolColour, wallColour, zoneColour, type RGB } from "./colours";
+import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER, STEPS, STOCK, UNCUT, toolColour, wallColour, zoneColour, type RGB } from "./colours";
+import { CutFace } from "./cutface";
 import { PART_FRAGMENT, PART_VERTEX, WAY_FRAGMENT, WAY_VERTEX } from "./shaders";
 import type { Course } from "./states";
 import { Stock } from "./stock";
@@ -76,6 +77,8 @@ export class Picture {
   private ways = new Map<number, Way>();
   private section = NO_SECTION.clone();
   private plane = new Plane();
+  private cutPart: CutFace;
+  private cutStock_: CutFace;
   private shared: Record<string, { value: unknown }>;
   private asked = false;
   private toolShown = -1;
@@ -88,7 +91,7 @@ export class Picture {
   onMove: () => void = () => {};
 
   constructor(place: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: !drawnBySoftware(), powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({ stencil: true, antialias: !drawnBySoftware(), powerPreference: "high-performance" });
     this.canvas = this.renderer.domElement;
     // a phone takes the graphics card away from a page that was put aside, and gives it back
     this.canvas.addEventListener("webglcontextrestored", () => this.ask());
@@ -112,6 +115,9 @@ export class Picture {
       uncut: { value: new Color(...UNCUT) }, pale: { value: new Color(...PALE) }, stripe: { value: new Color(...REMAINDER) },
       cap: { value: new Color(0.55, 0.57, 0.6) }, paper: { value: new Color(1, 1, 1) }, now: { value: Infinity },
     };
+    this.cutPart = new CutFace(this.shared.section!, this.shared.cap!.value as Color, -2);
+    this.cutStock_ = new CutFace(this.shared.section!, new Color(...STOCK), -4);
+    this.scene.add(this.cutPart.group, this.cutStock_.group);
     new ResizeObserver(() => this.resize(place)).observe(place);
     this.resize(place);
   }
@@ -278,6 +284,7 @@ export class Picture {
         this.parts.delete(label);
       }
     this.showLevels();
+    this.fillCut();
     this.stockFed = false;
     this.ask();
   }
@@ -389,6 +396,7 @@ export class Picture {
       mesh.visible = !(rough && this.coarse < 1);
       if (rough) rough.visible = this.coarse < 1;
     }
+    this.showCut();
     this.showWays();
   }
 
@@ -432,7 +440,22 @@ export class Picture {
     this.renderer.localClippingEnabled = true;
     const planes = this.cutting ? [this.plane] : [];
     if (this.edges) (this.edges.material as LineBasicMaterial).clippingPlanes = planes;
+    this.fillCut();
     for (const m of this.shine.children) ((m as Mesh).material as MeshBasicMaterial).clippingPlanes = planes;
+  }
+
+  /** The cut faces, of the finest level there is; while a slow machine draws the rough one the inside is seen instead. */
+  private fillCut(): void {
+    if (this.cutting) {
+      this.cutPart.cut(this.section, [...this.parts.values()].map((p) => p.mesh), this.middle, this.size);
+      this.cutStock_.cut(this.section, this.stock ? [this.stock.mesh] : [], this.middle, this.size);
+    }
+    this.showCut();
+  }
+
+  private showCut(): void {
+    this.cutPart.group.visible = this.cutting && this.coarse === 1;
+    this.cutStock_.group.visible = this.cutPart.group.visible && this.stock?.mesh.visible === true;
   }
 
   private get cutting(): boolean {
@@ -477,6 +500,7 @@ export class Picture {
     const { stock } = this;
     if (!stock) return;
     stock.mesh.visible = seconds !== null && this.stockOn;
+    this.showCut();
     if (!stock.mesh.visible) return;
     if (!this.stockFed) this.feedStock(stock);
     stock.time(seconds!);
@@ -656,23 +680,16 @@ export class Picture {
     return caster.intersectObjects(meshes, false).find((hit) => this.kept(hit.point)) ?? null;
   }
 
-  /** The first facet of the stock on a ray that is drawn. */
-  private castStock(caster: Raycaster): { hit: Intersection; spare: number } | null {
-    if (!this.stock?.mesh.visible) return null;
-    const spares = this.stock.mesh.geometry.attributes.spare as BufferAttribute;
-    for (const hit of caster.intersectObject(this.stock.mesh, false)) {
-      if (!this.kept(hit.point) || !hit.face || !hit.barycoord) continue;
-      const { a, b, c } = hit.face;
-      const spare = hit.barycoord.x * spares.getX(a) + hit.barycoord.y * spares.getX(b) + hit.barycoord.z * spares.getX(c);
-      if (spare >= this.stock.least) return { hit, spare };
-    }
-    return null;
+  /** mm that stock stands out of the part where a ray meets it. */
+  private spareAt(hit: Intersection): number {
+    const spares = (hit.object as Mesh).geometry.attributes.spare as BufferAttribute;
+    const { a, b, c } = hit.face!;
+    return hit.barycoord!.x * spares.getX(a) + hit.barycoord!.y * spares.getX(b) + hit.barycoord!.z * spares.getX(c);
   }
 
-  /** Whether a ray came upon a facet from inside, so that what is seen there is the cut face. */
-  private isCut(caster: Raycaster, hit: Intersection): boolean {
-    if (!this.cutting || !hit.face) return false;
-    return hit.face.normal.clone().transformDirection(hit.object.matrixWorld).dot(caster.ray.direction) > 0;
+  /** Whether a ray is in a body where it comes through the section: it leaves the body more often than it enters it. */
+  private inside(caster: Raycaster, hits: Intersection[]): boolean {
+    return this.cutting && hits.reduce((sum, h) => sum + Math.sign(h.face!.normal.clone().transformDirection(h.object.matrixWorld).dot(caster.ray.direction)), 0) > 0;
   }
 
   /** The place of part or stock that is seen under a point of the page, CSS pixels. */
@@ -686,17 +703,17 @@ export class Picture {
     const box = this.canvas.getBoundingClientRect();
     const caster = new Raycaster();
     caster.setFromCamera(new Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height), this.camera);
-    const hit = this.cast(caster);
-    const stock = this.castStock(caster);
-    const onStock = stock !== null && (hit === null || stock.hit.distance < hit.distance);
-    const seen = onStock ? stock.hit : hit;
-    if (!seen) return null;
-    const cut = this.isCut(caster, seen);
-    if (cut || onStock) {
-      // what shows of the inside lies farther than the face that is cut
-      const point = (cut && caster.ray.intersectPlane(this.plane, new Vector3())) || seen.point;
-      return { point, cut, spare: onStock ? stock.spare : null, face: -1, label: -1, left: 0, judged: 0 };
+    const onPart = caster.intersectObjects([...this.parts.values()].map((p) => p.mesh), false).filter((h) => this.kept(h.point));
+    const onStock = this.stock?.mesh.visible ? caster.intersectObject(this.stock.mesh, false).filter((h) => this.kept(h.point)) : [];
+    const none = { face: -1, label: -1, left: 0, judged: 0 };
+    const inPart = this.inside(caster, onPart);
+    if (inPart || this.inside(caster, onStock)) {
+      const point = caster.ray.intersectPlane(this.plane, new Vector3());
+      if (point) return { ...none, point, cut: true, spare: inPart ? null : 0 };
     }
+    const hit = onPart[0];
+    const stock = onStock.find((h) => this.spareAt(h) >= this.stock!.least);
+    if (stock && (!hit || stock.distance < hit.distance)) return { ...none, point: stock.point, cut: false, spare: this.spareAt(stock) };
     if (!hit?.face) return null;
     const mesh = hit.object as Mesh;
     const g = mesh.geometry;

@@ -61,8 +61,17 @@ async function folder() {
     return page.evaluate(() => {
       const box = document.querySelector(".stage canvas").getBoundingClientRect();
       const out = [];
-      for (let i = 0; i < 40; i++) for (let j = 0; j < 30; j++) out.push(window.zonemill.picture.pick(box.left + (box.width * (i + 0.5)) / 40, box.top + (box.height * (j + 0.5)) / 30));
-      return out.filter(Boolean).map((h) => ({ ...h, point: h.point.toArray() }));
+      const gl = document.querySelector(".stage canvas").getContext("webgl2");
+      window.zonemill.frame();
+      const rgba = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+      gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
+      for (let i = 0; i < 40; i++) for (let j = 0; j < 30; j++) {
+        const [x, y] = [(i + 0.5) / 40, (j + 0.5) / 30];
+        const hit = window.zonemill.picture.pick(box.left + box.width * x, box.top + box.height * y);
+        const at = 4 * (Math.floor((1 - y) * gl.drawingBufferHeight) * gl.drawingBufferWidth + Math.floor(x * gl.drawingBufferWidth));
+        if (hit) out.push({ ...hit, point: hit.point.toArray(), red: rgba[at], blue: rgba[at + 2] });
+      }
+      return out;
     });
   };
   const from = "#c=20,-25,25,8,6,2&m=zones";
@@ -71,10 +80,15 @@ async function folder() {
   const stocked = await seen(`${from}&t=3`);
   assert(stocked.filter((h) => h.spare > 0.1).length > 20 && stocked.some((h) => h.point[2] > 4.3), "the blank stands 0.5 mm over the part, and is not met");
   const cut = (await seen(`${from}&s=1,0.5,1`)).filter((h) => h.cut);
+  const both = await seen(`${from}&t=3&s=1,0.5,1`);
+  const cutStock = both.filter((h) => h.cut && h.spare !== null);
+  assert(cutStock.length >= 5 && both.some((h) => h.cut && h.spare === null), "part and blank are cut");
+  assert(cutStock.filter((h) => h.red > h.blue + 20).length >= 0.8 * cutStock.length, "the cut face of the blank is not drawn in its colour");
+  assert(both.every((h) => h.cut || h.spare !== null), "the part is seen through the blank");
   assert(cut.length > 20 && cut.every((h) => Math.abs(h.point[1] - 6) < 1e-3), "a cut face lies in the plane of the section");
 
   // by keys alone: what is under the cross, and a distance of two such places
-  await page.evaluate((l) => (location.hash = l), from);
+  await seen(from);
   await page.locator("canvas").focus();
   for (const key of ["f", "7", "Enter"]) await page.keyboard.press(key);
   assert(await page.locator(".aim").isVisible());
