@@ -137,12 +137,22 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
                                          "at_mm")} for e in report.get("remainder", ())],
         "tools": [tool_shape(t) for t in tool_bodies(ready.setup)], "steps": steps,
         "programs": list(way.names), "seconds": round(float(way.ended[-1]), 3 if open_ else 0) if len(way.ended) else 0,
-        "findings": [_finding(f, way, open_) for f in report["findings"]],
+        "findings": [_finding(f, way, open_) for f in report["findings"]], "found": report["finding_counts"],
+        **_minded(report),
         "facts": {k: report.get(k) for k in ("coverage", "reach_coverage", "machining_time_s", "gouge_max_mm",
                                              "complete")},
         "counts": {"facets": len(facets.corners), "moves": len(way.end)},
     }
     return {VIEW_NAME: ("view", "", None, write_view(head, chunks))}
+
+
+def _minded(report: Mapping[str, Any]) -> dict[str, Any]:
+    """What is to be minded although it is no finding: cautions, and the sentences that are none of them."""
+    cautions = [{k: c[k] for k in ("kind", "message", "remedy", "subjects", "at_mm")}
+                for c in report.get("warnings", ())]
+    known = {f"{c['message']}; {c['remedy']}" for c in cautions}
+    return {"cautions": cautions,
+            "notes": [*(w for w in report["part"]["warnings"] if w not in known), *report["proof"]["notes"]]}
 
 
 def _zone(z: Mapping[str, Any]) -> dict[str, Any]:

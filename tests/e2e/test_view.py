@@ -40,6 +40,8 @@ def test_the_demo_part_is_shown_as_its_report_has_it(demo_job):
     report, data = demo_job.report, (demo_job.out / "view.bin").read_bytes()
     head, chunks = read_view(data)
     assert not head["withheld"] and head["state"] == "proved" and head["findings"] == []
+    assert [c["message"] for c in head["cautions"]] == [w["message"] for w in report["warnings"]]
+    assert set(report["proof"]["notes"]) <= set(head["notes"])
     assert len(data) < 2e6
     finest = max(w["lod"] for w in head["chunks"] if w["kind"] == "mesh")
     area = area_of(head, chunks, finest)
@@ -99,6 +101,7 @@ def test_an_unproved_job_is_shown_without_its_program(part, tmp_path, monkeypatc
     # whole seconds do not say where the tool is: that is told, as coarsely as its way is
     assert head["steps"][gouge["step"]]["id"] == report["steps"][-1]["id"]
     assert gouge["tip_mm"] == [3.0, 6.0, 1.5] and gouge["axis"] == [0.0, 0.0, 1.0]
+    assert head["found"] == report["finding_counts"]
     assert [f["tip_mm"] for f in head["findings"] if f["kind"] == "residual"] == [None] * 4
     left = [head["left_unit_mm"] * c["left"].min() for w, c in zip(head["chunks"], chunks, strict=True)
             if w["kind"] == "mesh"]

@@ -10,6 +10,15 @@ import { Picture, type Mode, type P3, type Place } from "./scene";
 import type { ViewFinding, ViewHead } from "./viewfile";
 import { fileList, keyTable, needs, toolWords, whereOf } from "./words";
 
+/** Findings of the report, those it counts only included. */
+function foundIn(h: ViewHead): number {
+  return Math.max(h.findings.length, Object.values(h.found ?? {}).reduce((sum, n) => sum + n, 0));
+}
+
+function mindedIn(h: ViewHead): number {
+  return (h.cautions?.length ?? 0) + (h.notes?.length ?? 0);
+}
+
 export class JobView {
   readonly nodes: HTMLElement[];
   readonly picture: Picture;
@@ -148,11 +157,13 @@ export class JobView {
   }
 
   private summary(h: ViewHead): string {
-    const found = `${h.findings.length} ${h.findings.length === 1 ? "finding" : "findings"}`;
+    const count = foundIn(h);
+    const found = `${count} ${count === 1 ? "finding" : "findings"}`;
     if (h.findings.length) return `${found}${h.withheld ? ": the program is not handed out" : " in this program"}. Choose one in the list to go there.`;
-    if (h.kind === "verify") return "Nothing was found. The map shows what the program leaves on the part.";
-    if (!h.remainder.length) return "Proved and complete.";
-    return h.remainder.some((r) => r.tool_at_hand) ? "Proved. What is hatched red stays, and the list says why." : "Proved. What is hatched red stays: no tool of the setup gets there, and the list says why.";
+    const minded = mindedIn(h) ? ` ${mindedIn(h) === 1 ? "One thing is" : `${mindedIn(h)} things are`} to be minded, see the list.` : "";
+    if (h.kind === "verify") return `Nothing was found. The map shows what the program leaves on the part.${minded}`;
+    if (!h.remainder.length) return `Proved and complete.${minded}`;
+    return `${h.remainder.some((r) => r.tool_at_hand) ? "Proved. What is hatched red stays, and the list says why." : "Proved. What is hatched red stays: no tool of the setup gets there, and the list says why."}${minded}`;
   }
 
   roughDone(ms: number): void {
@@ -191,7 +202,8 @@ export class JobView {
         .filter(([m]) => h.kind === "plan" || m !== "zones")
         .map(([m, input]) => el("span", {}, input, el("label", { for: input.id }, { zones: "Zones", walls: "Walls", deviation: "Deviation" }[m]))));
     fill(this.panel, facts, colours,
-      h.findings.length ? this.section(`Findings (${h.findings.length})`, true, this.findingList(h)) : null,
+      h.findings.length ? this.section(`Findings (${foundIn(h)})`, true, this.findingList(h)) : null,
+      mindedIn(h) ? this.section(`To be minded (${mindedIn(h)})`, false, this.mindedList(h)) : null,
       h.zones.length ? this.section(`Zones (${h.zones.length})`, !h.findings.length && innerWidth > 700, this.zoneList(h)) : null,
       h.remainder.length ? this.section(`What stays (${h.remainder.length})`, !h.findings.length, this.restList(h)) : null,
       h.steps.length ? this.section(`Tool paths (${h.steps.length})`, this.look.p !== undefined, this.stepList(h)) : null,
@@ -210,6 +222,17 @@ export class JobView {
       this.findingButtons.push(button);
       add(list, el("li", {}, button));
     });
+    const more = foundIn(h) - h.findings.length;
+    if (more > 0) add(list, el("li", { class: "hint" }, `and ${more} more, which are counted only: ${Object.entries(h.found!).map(([kind, n]) => `${n} ${kind}`).join(", ")} in all`));
+    return list;
+  }
+
+  private mindedList(h: ViewHead): HTMLElement {
+    const list = el("ul", { class: "minded" });
+    for (const c of h.cautions ?? [])
+      add(list, el("li", {}, el("strong", {}, c.kind.replace(/_/g, " ")), ` ${c.message}; ${c.remedy} `,
+        c.at_mm ? el("button", { type: "button", class: "link", onclick: () => this.goTo(c.at_mm!, Math.max(0.12 * this.picture.size, 3), null) }, "where") : null));
+    for (const note of h.notes ?? []) add(list, el("li", {}, note));
     return list;
   }
 

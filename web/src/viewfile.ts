@@ -61,6 +61,14 @@ export interface ViewFinding {
   axis?: [number, number, number] | null;
 }
 
+export interface ViewCaution {
+  kind: string;
+  message: string;
+  remedy: string;
+  subjects: string[];
+  at_mm: [number, number, number] | null;
+}
+
 export interface ViewZone {
   id: string;
   tool: string;
@@ -114,6 +122,10 @@ export interface ViewHead {
   programs: string[];
   seconds: number;
   findings: ViewFinding[];
+  /** Findings by kind, those beyond the list included; what is to be minded. Files of earlier versions have neither. */
+  found?: Record<string, number>;
+  cautions?: ViewCaution[];
+  notes?: string[];
   facts: {
     coverage: number | null;
     reach_coverage: number | null;
