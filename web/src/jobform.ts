@@ -58,11 +58,13 @@ export function jobForm(onKeyless: () => void): { node: HTMLElement; again: () =
     blank.required = !blankField.hidden;
     json.value = JSON.stringify(setup(), null, 1);
   };
-  const drawTools = (): void => {
+  /** `focus`: what has it afterwards, for the table is made anew. */
+  const drawTools = (focus?: string): void => {
     fill(table, toolTable(tools, () => {
       keepTools(tools);
       show();
     }, drawTools));
+    if (focus) table.querySelector<HTMLElement>(focus)?.focus();
     show();
   };
   const take = (s: Partial<Setup> & Record<string, unknown>): void => {
@@ -171,11 +173,11 @@ async function materials(select: HTMLSelectElement): Promise<void> {
   }
 }
 
-function toolTable(tools: (ToolRow | string)[], changed: () => void, redraw: () => void): HTMLElement {
+function toolTable(tools: (ToolRow | string)[], changed: () => void, redraw: (focus: string) => void): HTMLElement {
   const body = el("tbody");
   const remove = (i: number): HTMLElement => el("td", {}, el("button", { type: "button", "aria-label": `Remove tool ${i + 1}`, onclick: () => {
     tools.splice(i, 1);
-    redraw();
+    redraw(tools.length ? `[aria-label="Remove tool ${Math.min(i + 1, tools.length)}"]` : ".add");
     changed();
   } }, "✕"));
   tools.forEach((t, i) => {
@@ -211,17 +213,17 @@ function toolTable(tools: (ToolRow | string)[], changed: () => void, redraw: () 
   });
   return el("div", {}, el("table", { "aria-labelledby": "toolshead" }, el("thead", {}, el("tr", {}, ...COLUMNS.map((c) => el("th", { scope: "col", title: c.hint }, c.title)), el("th", { scope: "col", title: "A holder of 14 to 24 mm, or the one of the setup" }, "Holder"), el("th", { scope: "col" }, el("span", { class: "sr" }, "Remove")))), body),
     el("p", { class: "buttons" },
-      el("button", { type: "button", onclick: () => {
+      el("button", { type: "button", class: "add", onclick: () => {
         const own = tools.filter((t) => typeof t !== "string");
         const last = own[own.length - 1] ?? FIRST[0]!;
         const number = Math.max(0, ...own.map((t) => Number(t.number ?? 0))) + 1;
         tools.push({ ...structuredClone(last), id: `T${number}`, number });
-        redraw();
+        redraw(`[aria-label="T number, tool ${tools.length}"]`);
         changed();
       } }, "Add a tool like the last"),
-      el("button", { type: "button", onclick: () => {
+      el("button", { type: "button", class: "anew", onclick: () => {
         tools.splice(0, tools.length, ...structuredClone(FIRST));
-        redraw();
+        redraw(".anew");
         changed();
       } }, "The first three again")));
 }

@@ -196,6 +196,7 @@ export class JobView {
     if (h.kind === "plan") fact("of what is in reach", percent(h.facts.reach_coverage));
     fact("machining", duration(h.facts.machining_time_s ?? h.seconds));
     fact("deepest cut into the part", figure(h.facts.gouge_max_mm, 3, "mm"));
+    if (h.budget_mm.allowance) fact("to stay on it, and not counted", figure(h.budget_mm.allowance, 3, "mm"));
     fact("allowed", `${figure(h.budget_mm.scallop, 3)} high, ${figure(h.budget_mm.gouge, 3, "mm")} deep`);
     const colours = el("fieldset", { class: "modes" }, el("legend", {}, "Colours"),
       ...(Object.entries(this.modes) as [Mode, HTMLInputElement][])
@@ -524,6 +525,10 @@ export class JobView {
     const tool = here && this.head!.tools.find((t) => t.number === this.head!.steps[here.step]!.tool);
     // far enough away that the tool does not hide the place
     if (f.point) this.goTo(f.point, Math.max(0.09 * this.picture.size, 2.5, 1.6 * (tool?.diameter_mm ?? 0)), f);
+    else {
+      this.ring.hidden = true;
+      this.marked = null;
+    }
     this.say(whereOf(f));
   }
 
@@ -579,7 +584,7 @@ export class JobView {
     const rest = what?.remainder === undefined ? undefined : h.remainder[what.remainder];
     const words = [`Face F${hit.face}`, wall ? (wall.startsWith("C") ? `connection ${wall}` : `wall ${wall}`) : "", what?.zone ? `zone ${what.zone}` : "",
       rest ? `stays: ${rest.reason}${needs(rest) ? `, ${needs(rest)}` : ""}` : "",
-      hit.judged === 0 ? "" : hit.judged === 2 ? "never reached by a cut" : `${hit.left < 0 ? `${(-hit.left).toFixed(4)} mm too deep` : `${hit.left.toFixed(4)} mm left`} at worst round here`,
+      hit.judged === 0 ? "" : hit.judged === 2 ? "never reached by a cut" : `${hit.left < 0 ? `${(-hit.left).toFixed(4)} mm too deep` : `${hit.left.toFixed(4)} mm left`}${h.budget_mm.allowance ? `, beside the ${h.budget_mm.allowance} mm that are to stay,` : ""} at worst round here`,
       `X ${hit.point.x.toFixed(2)} Y ${hit.point.y.toFixed(2)} Z ${hit.point.z.toFixed(2)}`];
     this.say(words.filter(Boolean).join(" · "));
     this.picture.ask();

@@ -544,11 +544,24 @@ export class Picture {
     if (here) {
       const number = this.head!.steps[here.step]!.tool;
       if (number !== this.toolShown) this.makeTool(number);
+      this.fade(known !== null);
       this.tool.position.copy(here.place);
       this.tool.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), here.axis));
     }
     this.ask();
     return here;
+  }
+
+  /** At a finding one looks through the tool at the place. */
+  private fade(on: boolean): void {
+    for (const { material } of this.tool.children as Mesh<BufferGeometry, MeshLambertMaterial>[]) {
+      const opacity = on ? Math.min(0.4, material.userData.opacity as number) : (material.userData.opacity as number);
+      if (material.opacity === opacity) continue;
+      material.opacity = opacity;
+      material.transparent = opacity < 1;
+      material.depthWrite = opacity === 1;
+      material.needsUpdate = true;
+    }
   }
 
   showHolder(on: boolean): void {
@@ -570,7 +583,7 @@ export class Picture {
       const g = new LatheGeometry(closed, 40);
       g.rotateX(Math.PI / 2); // its axis is Y
       const [colour, opacity] = look[body.kind] ?? [0x888888, 1];
-      this.tool.add(new Mesh(g, new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, side: DoubleSide, depthWrite: opacity === 1 })));
+      this.tool.add(new Mesh(g, new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, side: DoubleSide, depthWrite: opacity === 1, userData: { opacity } })));
     }
   }
 

@@ -111,7 +111,7 @@ export interface ViewHead {
   left_unit_mm: number;
   axis_unit: number;
   bounds_mm: [[number, number, number], [number, number, number]];
-  budget_mm: { scallop: number; gouge: number };
+  budget_mm: { scallop: number; gouge: number; allowance?: number };
   labelled: { zone?: string; remainder?: number; other?: boolean }[];
   zones: ViewZone[];
   walls: Named[];

@@ -220,6 +220,15 @@ async function service() {
   }
   await accessible(page, "form");
 
+  // who has keys alone does not lose the place in the table of tools
+  const focused = () => page.evaluate(() => document.activeElement.getAttribute("aria-label") ?? document.activeElement.textContent);
+  await page.getByRole("button", { name: "Add a tool like the last" }).focus();
+  await page.keyboard.press("Enter");
+  assert.equal(await focused(), "T number, tool 2");
+  await page.getByLabel("Remove tool 2").focus();
+  await page.keyboard.press("Enter");
+  assert.equal(await focused(), "Remove tool 1");
+
   // a stream of events that breaks, and a service that is away for a while
   const job = (state) => ({ id: "j1", kind: "plan", state, stage: "zones", progress: 0.1, labels: { order: "<img src=x onerror=alert(1)>" }, created_at: "2026-01-01T00:00:00Z",
     error: state === "failed" ? { title: "Out of <b>time</b>", detail: "it took too long" } : null, links: { self: "/v1/jobs/j1", events: "/v1/jobs/j1/events" } });
