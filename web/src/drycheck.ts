@@ -2,7 +2,7 @@
 import { get, type Job, type JobFiles } from "./api";
 import { el, figure } from "./dom";
 import type { ViewRest, ViewZone } from "./viewfile";
-import { fileList, needs } from "./words";
+import { fileList, needs, slender } from "./words";
 
 interface Zones {
   machinable_area_mm2?: number;
@@ -24,7 +24,7 @@ export async function dryCheck(job: Job, files: JobFiles): Promise<HTMLElement> 
     offers.length ? el("section", {}, el("h3", {}, "Tools that would help"), table(["Tool", "Neck, mm", "Reaches more, mm²"],
       offers.map((t) => [`${t.kind} D${t.diameter_mm}${t.kind === "bull" ? ` R${t.corner_radius_mm}` : ""}`, figure(t.neck_length_mm, 1), figure(t.area_mm2, 1)]))) : null,
     z.remainder.length ? el("section", {}, el("h3", {}, "What stays"), table(["Reason", "What would do", "Faces", "mm²"],
-      z.remainder.map((r) => [r.reason, needs(r), r.faces.join(" "), figure(r.area_mm2, 2)]))) : null,
+      z.remainder.map((r) => [r.reason, [needs(r), slender([r])].filter(Boolean).join(", "), r.faces.join(" "), figure(r.area_mm2, 2)]))) : null,
     el("section", {}, el("h3", {}, "Zones"), table(["Zone", "Tool", "Strategy", "Faces", "mm²"], z.zones.map((x) => [x.id, x.tool, x.strategy, x.faces.join(" "), figure(x.area_mm2, 1)]))),
     fileList(files));
 }

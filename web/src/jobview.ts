@@ -8,7 +8,7 @@ import { legendOf } from "./legend";
 import { lookOf, type Look } from "./look";
 import { Picture, type Mode, type P3, type Place } from "./scene";
 import type { ViewFinding, ViewHead } from "./viewfile";
-import { fileList, keyTable, needs, toolWords, whereOf } from "./words";
+import { fileList, keyTable, needs, slender, toolWords, whereOf } from "./words";
 
 /** Findings of the report, those it counts only included. */
 function foundIn(h: ViewHead): number {
@@ -263,8 +263,8 @@ export class JobView {
       const reason = key.split("|")[0]!;
       add(list, el("li", {}, el("button", { type: "button", "aria-pressed": "false", onclick: (e: Event) => {
         if (this.pressOne(e, list, labels)) this.goTo(h.remainder[g.rows[0]!]!.at_mm, Math.max(0.12 * this.picture.size, 3), null);
-      } }, swatch("#d8191f", true), el("strong", {}, reason), g.need ? ` ${g.need}` : "",
-        el("span", { class: "where" }, `${figure(g.area, g.area < 10 ? 1 : 0, "mm²")}${g.rows.length > 1 ? `, ${g.rows.length} places` : ""}`))));
+      } }, swatch("#d8191f", true), el("strong", {}, reason), ` ${[g.need, slender(g.rows.map((k) => h.remainder[k]!))].filter(Boolean).join(", ")}`,
+        el("span", { class: "where" }, `${figure(g.area, g.area < 1 ? 2 : g.area < 10 ? 1 : 0, "mm²")}${g.rows.length > 1 ? `, ${g.rows.length} places` : ""}`))));
     }
     return list;
   }
@@ -583,7 +583,7 @@ export class JobView {
     const wall = h.walls.find((w) => w.faces.includes(hit.face))?.id ?? h.connections.find((c) => c.faces.includes(hit.face))?.id;
     const rest = what?.remainder === undefined ? undefined : h.remainder[what.remainder];
     const words = [`Face F${hit.face}`, wall ? (wall.startsWith("C") ? `connection ${wall}` : `wall ${wall}`) : "", what?.zone ? `zone ${what.zone}` : "",
-      rest ? `stays: ${rest.reason}${needs(rest) ? `, ${needs(rest)}` : ""}` : "",
+      rest ? ["stays: " + rest.reason, needs(rest), slender([rest])].filter(Boolean).join(", ") : "",
       hit.judged === 0 ? "" : hit.judged === 2 ? "never reached by a cut" : `${hit.left < 0 ? `${(-hit.left).toFixed(4)} mm too deep` : `${hit.left.toFixed(4)} mm left`}${h.budget_mm.allowance ? `, beside the ${h.budget_mm.allowance} mm that are to stay,` : ""} at worst round here`,
       `X ${hit.point.x.toFixed(2)} Y ${hit.point.y.toFixed(2)} Z ${hit.point.z.toFixed(2)}`];
     this.say(words.filter(Boolean).join(" · "));

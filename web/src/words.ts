@@ -46,7 +46,14 @@ interface Need {
   access?: string;
 }
 
-/** What would do for an entry of the remainder, in words; as much as the sheet says (service/sheettables.py). */
+/** How slender a tool would be, in words, from the least to the most of some entries; nothing where none says it. */
+export function slender(all: ViewRest[]): string {
+  const times = all.map((r) => (r.would_need as Need).slenderness).filter((v) => v !== undefined).sort((a, b) => a - b);
+  const [least, most] = [times[0]?.toFixed(1), times[times.length - 1]?.toFixed(1)];
+  return times.length ? `as a tool would be ${least === most ? least : `${least} to ${most}`} times as long as thick` : "";
+}
+
+/** What would do for an entry of the remainder, in words; with `slender` as much as the sheet says (service/sheettables.py). */
 export function needs(r: ViewRest): string {
   const w = r.would_need as Need;
   const round = w.kind === "bull" ? ` with a corner of ${w.corner_radius_mm} mm` : "";
@@ -56,7 +63,6 @@ export function needs(r: ViewRest): string {
     w.diameter_mm !== undefined && `needs a ${w.kind} of ${w.diameter_mm} mm${round}, neck ${w.neck_length_mm} mm, shank ${w.shank_diameter_mm} mm, stickout ${w.stickout_mm} mm`,
     w.diameter_mm !== undefined && (w.share ?? 1) < 1 && `for ${percent(w.share)} of it`,
     w.diameter_mm === undefined && w.kind && `needs ${OTHERS[w.kind] ?? w.kind}`,
-    w.slenderness !== undefined && `as a tool would be ${w.slenderness.toFixed(1)} times as long as thick`,
     w.access && `along ${w.access}`,
   ].filter(Boolean).join(", ") || "no tool would reach it";
 }
