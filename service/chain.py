@@ -142,8 +142,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             *uncut_centres(setup, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
-    report, rest = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
-                                        given_up, cautions)
+    report, rest, stays = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
+                                               given_up, cautions)
     if report["state"] == "proved":
         # of every control's program one was simulated, before its figures were known; what is delivered is the same
         final = with_figures(written, report)
@@ -157,7 +157,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
             for p in written:
                 files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
         files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-        page = plan_view(ready, look, scored, zone, given_up, rest, proof, programs, proof_setup(ready, look), report)
+        page = plan_view(ready, look, scored, zone, rest, stays, proof, programs, proof_setup(ready, look), report)
         if page:
             _preview(ready, page[VIEW_NAME][3], report, out / "preview.png")
             files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())

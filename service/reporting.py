@@ -163,8 +163,8 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
                zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-               cautions: Sequence[Caution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """report.json without its files, and which proof samples stay uncut.
+               cautions: Sequence[Caution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[Remainder]]:
+    """report.json without its files, which proof samples stay uncut, and why.
 
     A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
 
@@ -175,7 +175,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
 
     Returns
     -------
-    dict, and (n,) bool: the samples that stay uncut
+    dict, (n,) bool: the samples that stay uncut, and these by region and reason, the smallest ones too
     """
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
@@ -208,7 +208,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "tools": _tools(ready, proof, made.steps), "deviation": deviation(proof), "machined": None, "files": [],
         "version": VERSION,
     }
-    return report, rest
+    return report, rest, items
 
 
 def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[str, Any]]) -> list[dict[str, Any]]:

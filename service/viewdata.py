@@ -14,7 +14,7 @@ from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
 from service.convert import tool_bodies
 from service.delivery import Files
-from service.prepare import Prepared, clearances
+from service.prepare import Prepared
 from service.reporting import REMAINDER_FLOOR_MM2
 from service.scoring import Score
 from service.sides import Look
@@ -27,7 +27,7 @@ from service.viewpaths import GRID as PATH_GRID
 from service.viewstock import stock_chunk
 from verify.model import NcProgram, Proof, ProofSetup
 from verify.sequence import Reading, read_all
-from zones.remainder import explain
+from zones.remainder import Remainder
 from zones.view import turned_samples
 
 VIEW_NAME = "view.bin"
@@ -38,27 +38,27 @@ NO_HOLDER = 30.0  # mm of shank that are drawn where no holder is known
 I64 = NDArray[np.int64]
 
 
-def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-              rest: NDArray[np.bool_], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
+              stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
     """The view file of a planned job, as ``service.delivery`` takes it.
 
     scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
-    zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
-    given_up, rest : (n,) bool, samples the plan gave up, and those that stay uncut
-    report   : whose places are in the setup frame; of a job that is not proved no program is given away.
-               Where the file cannot be made its notes say so
+    zone   : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
+    rest   : (n,) bool, those that stay uncut; stays : why, as ``service.reporting.job_report`` has it
+    report : whose places are in the setup frame; of a job that is not proved no program is given away.
+             Where the file cannot be made its notes say so
     """
     return _or_none(report, f"{VIEW_NAME}, and preview.png, which is drawn from it,",
-                    lambda: _plan_view(ready, look, scored, zone, given_up, rest, proof, programs, setup, report))
+                    lambda: _plan_view(ready, look, scored, zone, rest, stays, proof, programs, setup, report))
 
 
-def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-               rest: NDArray[np.bool_], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
+               stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
                report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
-    label[rest] = len(zones) + _entries(ready, scored, given_up, rest, len(entries))
+    label[rest] = len(zones) + _entries(scored.samples.subset(rest), stays, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
     read = read_all(programs, look.part, tool_bodies(ready.setup), setup, 0, lambda _share: None)
     way = way_of(read, programs, look.rotation, report["steps"])
@@ -91,13 +91,9 @@ def _or_none(report: Mapping[str, Any], what: str, made: Callable[[], Files]) ->
         return {}
 
 
-def _entries(ready: Prepared, scored: Score, given_up: NDArray[np.bool_], rest: NDArray[np.bool_],
-             count: int) -> I64:
+def _entries(s: SurfaceSamples, stays: Sequence[Remainder], count: int) -> I64:
     """(r,) which entry of the remainder, of ``count``, each sample that stays is of: that of the nearest one asked."""
-    s = scored.samples.subset(rest)
-    items = explain(s, scored.labels.subset(rest), ready.views, ready.decomposition, ready.lift, given_up[rest],
-                    clear=clearances(ready.setup))
-    kept = [i.samples for i in items if i.area >= REMAINDER_FLOOR_MM2]
+    kept = [i.samples for i in stays if i.area >= REMAINDER_FLOOR_MM2]
     asked = [(k, i) for k, i in enumerate(kept[:count]) if i is not None and len(i)]
     if not asked:
         return np.full(len(s), count, np.int64)

@@ -231,7 +231,7 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
         reason[covered(few, view.obstacles) & (reason == "")] = "fixture"
     _at_hand(few, view.fields, buyer, out, "pass")
     out.left[reason == "pass"] = TOO_LITTLE
-    if buyer.clamped:
+    if buyer.clamped and bool((reason == "").any()):  # these limits are dear
         _at_hand(few, buyer.unclamped, buyer, out, "fixture")
     left = np.flatnonzero(reason == "")
     wants = buyer.wants(few.subset(left))
