@@ -117,13 +117,14 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     told, begun = Learned(), PREPARED
     sides: list[Side] = []
     found: list[int] = []
+    blanks: dict[str, StockMap] = {}
     while True:
         # how many there will be is not known: each takes most of what is left
         ended = begun + FIRST_SHARE * (PROVED - begun)
         span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
         for k, view in list(enumerate(ready.views))[len(sides):]:
             sides.append(resumed.side(view, sides, told.along(view.id), partial(
-                _side, ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner)))
+                _side, ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner, blanks)))
         made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
         zone, given_up = scored.without(made, ready.zones)
         written = programs_of(ready, sides, trimmed)
@@ -222,14 +223,16 @@ class _Span:
 
 def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
           before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner,
-          keeper: Keeper) -> Side:
-    """Plan the zones of one access.
+          blanks: dict[str, StockMap], keeper: Keeper) -> Side:
+    """Plan the zones of one access; ``blanks`` keeps what the blank looks like along it for the next plan.
 
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
     the whole blank, for who knows in which order programs are run. Heights are those of the whole blank in any case.
     """
     turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
-    stock = planning_stock(ready, view)
+    if view.id not in blanks:
+        blanks[view.id] = planning_stock(ready, view)
+    stock = blanks[view.id].copied()
     found = told.along(view.id)
     settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
     if turned:
