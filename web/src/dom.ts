@@ -56,7 +56,10 @@ export function duration(seconds: number): string {
 }
 
 export function figure(value: number | null | undefined, digits: number, unit = ""): string {
-  return value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit ? `\u202f${unit}` : ""}`;
+  if (value === null || value === undefined) return "–";
+  const least = 10 ** -digits;
+  const small = value > 0 && value < 0.5 * least; // what is there does not read as nothing
+  return `${small ? "<\u202f" : ""}${(small ? least : value).toFixed(digits)}${unit ? `\u202f${unit}` : ""}`;
 }
 
 /** A share of 0..1, rounded down as on the sheet, so that 100 % is all of it. */
