@@ -23,7 +23,6 @@ from service.viewer import folder_app
 from tests.e2e.test_withheld import FAKES, SETUP, call, part  # noqa: F401
 
 ROOT = Path(__file__).parents[2]
-DRIVE = ROOT / "web" / "tests" / "drive.mjs"
 pytestmark = [pytest.mark.timeout(600), pytest.mark.network]
 
 
@@ -37,26 +36,31 @@ def browser() -> str | None:
     return os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 
 
-@pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    """Run the driver; returns what it says. Pictures are kept where ZONEMILL_SHOTS says."""
+def driven(script, *argv):
+    """What a script of ``web/tests`` says of the page, run by Node; skips, with the reason, what is not there."""
     if not (FOLDER / "index.html").is_file():
         pytest.skip("the page is not built: make web")
     if node() is None or not (ROOT / "web" / "node_modules" / "playwright-core").is_dir():
         pytest.skip("no Node with playwright-core here: make web")
     if browser() is None:
         pytest.skip("no Chromium here: apt-get install chromium, or set CHROMIUM")
+    done = subprocess.run([node(), str(ROOT / "web" / "tests" / script), *(str(a) for a in argv)], capture_output=True,
+                          text=True, timeout=400, cwd=ROOT / "web", env={**os.environ, "CHROMIUM": browser()})
+    assert done.returncode == 0, done.stderr[-3000:]
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """Run the driver; returns what it says. Pictures are kept where ZONEMILL_SHOTS says."""
     shots = Path(os.environ.get("ZONEMILL_SHOTS") or tmp_path_factory.mktemp("shots"))
     shots.mkdir(parents=True, exist_ok=True)
 
     def run(what, url, *more):
-        argv = [node(), str(DRIVE), what, url, *(str(m) for m in more)]
+        argv = [what, url, *more]
         if what != "key":
-            argv.insert(4 if what == "look" else len(argv), str(shots))
-        done = subprocess.run(argv, capture_output=True, text=True, timeout=400, cwd=ROOT / "web",
-                              env={**os.environ, "CHROMIUM": browser()})
-        assert done.returncode == 0, done.stderr[-3000:]
-        return json.loads(done.stdout.strip().splitlines()[-1])
+            argv.insert(2 if what == "look" else len(argv), shots)
+        return driven("drive.mjs", *argv)
 
     return run
 

@@ -4,44 +4,23 @@
 """
 
 import json
-import subprocess
 
 import pytest
 
 from service.server import background, settings_with
-from tests.e2e.test_page import FOLDER, ROOT, browser, node, shown
+from tests.e2e.test_page import driven, shown
 from tests.e2e.test_withheld import call, part  # noqa: F401
 
-HARM = ROOT / "web" / "tests" / "harm.mjs"
 pytestmark = [pytest.mark.timeout(600), pytest.mark.network]
 
 
-@pytest.fixture(scope="module")
-def harm():
-    """Run the driver; returns what it says."""
-    if not (FOLDER / "index.html").is_file():
-        pytest.skip("the page is not built: make web")
-    if node() is None or not (ROOT / "web" / "node_modules" / "playwright-core").is_dir():
-        pytest.skip("no Node with playwright-core here: make web")
-    if browser() is None:
-        pytest.skip("no Chromium here: apt-get install chromium, or set CHROMIUM")
-
-    def run(what, url, *more):
-        done = subprocess.run([node(), str(HARM), what, url, *(str(m) for m in more)], capture_output=True, text=True,
-                              timeout=400, cwd=ROOT / "web")
-        assert done.returncode == 0, done.stderr[-3000:]
-        return json.loads(done.stdout.strip().splitlines()[-1])
-
-    return run
-
-
-def test_a_job_is_seen_on_bad_days(harm, part, tmp_path):  # noqa: F811
+def test_a_job_is_seen_on_bad_days(part, tmp_path):  # noqa: F811
     assert call(part, tmp_path).exit_code == 0
     with shown(tmp_path / "out") as url:
-        harm("folder", url, tmp_path)
+        driven("harm.mjs", "folder", url, tmp_path)
 
 
-def test_the_form_changes_no_setup_and_the_page_outlives_its_connection(harm, tmp_path):
+def test_the_form_changes_no_setup_and_the_page_outlives_its_connection(tmp_path):
     flat = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
     setups = [
         {"tools": [flat], "quality": {"scallop_height_mm": 0.4}, "stock": {"kind": "box", "margin_mm": 3},
@@ -54,7 +33,7 @@ def test_the_form_changes_no_setup_and_the_page_outlives_its_connection(harm, tm
     for file, setup in zip(files, setups, strict=True):
         file.write_text(json.dumps(setup))
     with background(settings_with({"host": "127.0.0.1", "port": 0, "data_dir": tmp_path / "data"})) as url:
-        first, second, third = harm("service", f"{url}/", *files)["setups"]
+        first, second, third = driven("harm.mjs", "service", f"{url}/", *files)["setups"]
     assert "box_mm" not in second["stock"] and second["labels"] == {}
     # what a setup leaves out is the service's own, not that of the setup before
     assert first["quality"]["scallop_height_mm"] == 0.4 and third["quality"]["scallop_height_mm"] == 0.01
