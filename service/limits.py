@@ -1,6 +1,8 @@
 """The limit on request bodies: refused by Content-Length before a byte is read, else counted while it streams.
 
-The framework's own limit answers in plain text; this one lets the error handlers answer as problem+json.
+Forms with files may be large and go to disk. Every other body is JSON, which the framework reads into memory and parses
+before it asks for a key, so it has a limit of its own. The framework's own limit answers in plain text; this one lets
+the error handlers answer as problem+json.
 """
 
 from __future__ import annotations
@@ -9,11 +11,14 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.problems import problem_response, too_large
+from service.problems import BODY_LIMIT, problem_response, too_large
+
+FORMS = ("/v1/jobs", "/v1/zones", "/v1/verifications")
+LARGEST_JSON = 1_000_000  # a tool with the finest profile takes a tenth of it
 
 
 class BodyLimitMiddleware:
-    """Refuses bodies of more than ``limit`` bytes with 413."""
+    """Refuses forms of more than ``limit`` bytes, and other bodies of more than ``LARGEST_JSON``, with 413."""
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
         self.app, self.limit = app, limit
@@ -23,10 +28,12 @@ class BodyLimitMiddleware:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        limit = self.limit if scope["path"] in FORMS else min(self.limit, LARGEST_JSON)
+        scope[BODY_LIMIT] = limit
         request = Request(scope, receive)
         text = request.headers.get("content-length", "")
-        if text.isascii() and text.isdecimal() and int(text[:20]) > self.limit:
-            answer = problem_response(request, too_large(self.limit), {"Connection": "close"})
+        if text.isascii() and text.isdecimal() and int(text[:20]) > limit:
+            answer = problem_response(request, too_large(limit), {"Connection": "close"})
             await answer(scope, receive, send)
             return
         seen = 0
@@ -35,7 +42,7 @@ class BodyLimitMiddleware:
             nonlocal seen
             message = await receive()
             seen += len(message.get("body", b""))
-            if seen > self.limit:
+            if seen > limit:
                 raise HTTPException(413)
             return message
 

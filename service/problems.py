@@ -34,12 +34,13 @@ from service.head import is_stream
 from service.storage import STORAGE_FULL, is_full
 
 log = structlog.get_logger(__name__)
+BODY_LIMIT = "zonemill.body_limit"  # where a request keeps how many bytes its body may have
 
 
 def too_large(limit: int) -> TooLargeError:
     """The error for a body over the limit, bytes."""
     return TooLargeError(f"the request body is larger than {limit / 1e6:g} MB", limit=limit,
-                         remedy="send a smaller file or raise ZONEMILL_MAX_BODY_MB")
+                         remedy="send a smaller file, or where it is one raise ZONEMILL_MAX_BODY_MB")
 
 
 def problem_response(request: Request, error: CamError, headers: dict[str, str] | None = None) -> JSONResponse:
@@ -73,7 +74,6 @@ async def _ours(request: Request, error: Exception) -> JSONResponse:
 
 async def _framework(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
-    limit = request.app.state.settings.max_body_bytes
     text = str(error.detail)
     named: dict[int, CamError] = {
         401: UnauthorizedError(text, remedy="send Authorization: Bearer KEY"),
@@ -81,7 +81,7 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
                            remedy="GET /openapi.json lists the paths"),
         405: MethodError(f"{request.method} is not offered at {request.url.path}",
                          remedy="the Allow header names the methods that are"),
-        413: too_large(limit),
+        413: too_large(request.scope[BODY_LIMIT]),
     }
     # 400 is the framework's word for a body that it cannot decode; any other bad body is 422
     fallback = (RequestError(text, remedy="see the schema in /openapi.json") if error.status_code in (400, 422)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from fastapi import Request
+from python_multipart.multipart import parse_options_header
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
@@ -56,6 +57,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise RequestError("the body must be multipart/form-data", code="not_multipart",
                            remedy="curl -F part=@PART.step -F 'setup=@SETUP.json;type=application/json'")
+    _check_charset(request.headers["content-type"])
     try:
         form = await request.form(max_files=7, max_fields=7, max_part_size=MAX_SETUP_BYTES)
     except HTTPException as error:
@@ -86,6 +88,15 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
                 stock if isinstance(stock, UploadFile) else None,
                 _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None,
                 (await _bytes_of(form[WEBHOOK])).decode("latin-1") if WEBHOOK in names else None)
+
+
+def _check_charset(content_type: str) -> None:
+    """Texts are UTF-8. The framework would decode them by any codec of Python that the header names, and of those some
+    take hours for a megabyte (punycode, idna) and one raises whatever it is given (undefined)."""
+    charset = parse_options_header(content_type)[1].get(b"charset", b"utf-8")  # as the framework reads it
+    if charset.lower() not in (b"utf-8", b"utf8", b"us-ascii"):
+        raise RequestError("the texts of a form are to be UTF-8", code="bad_multipart", subjects=("content-type",),
+                           measured=ascii(charset)[:80], limit="utf-8", remedy="leave charset out of Content-Type")
 
 
 def _tool_number(data: bytes) -> int:

@@ -78,6 +78,27 @@ def test_a_body_over_the_limit_is_refused(client, post):
     assert answer.status_code == 413 and answer.headers["content-type"] == "application/problem+json"
 
 
+def test_a_body_that_is_no_form_has_a_limit_of_its_own_also_for_who_has_no_key(make_client):
+    client = make_client(auth="keys")
+    text = b'{"id": "' + b"x" * 1_000_000 + b'"}'
+    for method, path in (("PUT", "/v1/tools/x"), ("POST", "/v1/keys")):
+        json_body = {"content-type": "application/json"}
+        body = _is_problem(client.request(method, path, content=text, headers=json_body), 413, "body_too_large")
+        assert body["limit"] == 1_000_000
+        drip = client.request(method, path, content=iter([text[:600_000], text[600_000:]]), headers=json_body)
+        _is_problem(drip, 413, "body_too_large")
+
+
+@pytest.mark.parametrize("charset", ["punycode", "idna", "undefined", "utf-16", "utf-8; charset=punycode", "rot13"])
+def test_no_codec_of_the_clients_choice_reads_a_form(client, charset):
+    body = b'--b\r\nContent-Disposition: form-data; name="setup"\r\n\r\n{}\r\n--b--\r\n'
+    form = f"multipart/form-data; boundary=b; charset={charset}"
+    found = _is_problem(client.post("/v1/jobs", content=body, headers={"content-type": form}), 422, "bad_multipart")
+    assert found["subjects"] == ["content-type"]
+    good = client.post("/v1/jobs", content=body, headers={"content-type": "multipart/form-data; boundary=b; charset=UTF-8"})
+    _is_problem(good, 422, "missing_part")
+
+
 def test_malformed_forms(client, post):
     _is_problem(client.post("/v1/jobs", json={}), 422, "not_multipart")
     _is_problem(client.post("/v1/jobs", files={"part": ("a", STEP)}), 422, "missing_part")
