@@ -153,8 +153,14 @@ class _Pinned(http.client.HTTPConnection):
     def connect(self) -> None:
         """Open it."""
         self.sock = socket.create_connection((self.address, self.target.port), self.timeout)
+
+    def secure(self) -> None:
+        """Agree on TLS where the target wants it; ``cut`` ends that too, which may drip in for days otherwise."""
         if self.target.scheme == "https":
-            self.sock = ssl.create_default_context().wrap_socket(self.sock, server_hostname=self.target.host)
+            tls = ssl.create_default_context().wrap_socket(self.sock, server_hostname=self.target.host,
+                                                           do_handshake_on_connect=False)
+            self.sock = tls
+            tls.do_handshake()
 
     def cut(self) -> None:
         """End it from another thread, whatever it waits for."""
@@ -169,7 +175,7 @@ class _Pinned(http.client.HTTPConnection):
 def send(target: Target, addresses: list[str], body: bytes, headers: dict[str, str], timeout_s: float) -> int:
     """POST a body to the first of the addresses that takes a connection; returns the status of the answer.
 
-    timeout_s : for connecting, and again for all the rest together
+    timeout_s : for connecting, and again for all the rest together, of each address
 
     Raises
     ------
@@ -179,16 +185,16 @@ def send(target: Target, addresses: list[str], body: bytes, headers: dict[str, s
     failure: OSError = ConnectionError("no address")
     for address in addresses:
         connection = _Pinned(target, address, timeout_s)
-        try:
-            connection.connect()
-        except OSError as error:
-            failure = error
-            connection.close()
-            continue
         watch = threading.Timer(timeout_s, connection.cut)
         watch.daemon = True
-        watch.start()
         try:
+            try:
+                connection.connect()
+                watch.start()
+                connection.secure()
+            except OSError as error:
+                failure = error
+                continue
             connection.request("POST", target.path, body, headers)
             return connection.getresponse().status
         finally:

@@ -17,7 +17,6 @@ import json
 import random
 import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 
 import structlog
 from sqlalchemy.engine import RowMapping
@@ -32,6 +31,7 @@ from service.version import VERSION
 log = structlog.get_logger(__name__)
 
 SLOTS = 4
+LAST_WORDS_S = 5.0
 LOOK_EVERY_S = 0.5
 LONGEST_PAUSE_S = 6 * 3600.0
 LARGEST_BODY = 256_000
@@ -90,7 +90,7 @@ class Courier:
         self.settings, self.jobs = settings, jobs
         self._networks = [ipaddress.ip_network(n) for n in settings.webhook_networks]
         self._stop = threading.Event()
-        self._pool = ThreadPoolExecutor(SLOTS, thread_name_prefix="webhook")
+        self._busy: list[threading.Thread] = []
         self._thread = threading.Thread(target=self._run, name="courier", daemon=True)
 
     def start(self) -> None:
@@ -98,19 +98,23 @@ class Courier:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop claiming; what is on its way ends by itself, and is sent again later if it did not."""
+        """Stop claiming, and wait a little for what is on its way; if that did not end, it is sent again later."""
         self._stop.set()
         self._thread.join(timeout=5)
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        until = time.monotonic() + LAST_WORDS_S
+        for each in self._busy:
+            each.join(timeout=max(0.0, until - time.monotonic()))
 
     def _run(self) -> None:
-        busy: set[Future[None]] = set()
         while not self._stop.is_set():
-            busy = {f for f in busy if not f.done()}
+            self._busy = [each for each in self._busy if each.is_alive()]
             try:
-                # The lease outlasts every limit of an attempt: resolving, four connections, the rest.
-                while len(busy) < SLOTS and (row := self.jobs.claim_webhook(60 + 6 * self.settings.webhook_timeout_s)):
-                    busy.add(self._pool.submit(self._deliver, row))
+                # The lease outlasts every limit of an attempt: resolving, four connections, each with its rest.
+                lease_s = 60 + 9 * self.settings.webhook_timeout_s
+                while len(self._busy) < SLOTS and (row := self.jobs.claim_webhook(lease_s)):
+                    # A daemon: a receiver that hangs must not keep the process from ending.
+                    self._busy.append(threading.Thread(target=self._deliver, args=(row,), name="webhook", daemon=True))
+                    self._busy[-1].start()
             except Exception:
                 log.exception("courier stumbled")  # database away: the next round tries again
             self._stop.wait(timeout=LOOK_EVERY_S)

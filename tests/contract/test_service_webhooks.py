@@ -20,9 +20,9 @@ MASTER = "m" * 40
 
 
 class Receiver:
-    """Answers POSTs with the statuses it is given, the last one for ever; keeps what it got."""
+    """Answers POSTs with the statuses it is given, the last one for ever, after a while; keeps what it got."""
 
-    def __init__(self, *statuses, tls=None):
+    def __init__(self, *statuses, tls=None, after_s=0.0):
         self.got, self.statuses = [], list(statuses)
         outer = self
 
@@ -31,6 +31,7 @@ class Receiver:
                 body = self.rfile.read(int(self.headers["content-length"]))
                 status = outer.statuses.pop(0) if len(outer.statuses) > 1 else outer.statuses[0]
                 outer.got.append((self.path, dict(self.headers.items()), body, status))
+                time.sleep(after_s)
                 self.send_response(status)
                 if status == 302:
                     self.send_header("Location", f"http://127.0.0.1:{outer.port}/elsewhere")
@@ -201,6 +202,16 @@ def test_a_restart_in_between_loses_nothing(receiver, hooked, post):
     client.__enter__ = client.__exit__ = lambda *_: None
     job = settled(hooked(there), job, "delivered")
     assert job["webhook"]["attempts"] == 2 and len(there.got) == 2
+
+
+def test_an_orderly_stop_waits_for_what_is_on_its_way_so_that_it_is_not_sent_twice(receiver, hooked, post):
+    there = receiver(200, after_s=1.0)
+    client = hooked(there, webhook_timeout_s=5)
+    job = post(client, "sleep", webhook_url=f"http://127.0.0.1:{there.port}").json()
+    client.delete(job["links"]["self"])
+    assert there.wait(1)
+    client.app.state.engine._courier.close()
+    assert client.get(job["links"]["self"]).json()["webhook"]["state"] == "delivered"
 
 
 def test_an_attempt_that_was_cut_off_by_a_crash_is_made_again(receiver, hooked, post, monkeypatch):

@@ -156,6 +156,15 @@ def test_an_answer_that_drips_is_cut_off(listener):
     assert time.monotonic() - started < 2.0 and not isinstance(caught.value, AssertionError)
 
 
+def test_a_handshake_that_drips_is_cut_off(listener):
+    hello = b"\x16\x03\x03\x40\x00" + b"\x02\x00\x3f\xfc" + b"\x03" * 60  # the start of a record of 16 kB
+    port, _ = listener(hello, slowly_s=0.1)
+    started = time.monotonic()
+    with pytest.raises(OSError):
+        send(parse_target(f"https://mes.example.com:{port}"), ["127.0.0.1"], b"", {}, 0.6)
+    assert time.monotonic() - started < 3.0
+
+
 def test_no_more_than_the_head_of_an_answer_is_read(listener):
     port, _ = listener(b"HTTP/1.1 200 OK\r\nContent-Length: 1000000000\r\n\r\n" + b"x" * 100_000)
     assert send(parse_target(f"http://127.0.0.1:{port}"), ["127.0.0.1"], b"", {}, 2.0) == 200
