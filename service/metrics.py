@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from schemas.jobs import FINAL_STATES
 from service.engine import Engine
 
+METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"))
 STATES = ("queued", "running", *FINAL_STATES)
 
 
@@ -44,7 +45,8 @@ class Metrics:
 
 
 class MetricsMiddleware:
-    """Times every request under the pattern of its route, never its path: ids would be labels without end."""
+    """Times every request under the pattern of its route, never its path: ids would be labels without end, and so would
+    methods, for a client may call its own what it likes."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app, self.metrics = app, metrics
@@ -66,5 +68,6 @@ class MetricsMiddleware:
         finally:
             route: Any = scope.get("route")
             pattern = getattr(route, "path", "none")
-            self.metrics.requests.labels(scope["method"], pattern, str(seen["status"])).observe(
+            method = scope["method"] if scope["method"] in METHODS else "other"
+            self.metrics.requests.labels(method, pattern, str(seen["status"])).observe(
                 time.perf_counter() - started)

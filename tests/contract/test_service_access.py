@@ -78,7 +78,9 @@ def test_health_and_metrics(client, post, finish):
     assert client.get("/healthz").json()["status"] == "ok"
     assert client.get("/readyz").json() == {"status": "ok", "checks": dict.fromkeys(
         ("database", "data_folder", "disk_space", "engine"), "ok")}
+    assert client.request("BREW1", "/healthz").status_code == client.request("BREW2", "/healthz").status_code == 405
     text = client.get("/metrics").text
+    assert 'method="other"' in text and "BREW" not in text  # a name of the client's own would be a series for ever
     assert 'zonemill_submissions_total{kind="plan"}' in text and 'zonemill_jobs{state="proved"}' in text
     assert 'route="/v1/jobs/{job_id}"' in text and "/v1/jobs/j" not in text
 
