@@ -15,7 +15,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,11 +76,10 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
                                     "address_bytes": limits.memory_bytes + ADDRESS_ROOM}))
         reading, writing = os.pipe()
         try:
-            with log.open("wb") as out:
+            with log.open("wb") as out, closing_fd(writing):
                 child = subprocess.Popen([sys.executable, "-m", "service.child", str(path), str(writing)],
                                          pass_fds=(writing,), stdin=subprocess.DEVNULL, stdout=out, stderr=out,
                                          start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
-            os.close(writing)
             try:
                 final = _watch(child, _Lines(reading, on_progress, on_resumed), limits, keep)
             finally:
@@ -87,6 +87,15 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
         finally:
             os.close(reading)
         return _outcome(child.returncode, final, log)
+
+
+@contextmanager
+def closing_fd(handle: int) -> Iterator[None]:
+    """Close a file descriptor at the end, also where a child could not be started."""
+    try:
+        yield
+    finally:
+        os.close(handle)
 
 
 def kill_tree(child: subprocess.Popen[bytes]) -> None:
@@ -202,7 +211,9 @@ def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
         return str(final["state"])
     if "error" in final:
         raise error_from_dict(final["error"])
-    tail = log.read_bytes()[-2000:].decode("utf-8", "replace").strip()
+    with log.open("rb") as said:  # it may have said gigabytes
+        said.seek(max(0, log.stat().st_size - 2000))
+        tail = said.read().decode("utf-8", "replace").strip()
     if "MemoryError" in tail or "bad_alloc" in tail:
         raise ResourceError("the job ran out of memory", code="job_memory",
                             remedy="simplify the part, or give the machine or ZONEMILL_JOB_MEMORY_LIMIT_MB more")
