@@ -15,7 +15,7 @@ router = APIRouter(tags=["operation"])
 
 
 @router.get("/healthz", operation_id="healthz")
-def healthz() -> Health:
+async def healthz() -> Health:  # without a thread: those may all wait for the database
     """The process answers."""
     return Health(status="ok")
 
