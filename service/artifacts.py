@@ -100,6 +100,15 @@ def make_private(folder: Path) -> None:
     folder.mkdir(mode=0o700, exist_ok=True)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and flush the entries of those above that had to be made for it: a file that is flushed may be lost
+    with the entry of its folder."""
+    if not folder.is_dir():
+        make_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        sync_folder(folder.parent)
+
+
 def sync_folder(folder: Path) -> None:
     """Flush a folder's entries to the disk."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -158,7 +167,7 @@ class Artifacts:
             if check is not None:
                 check(temporary)
             target = self.blob(digest.hexdigest())
-            target.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(target.parent)
             os.replace(temporary, target)
             sync_folder(target.parent)
         finally:
@@ -183,7 +192,7 @@ class Artifacts:
         """Make a workspace the result of ``key``; if that exists already, the workspace is dropped."""
         sync_tree(workspace)
         target = self.result(key)
-        target.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(target.parent)
         try:
             os.rename(workspace, target)
         except OSError:
