@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -11,9 +13,17 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import Column, Float, Integer, String, Text
 from sqlalchemy.engine import Engine
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
 from service.artifacts import make_private
 
+AWAY = (DBAPIError, PoolTimeoutError)
+"""What is raised while the database does not answer: by itself, or to who waits for one of its connections."""
+
+# A server that fell silent is given up after seconds; the defaults of the system are minutes to hours.
+POSTGRES = {"connect_timeout": 10, "keepalives_idle": 5, "keepalives_interval": 3, "keepalives_count": 3,
+            "tcp_user_timeout": 15_000}
 MIGRATION_LOCK = 0x7A6F6E65  # a number of our own among PostgreSQL's advisory locks
 
 metadata = sa.MetaData()
@@ -98,6 +108,7 @@ api_keys = sa.Table(
 def connect(url: str) -> Engine:
     """An engine for a database URL; SQLite runs in WAL mode with full synchronisation.
 
+    What it raises holds no values: they are setups, webhooks and digests of keys, and errors go into the log.
     One engine per URL and process: Dask tasks call this again and again.
     """
     return _connect(url)
@@ -106,8 +117,12 @@ def connect(url: str) -> Engine:
 @lru_cache(maxsize=16)
 def _connect(url: str) -> Engine:
     if not url.startswith("sqlite"):
-        return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=20)
-    engine = sa.create_engine(url, connect_args={"timeout": 30, "check_same_thread": False})
+        asked = sa.make_url(url)
+        given = POSTGRES if asked.drivername == "postgresql+psycopg" else {}
+        options = {k: v for k, v in given.items() if k not in asked.query}
+        return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=20, hide_parameters=True,
+                                connect_args=options)
+    engine = sa.create_engine(url, hide_parameters=True, connect_args={"timeout": 30, "check_same_thread": False})
     sa.event.listen(engine, "connect", _pragmas)
     return engine
 
@@ -135,9 +150,12 @@ def migrate(url: str) -> None:
 
 @contextmanager
 def _alone(connection: sa.Connection) -> Iterator[None]:
-    """Only one service at a time brings a PostgreSQL up to date; the embedded one has its data folder for itself."""
+    """Only one process at a time brings a database up to date; others wait. ``zonemill keys`` does so too."""
     if connection.dialect.name != "postgresql":
-        yield
+        path = connection.engine.url.database
+        with Path(f"{path}.migrating" if path else os.devnull).open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
         return
     connection.execute(sa.text("SELECT pg_advisory_lock(:n)"), {"n": MIGRATION_LOCK})
     connection.commit()

@@ -17,11 +17,10 @@ from typing import IO, Any
 
 import structlog
 from sqlalchemy.engine import RowMapping
-from sqlalchemy.exc import DBAPIError
 
 from geometry.errors import ResourceError, SetupError
 from service.artifacts import Artifacts
-from service.db import connect, migrate
+from service.db import AWAY, connect, migrate
 from service.errors import RateError, UnavailableError
 from service.janitor import Janitor
 from service.keys import KeyStore
@@ -105,7 +104,10 @@ class Engine:
         self.janitor.start()
 
     def close(self) -> None:
-        """Stop dispatching and end the embedded cluster; its running jobs are left to the next start."""
+        """Stop dispatching and end the embedded cluster; its running jobs are left to the next start.
+
+        Of a real cluster they go on, and what no worker has begun is another service's to claim at once.
+        """
         self._stop.set()
         self._wake.set()
         if self._courier is not None:
@@ -113,11 +115,14 @@ class Engine:
         self.janitor.close()
         if self._thread is not None:
             self._thread.join(timeout=10)
-        if self._cluster is not None:
-            try:
+        try:
+            if self._cluster is not None:
                 self.jobs.disown()
-            except DBAPIError:
-                log.exception("the database is away; running jobs are taken up when their leases have run out")
+            else:
+                self.jobs.hand_back(self.owner)
+        except AWAY:
+            log.exception("the database is away; running jobs are taken up when their leases have run out")
+        if self._cluster is not None:
             self._await_idle()
         for part in (self._client, self._cluster):
             if part is not None:
@@ -338,7 +343,7 @@ class Engine:
             if future.status != "error":
                 continue
             job_id, _, claim = key.rpartition("-")
-            if isinstance(future.exception(), DBAPIError):
+            if isinstance(future.exception(), AWAY):
                 log.warning("the database was away; the job is taken up again", job=job_id, claim=claim)
                 continue  # its lease runs out
             error = ResourceError(f"the workers that ran the job were lost ({future.exception()!r})",

@@ -16,6 +16,7 @@ from starlette.routing import compile_path
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
 from service.convert import sentence
+from service.db import AWAY
 from service.errors import (
     ERROR_TABLE,
     ForbiddenError,
@@ -61,7 +62,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(CamError, _ours)
     app.add_exception_handler(HTTPException, _framework)
     app.add_exception_handler(RequestValidationError, _validation)
-    app.add_exception_handler(DBAPIError, _database)
+    for kind in AWAY:
+        app.add_exception_handler(kind, _database)
     app.add_exception_handler(OSError, _disk)
     app.add_exception_handler(UnicodeEncodeError, _half_a_character)
     app.add_exception_handler(Exception, _unexpected)
@@ -112,7 +114,7 @@ async def _validation(request: Request, error: Exception) -> JSONResponse:
 
 async def _database(request: Request, error: Exception) -> JSONResponse:
     """The database is away, or full: nobody's bug, and worth trying again. What it said may name hosts and users."""
-    if not isinstance(error, OperationalError | InterfaceError):
+    if isinstance(error, DBAPIError) and not isinstance(error, OperationalError | InterfaceError):
         return await _unexpected(request, error)
     log.error("the database does not answer", path=request.url.path, exc_info=error)
     return problem_response(request, UnavailableError("the database does not answer", code="database_unavailable",

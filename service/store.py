@@ -98,21 +98,24 @@ class JobStore:
             "webhook_due": 0.0 if new.webhook_url else None, "webhook_attempts": 0,
             "library_json": new.library_json,
         }
-        try:
-            with self.engine.begin() as c:
-                made = c.execute(_insert_where(values, _has_room(new.principal, room))).mappings().one_or_none()
-                if made is not None and new.labels:
-                    c.execute(labels.insert(), [{"job_id": made["id"], "key": k, "value": v}
-                                                for k, v in new.labels.items()])
-            if made is not None:
-                return made, True
-            found = self._by_key(new.principal, new.idempotency_key)
-            if found is None:
-                raise self.no_room(new.principal, room)
-        except IntegrityError:
-            found = self._by_key(new.principal, new.idempotency_key)
-            if found is None:
-                raise
+        found = None
+        while found is None:
+            try:
+                with self.engine.begin() as c:
+                    made = c.execute(_insert_where(values, _has_room(new.principal, room))).mappings().one_or_none()
+                    if made is not None and new.labels:
+                        c.execute(labels.insert(), [{"job_id": made["id"], "key": k, "value": v}
+                                                    for k, v in new.labels.items()])
+                if made is not None:
+                    return made, True
+                found = self._by_key(new.principal, new.idempotency_key)
+                if found is None:
+                    raise self.no_room(new.principal, room)
+            except IntegrityError:
+                found = self._by_key(new.principal, new.idempotency_key)
+                if found is None and new.idempotency_key is None:
+                    raise
+                # None: the files of the job that had the key were let go of just now, so the key is free again
         if found["kind"] != new.kind:
             raise KeyConflictError(
                 f"the Idempotency-Key belongs to job {found['id']}, which is of kind {found['kind']}, not {new.kind}",
@@ -298,6 +301,13 @@ class JobStore:
                 state="queued", stage="queued", progress=0.0, attempt=jobs.c.attempt - begun, lease_owner=None,
                 lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
+    def hand_back(self, owner: str) -> int:
+        """Put into the queue what ``owner`` claimed and no worker has begun; returns how many."""
+        with self.engine.begin() as c:
+            return c.execute(jobs.update().where(jobs.c.state == "running", jobs.c.lease_owner == owner).values(
+                state="queued", stage="queued", progress=0.0, lease_owner=None, lease_until=None,
+                event_seq=jobs.c.event_seq + 1)).rowcount
+
     def put_back(self, job_id: str, owner: str) -> bool:
         """Let a job that ``owner`` holds wait again; the attempt counts."""
         return self._change(self._held(job_id, owner), state="queued", stage="queued", progress=0.0, lease_owner=None,
@@ -315,12 +325,15 @@ class JobStore:
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
     def give_up(self, max_attempts: int, lease_s: float, mercy_s: float = 0.0) -> int:
-        """Fail the jobs whose holder went silent in their last attempt; lease_s and mercy_s as for ``claim``."""
+        """Fail the jobs whose holder went silent in their last attempt; lease_s and mercy_s as for ``claim``.
+
+        Also those that wait and have no attempt left, as after ``max_attempts`` was lowered: nobody would claim them.
+        """
         error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
                               code="attempts_exhausted", measured=max_attempts, limit=max_attempts,
                               remedy="look into the log of the service; the job may need more memory than there is")
-        gone = sa.and_(jobs.c.state == "running", _silent(time.time(), lease_s, mercy_s),
-                       jobs.c.attempt >= max_attempts)
+        silent = sa.and_(jobs.c.state == "running", _silent(time.time(), lease_s, mercy_s))
+        gone = sa.and_(sa.or_(jobs.c.state == "queued", silent), jobs.c.attempt >= max_attempts)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(gone).values(
                 state="failed", stage="failed", finished=time.time(), error_json=json.dumps(error.as_dict()),

@@ -16,11 +16,10 @@ from typing import Any
 
 import structlog
 from sqlalchemy.engine import RowMapping
-from sqlalchemy.exc import DBAPIError
 
 from geometry.errors import CamError, CancelledError, InternalError, ResourceError
 from service.artifacts import Artifacts, key_of
-from service.db import connect
+from service.db import AWAY, connect
 from service.storage import STORAGE_FULL, is_full, storage_full
 from service.store import WORKER, JobStore
 from service.supervisor import Limits, supervise
@@ -110,7 +109,7 @@ def _record(write: Callable[[], bool], patience_s: float) -> bool:
     while True:
         try:
             return write()
-        except DBAPIError as error:
+        except AWAY as error:
             if time.monotonic() > until:
                 raise
             log.warning("the end of a job is not recorded yet", error=type(error).__name__)
@@ -164,14 +163,14 @@ class _Attempt:
     def _progress(self, stage: str, fraction: float) -> None:
         try:
             self.store.progress(self.row["id"], self.owner, stage, fraction)
-        except DBAPIError as error:
+        except AWAY as error:
             log.warning("progress not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _resumed(self, taken: Mapping[str, int]) -> None:
         log.info("taken over from an attempt before", job=self.row["id"], attempt=self.row["attempt"], **taken)
         try:
             self.store.resumed(self.row["id"], self.owner, taken)
-        except DBAPIError as error:
+        except AWAY as error:
             log.warning("what was taken over is not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _keep(self) -> bool:
@@ -181,6 +180,6 @@ class _Attempt:
                 return self.store.is_held(self.row["id"], self.owner)
             self.renewed = time.monotonic()
             return self.store.renew(self.row["id"], self.owner, self.config.lease_s)
-        except DBAPIError as error:
+        except AWAY as error:
             log.warning("database does not answer", job=self.row["id"], error=type(error).__name__)
             return True

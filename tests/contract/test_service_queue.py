@@ -5,6 +5,8 @@ import time
 from collections import namedtuple
 
 import pytest
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
 from service.work import Unshown, WorkConfig
 
@@ -91,13 +93,14 @@ def test_an_upload_that_finds_the_disk_full_is_no_bug(make_client, post, monkeyp
     assert answer.status_code == 503 and answer.json()["code"] == "storage_full"
 
 
-def test_a_database_that_is_away_is_503_and_tells_nothing_of_itself(make_client, monkeypatch):
-    from sqlalchemy.exc import OperationalError
-
+@pytest.mark.parametrize("error", [
+    OperationalError("SELECT secret FROM t", {}, Exception("connection to db.internal failed")),
+    PoolTimeoutError("QueuePool limit of db.internal")])
+def test_a_database_that_is_away_is_503_and_tells_nothing_of_itself(make_client, monkeypatch, error):
     client = make_client()
 
     def away(*_args, **_named):
-        raise OperationalError("SELECT secret FROM t", {}, Exception("connection to db.internal failed"))
+        raise error
 
     monkeypatch.setattr(client.app.state.engine.jobs, "page", away)
     answer = client.get("/v1/jobs")

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
 
+import service.artifacts
 import service.db
 from service.artifacts import Artifacts, artifact_key
 from service.db import connect, jobs, metadata, migrate
@@ -234,6 +235,47 @@ def test_cancel_takes_the_job_from_its_holder(store):
     assert store.counts() == {"cancelled": 1} and store.running() == 0
     with pytest.raises(NotFoundError):
         store.get(job, "somebody else")
+
+
+def test_a_job_that_waits_without_an_attempt_left_fails_instead_of_waiting_for_ever(store):
+    job = store.create(new())[0]["id"]
+    store.claim("o", 30, 3)
+    assert store.start(job, 1, "worker-1", 30, 3) and store.put_back(job, "worker-1")
+    assert store.give_up(2, 30) == 0 and store.give_up(1, 30) == 1  # max_attempts was 3 and is 1 now
+    assert "attempts_exhausted" in store.get(job)["error_json"]
+
+
+def test_what_no_worker_has_begun_is_handed_back_and_the_rest_goes_on(store):
+    begun, waiting, other = (store.create(new(key=f"k{k}"))[0]["id"] for k in range(3))
+    assert [store.claim(o, 30, 3)["id"] for o in ("api-1", "api-1", "api-2")] == [begun, waiting, other]
+    assert store.start(begun, 1, "worker-1", 30, 3)
+    assert store.hand_back("api-1") == 1 and not store.start(waiting, 1, "worker-2", 30, 3)
+    assert [store.get(j)["state"] for j in (begun, waiting, other)] == ["running", "queued", "running"]
+    assert store.claim("api-2", 30, 3)["claims"] == 2 and store.get(waiting)["attempt"] == 0
+
+
+def test_a_key_that_becomes_free_in_between_makes_a_new_job(store, monkeypatch):
+    old, by_key = store.create(new(key="k"))[0]["id"], store._by_key
+
+    def let_go_meanwhile(*given):
+        monkeypatch.undo()
+        assert store.cancel(old) and store.expire(old)
+        return by_key(*given)
+
+    monkeypatch.setattr(store, "_by_key", let_go_meanwhile)
+    row, fresh = store.create(new(content="other", key="k"))
+    assert fresh and row["id"] != old
+
+
+def test_folders_that_are_made_for_a_file_are_flushed_too(tmp_path, monkeypatch):
+    flushed, sync = [], service.artifacts.sync_folder
+    monkeypatch.setattr(service.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
+    files = Artifacts(tmp_path / "data")
+    sha, _ = files.put_blob([b"abc"])
+    assert flushed == [files.root, files.root / "blobs", files.root / "blobs" / sha[:2]]
+    flushed.clear()
+    files.put_blob([b"abc"])
+    assert flushed == [files.root / "blobs" / sha[:2]]
 
 
 def test_results_appear_whole_and_once(tmp_path):
