@@ -122,6 +122,7 @@ class _Walk:
     def __init__(self, clamping: Clamping) -> None:
         self.clamping, self.machine = clamping, clamping.machine
         self.frame: Frame | None = None
+        self.ahead: list[F64] = []
         self.tip, self.turn = home_of(clamping), np.zeros(2)
 
     def enter(self, step: Workingstep, fresh: bool) -> list[Leg]:
@@ -133,14 +134,12 @@ class _Walk:
                               code="no_frame", subjects=(step.id,), limit=sorted(self.clamping.frames))
         if fresh:
             self.frame, self.tip, self.turn = None, home_of(self.clamping), np.zeros(2)
-        first, up = step.trajectories[0], np.array([[0.0, 0.0, 1.0]])
-        # of the places for the first axis one from which they get along the whole step
-        axes = np.vstack([up if t.axes is None else t.axes for t in step.trajectories]) @ frame.rotation
-        wanted = self.machine.follow(axes, self.turn)[0]
+        self.ahead = self._followed(step, frame)
+        wanted = self.ahead[0][0]
         if self.frame is not frame or np.abs(wanted - self.turn).max() > AT_REST:
             legs += [*self._away(), *self._turned(wanted)]
             self.frame = frame
-        start = first.points[0]
+        start = step.trajectories[0].points[0]
         here, clear = frame.rotation @ self.tip, int(to_grid(np.array([frame.clearance]))[0])
         path = grid_link(to_grid(here), to_grid(start), clear)
         if len(path) > 1:
@@ -150,11 +149,26 @@ class _Walk:
         self.tip = start @ frame.rotation
         return legs
 
+    def _followed(self, step: Workingstep, frame: Frame) -> list[F64]:
+        """Where the rotary axes stand, (n, 2) rad, at the points of each trajectory of a step; of a fixed axis once.
+
+        Found for all of the step: the place that turns least in one trajectory may be none to go on from in the next.
+        Where one ends the next begins, at the pole too.
+        """
+        up, axes, begins = np.array([[0.0, 0.0, 1.0]]), np.zeros((0, 3)), []
+        for t in step.trajectories:
+            own = (up if t.axes is None else t.axes) @ frame.rotation
+            joined = len(axes) > 0 and bool(np.abs(axes[-1] - own[0]).max() <= JUMP)
+            begins.append((len(axes) - joined, len(own)))
+            axes = np.vstack([axes, own[joined:]])
+        turns = self.machine.follow(axes, self.turn)
+        return [turns[i:i + n] for i, n in begins]
+
     def through(self, step: Workingstep) -> list[Leg]:
-        """The trajectories of a step in the setup frame."""
+        """The trajectories of a step that was entered, in the setup frame."""
         legs, frame = [], self.clamping.frames[step.access]
         gauge = self.clamping.gauges[step.tool.number]
-        for t in step.trajectories:
+        for t, ahead in zip(step.trajectories, self.ahead, strict=True):
             tips = t.points @ frame.rotation
             axis = frame.rotation[2] if t.axes is None else t.axes[0] @ frame.rotation
             if np.abs(self.machine.axes(self.turn[None])[0] - axis).max() > JUMP:
@@ -166,7 +180,7 @@ class _Walk:
                 legs.append(replace(self._straight(t.motion, tips, t.feed), arcs=self._arcs(t.arcs, frame)))
             else:
                 tips, turns = self.machine.course(tips, t.axes @ frame.rotation, 0.5 * step.chordal_tolerance, SWING,
-                                                  gauge, self.turn)
+                                                  gauge, ahead)
                 legs.append(Leg(t.motion, tips, self.machine.axes(turns), turns, t.feed))
                 self.turn = turns[-1]
             self.tip = tips[-1]

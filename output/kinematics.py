@@ -33,7 +33,7 @@ POLE = 1e-9  # rad, an axis nearer to Z than this has no azimuth
 THROUGH = 1e-5  # rad, a path that passes Z as near as that goes through it: the tilt may change its sign there
 ROUND = 2.0 * math.pi
 MOST_ROUNDS = 24  # halvings of a block
-STANDS = 1e-6  # rad, from where it is said to stand
+SLACK = 1e-9  # rad beyond a limit that is rounding
 SHARES = (0.25, 0.5, 0.75)  # of a block, where it is held against the straight way
 _LETTER = {"A": 0, "B": 1}
 _AZIMUTH = {  # azimuth of the axis, rad, where the tilt is positive: first + second * C
@@ -125,8 +125,13 @@ class RotaryMachine:
 
     def stands(self, axes: F64) -> NDArray[np.bool_]:
         """(n,) bool: tool axes (n, 3), unit, for which the rotary axes have a place inside their limits."""
-        outside = np.isnan(self._choices(self.turns(axes)).sum(axis=2))
-        return np.asarray(~outside.all(axis=1))
+        both = self.turns(axes)
+        if self.limits is None:
+            return np.ones(len(axes), np.bool_)
+        low, high = self.limits[:, 0] - SLACK, self.limits[:, 1] + SLACK
+        least = both[..., 1] + ROUND * np.ceil((low[1] - both[..., 1]) / ROUND)
+        tilts = (both[..., 0] >= low[0]) & (both[..., 0] <= high[0])
+        return np.asarray((tilts & (least <= high[1])).any(axis=1))
 
     def even(self, axis: F64, degrees: float) -> F64:
         """(k, 3) unit: axes round one (3,) for which both rotary axes stand at whole multiples of some degrees."""
@@ -151,12 +156,11 @@ class RotaryMachine:
             place = pivots[0] + _applied(self._tilt(turns).transpose(0, 2, 1), place - pivots[0])
         return np.asarray(pivots[1] + _applied(_turn_matrix(2, -turns[:, 1]), place - pivots[1]))
 
-    def follow(self, axes: F64, start: F64 | None = None, *, held: bool = False) -> F64:
+    def follow(self, axes: F64, start: F64 | None = None) -> F64:
         """Rotary axes along a path, turning least in all.
 
         axes  : (n, 3) float64, unit, along the path; neighbours less than half a turn apart
         start : (2,) float64, rad, where they stand before the path; None: anywhere, the least angles first
-        held  : they stand at the first axis already, and are not turned to its other place
 
         Returns
         -------
@@ -175,26 +179,22 @@ class RotaryMachine:
         over = math.pi if self.limits is None or self.limits[0, 1] >= math.pi else -math.pi
         out[:, 0] = np.where(axes[:, 2] < 0.0, over, 0.0)
         if len(known):
-            first = start if held and known[0] == 0 else None
-            out[known] = self._least_turning(self.turns(axes[known]), _through_pole(axes, known), start, first)
-            at, turned = known, out[known, 1]
-            if held and known[0] > 0 and start is not None:  # at the pole, where any C will do, it is what it is
-                at, turned = np.concatenate([[0], known]), np.concatenate([start[1:], turned])
-            out[:, 1] = np.interp(np.arange(len(axes)), at, turned)
+            out[known] = self._least_turning(self.turns(axes[known]), _through_pole(axes, known), start)
+            out[:, 1] = np.interp(np.arange(len(axes)), known, out[known, 1])
         else:
             out[:, 1] = 0.0 if start is None else start[1]
         self._check(out)
         return out
 
     def course(self, tips: F64, axes: F64, tolerance: float, swing: float, gauge: float,
-               start: F64 | None = None) -> tuple[F64, F64]:
+               turns: F64 | None = None) -> tuple[F64, F64]:
         """A path with as many points more as the rotary axes need to follow it.
 
         tips, axes : (n, 3) float64, mm and unit: straight between tips, along great circles between axes
         tolerance  : mm, what the tip may leave its way by where the program is one of joints
         swing      : rad, what the axis may leave its great circle by
         gauge      : mm, spindle face to tip
-        start      : (2,) float64, rad, where the rotary axes stand at its first point; None: anywhere
+        turns      : (n, 2) float64, rad, where the rotary axes stand at its points; None: as ``follow`` has it
 
         Returns
         -------
@@ -205,7 +205,7 @@ class RotaryMachine:
         OutputError
             As ``follow``; pole_crossing: the axis passes so near Z that no step is short enough.
         """
-        turns = self.follow(axes, start, held=start is not None)
+        turns = self.follow(axes) if turns is None else turns
         for _ in range(MOST_ROUNDS):
             off = np.flatnonzero(self._off(tips, axes, turns, tolerance, swing, gauge))
             if not len(off):
@@ -245,14 +245,13 @@ class RotaryMachine:
                 out |= np.linalg.norm(at - (1.0 - share) * tips[:-1] - share * tips[1:], axis=1) > tolerance
         return out
 
-    def _least_turning(self, both: F64, poled: NDArray[np.bool_], start: F64 | None, first: F64 | None) -> F64:
+    def _least_turning(self, both: F64, poled: NDArray[np.bool_], start: F64 | None) -> F64:
         """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all.
 
         poled : (n - 1,) bool, where the way to the next goes through the pole; only there the tilt may change its sign,
                 for elsewhere that would take the axis through Z and back
-        first : (2,) rad, the place it begins with, or None
         """
-        rows = self._choices(both)
+        rows = self._choices(both, 0.0 if start is None else float(start[1]), poled)
         other = np.repeat([False, True], rows.shape[1] // 2)
         changed = other[:, None] != other
         least = np.full(rows.shape[:2], math.inf)
@@ -261,8 +260,6 @@ class RotaryMachine:
         if self.limits is None:
             rows[0, :, 1] += ROUND * np.rint((came_from[1] - rows[0, :, 1]) / ROUND)
         least[0] = np.abs(rows[0] - came_from).max(axis=1)
-        if first is not None:
-            least[0, least[0] > STANDS] = math.inf
         least[0, np.isnan(least[0])] = math.inf
         if not np.isfinite(least[0]).any():
             self._refuse(both[0], 0)
@@ -286,16 +283,24 @@ class RotaryMachine:
             at = int(came[k, at])
         return out
 
-    def _choices(self, both: F64) -> F64:
-        """(n, m, 2) rad: the places to choose from, nan outside the limits; without limits the two alone."""
+    def _choices(self, both: F64, start: float, poled: NDArray[np.bool_]) -> F64:
+        """(n, m, 2) rad: the places to choose from, nan outside the limits; without limits the two alone.
+
+        Limits far apart hold more whole turns than the path can come to from where C stands at its ``start``: a row of
+        places spans no more than C turns in all, and is moved by whole turns as near to there as limits let it.
+        """
         if self.limits is None:
             return both.copy()
         low, high = self.limits[1]
+        step = np.diff(both[:, 0, 1])
+        most = float(np.abs(step - ROUND * np.rint(step / ROUND)).sum()) + ROUND * (2 + np.count_nonzero(poled))
+        here = min(max(start, low), high)
+        low, high = max(low, here - most), min(high, here + most)
         turns = np.arange(math.floor((low - math.pi) / ROUND), math.ceil((high + math.pi) / ROUND) + 1)
         rows = np.repeat(both, len(turns), axis=1)
         rows[..., 1] += np.tile(ROUND * turns, 2)
-        slack = 1e-9
-        beyond = ((rows < self.limits[:, 0] - slack) | (rows > self.limits[:, 1] + slack)).any(axis=2)
+        least, greatest = np.array([self.limits[0], [low, high]]).T
+        beyond = ((rows < least - SLACK) | (rows > greatest + SLACK)).any(axis=2)
         rows[beyond] = np.nan
         rows[:, :, 1] = np.clip(rows[:, :, 1], low, high)
         rows[:, :, 0] = np.clip(rows[:, :, 0], *self.limits[0])
@@ -305,7 +310,7 @@ class RotaryMachine:
         """Refuse places outside the limits."""
         if self.limits is None:
             return
-        out = (turns < self.limits[:, 0] - 1e-9) | (turns > self.limits[:, 1] + 1e-9)
+        out = (turns < self.limits[:, 0] - SLACK) | (turns > self.limits[:, 1] + SLACK)
         if out.any():
             k = int(np.flatnonzero(out.any(axis=1))[0])
             self._refuse(np.array([turns[k], turns[k]]), k)

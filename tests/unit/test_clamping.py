@@ -159,3 +159,27 @@ def test_the_place_of_the_rotary_axes_is_chosen_for_the_whole_step():
     assert np.abs(clamping.machine.axes(turns)[[0, -1]] - wanted_axes[[0, -1]]).max() < 1e-9
     alone = clamping.machine.follow(wanted_axes[:1], np.zeros(2))[0]
     assert np.abs(alone - turns[0]).max() > 1.0  # it would have been the other place
+
+
+@pytest.mark.parametrize("at", [0, 24, 25, 26, 30])
+def test_parts_of_a_pass_over_the_pole_go_on_from_one_another(at):
+    """A tilts to one side alone, so C has to swing round at the pole; the part that ends just past it would rather
+    tilt the other way, from where the next part has no way on."""
+    plan = clamped()
+    lean = np.radians(np.linspace(25.0, -25.0, 51))
+    axes = np.column_stack([np.zeros(51), -np.sin(lean), np.cos(lean)])
+    tips = np.column_stack([np.linspace(-4.0, 4.0, 51), np.zeros(51), np.full(51, 12.0)])
+    parts = [(0, 51)] if at == 0 else [(0, at + 1), (at, 51)]
+    cuts = tuple(Trajectory(Motion.CUT, tips[a:b], 500.0, axes[a:b]) for a, b in parts)
+    machine = RotaryMachine("table-table-AC", limits=np.radians([[-5.0, 110.0], [-360.0, 360.0]]))
+    job = replace(plan, steps=(replace(plan.steps[0], trajectories=cuts),),
+                  clamping=replace(plan.clamping, machine=machine))
+    (section,) = sections(job)
+    before, *legs = [section.before[-2], *section.legs]
+    assert np.degrees(np.vstack([leg.turns for leg in legs])[:, 0]).min() >= -5.0
+    for one, other in zip([before, *legs], legs, strict=False):
+        assert np.abs(one.turns[-1] - other.turns[0]).max() < 1e-9
+    assert np.abs(np.vstack([leg.axes for leg in legs])[[0, -1]] - axes[[0, -1]]).max() < 1e-9
+    p = read(job)
+    cut = np.flatnonzero(~np.isnan(p.feed))
+    assert np.abs(p.poses.end_axis[cut[:-1]] - p.poses.start_axis[cut[1:]]).max() < 1e-9

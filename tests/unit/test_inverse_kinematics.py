@@ -122,16 +122,29 @@ def test_an_axis_that_passes_close_by_the_pole_is_followed():
     assert len(path) < 200
 
 
-def test_a_path_begins_where_the_axes_stand_even_where_the_other_place_would_turn_less():
-    """From A30 a path that ends where only a negative tilt is allowed would rather have begun at the other place."""
-    here = machine("table-table-AC")
-    axes = unit(np.stack([np.linspace(0.4, -0.4, 41), np.full(41, 0.02), np.ones(41)], axis=1))
-    for start in here.turns(axes[:1])[0]:
-        turns = here.follow(axes, start, held=True)
-        assert np.allclose(turns[0], start) and np.allclose(here.axes(turns), axes)
-    pole = unit(np.stack([np.linspace(0.0, 0.4, 41), np.zeros(41), np.ones(41)], axis=1))
-    turns = here.follow(pole, np.radians([0.0, 33.0]), held=True)
-    assert np.allclose(turns[0], np.radians([0.0, 33.0])) and np.allclose(here.axes(turns), pole)
+@pytest.mark.parametrize("limits", [[[-120, 120], [-360, 360]], [[-5, 110], [0, 90]], [[-90, 20], [-200, 170]]])
+def test_an_axis_stands_where_one_of_its_places_is_inside_the_limits(limits):
+    rng = np.random.default_rng(4)
+    axes = unit(rng.normal(size=(400, 3)))
+    here, (low, high) = machine("table-table-BC", limits), np.radians(limits).T
+    turned = here.turns(axes)[:, None] + 2.0 * np.pi * np.arange(-3, 4)[:, None, None] * [0.0, 1.0]
+    inside = ((turned >= low) & (turned <= high)).all(axis=3).any(axis=(1, 2))
+    assert np.array_equal(here.stands(axes), inside) and 0 < inside.sum() < 400
+
+
+@pytest.mark.parametrize("most", [720.0, 99_999.0, 1e6])
+def test_limits_far_apart_are_no_more_places_to_choose_from(most):
+    """A control that counts on to 99999 deg held 1112 places an axis, and a pass of 100 poses took 7 s."""
+    spin = np.linspace(0.0, 2.5, 50)
+    cone = unit(np.stack([0.3 * np.cos(spin), 0.3 * np.sin(spin), np.full(50, 0.9)], axis=1))
+    near = machine("table-table-AC", [[0.0, 110.0], [-360.0, 360.0]])
+    far = machine("table-table-AC", [[0.0, 110.0], [-most, most]])
+    assert np.array_equal(far.follow(cone), near.follow(cone))
+    for start in (-most, most - 180.0, 0.5 * most):  # from where C stands, by its limits too
+        turns = far.follow(cone, np.radians([20.0, start]))
+        assert abs(np.degrees(turns[0, 1]) - start) < 505.0  # a turn, and room for the path before its limit
+        assert np.allclose(far.axes(turns), cone, atol=1e-8)
+    assert far._choices(far.turns(cone), 0.0, np.zeros(49, bool)).shape[1] <= 16
 
 
 @pytest.mark.parametrize("aside", [0.0, 1e-6, 0.03])
