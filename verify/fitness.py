@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from geometry.toolbody import ToolBody
 from verify.blank import stock_bounds
 from verify.cycles import FEED
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program import Program
+from verify.table import UPRIGHT, lowest_places
 
+UP = np.array([0.0, 0.0, 1.0])
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 Z_AXIS = 4
 LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
@@ -22,7 +25,7 @@ RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from de
 
 def top_of_all(bounds: F64, setup: ProofSetup) -> float:
     """Height that neither part (bounds (2, 3), mm), stock nor fixtures exceed before the first cut, mm."""
-    return _top_along(np.array([0.0, 0.0, 1.0]), bounds, setup)
+    return _top_along(UP, bounds, setup)
 
 
 def _top_along(axis: F64, bounds: F64, setup: ProofSetup) -> float:
@@ -45,35 +48,55 @@ def from_above(program: Program, height: float) -> Program:
     return replace(program, start=start, minutes=minutes)
 
 
-def way_findings(p: Program, bounds: F64, setup: ProofSetup) -> list[Finding]:
+def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: ProofSetup) -> list[Finding]:
     """Ways that cannot be simulated and are not clear above everything, and stops below it.
 
     bounds : (2, 3) mm, of the part
     """
     top = top_of_all(bounds, setup)
-    return [*_blind(p, top, setup), *_doglegs(p, top, setup), *_low_stops(p, bounds, setup)]
+    low = np.minimum(p.start[:, 2], p.end[:, 2])
+    if p.poses is not None:  # where a tool leans its holder may hang lower than its tip
+        low = np.minimum(low, lowest_places(p, tools, setup, leaning=True))
+    return [*_blind(p, bounds, top, low, setup), *_doglegs(p, top, low, setup), *_low_stops(p, bounds, setup)]
 
 
-def _blind(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
+def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
+    """Ways that start at a place nobody stated and do not end above everything, where all of these places are.
+
+    Above is along Z of the machine. On a machine whose table tilts that is the tool axis, else Z of the setup frame,
+    above which all of the tool has to be; low (m,) float64, mm, its lowest places.
+    """
     clear = top + setup.clearance_rapid - 1e-6
+    tables = setup.kinematics is not None and not setup.kinematics.tilts_head
     for move, axes in p.unknown.tolist():
         a, b = p.start[move], p.end[move]
-        lowest = min(a[2], b[2])
-        if lowest >= clear or (axes == Z_AXIS and (a[:2] == b[:2]).all()):
+        if axes == Z_AXIS and (a[:2] == b[:2]).all():
             continue
         names = "".join(name for k, name in enumerate("XYZ") if axes & (1 << k))
-        yield _finding(FindingKind.PROGRAM, p, move, float(clear - lowest), float(clear),
-                       f"the way to {_place(b)} starts at a place the program has not stated ({names}) and goes below "
-                       f"Z{clear:.3f}, so it cannot be simulated: state X and Y first, then come down")
+        way = f"the way to {_place(b)} starts at a place the program has not stated ({names})"
+        axis = UP if p.poses is None else p.poses.end_axis[move]
+        if tables and axis[2] < 1.0 - UPRIGHT:
+            limit = _top_along(axis, bounds, setup) + setup.clearance_rapid
+            lowest = min(float(a @ axis), float(b @ axis))
+            if lowest < limit - 1e-6:
+                yield _finding(FindingKind.PROGRAM, p, move, limit - lowest, limit,
+                               f"{way} and ends {limit - lowest:.3f} mm along the tool lower than above everything, so "
+                               "it cannot be simulated: go to a place farther out first, then along the tool")
+        elif low[move] < clear:
+            yield _finding(FindingKind.PROGRAM, p, move, float(clear - low[move]), float(clear),
+                           f"{way} and goes below Z{clear:.3f}, so it cannot be simulated: state X and Y first, then "
+                           "come down")
 
 
-def _doglegs(p: Program, top: float, setup: ProofSetup) -> Iterator[Finding]:
-    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.dogleg``)."""
+def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
+    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.dogleg``).
+
+    low : (m,) float64, mm, the lowest places of tools
+    """
     if not setup.dogleg or p.poses is None:
         return
     clear = top + setup.clearance_rapid - 1e-6
     start, end = joints_of(p, setup) or (p.start, p.end)
-    low = np.minimum(p.start[:, 2], p.end[:, 2])
     turning = (p.poses.start_turn != p.poses.end_turn).sum(axis=1)
     several = (np.abs(end - start) > 1e-9).sum(axis=1) + turning > 1
     bad = np.flatnonzero((p.kind != FEED) & (turning > 0) & several & (low < clear))

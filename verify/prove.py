@@ -111,7 +111,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stretches, of = in_parts(moves, tools)
     angle = engaged_angles(run.engaged, stretches, tools)
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings()),
+                *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings(tools)),
                 *table_findings([p.program for p in read], tools, setup),
                 *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)

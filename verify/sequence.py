@@ -41,9 +41,10 @@ class Reading:
     setup: ProofSetup
     bounds: F64
 
-    def findings(self) -> list[Finding]:
+    def findings(self, tools: Sequence[ToolBody]) -> list[Finding]:
         """Limits of the machine and ways that cannot be simulated, places in the frame of the proof."""
-        found = [*limit_findings([self.program], self.setup), *way_findings(self.program, self.bounds, self.setup)]
+        found = [*limit_findings([self.program], self.setup),
+                 *way_findings(self.program, self.bounds, tools, self.setup)]
         if self.turn is None:
             return found
         return [f if f.point is None else replace(f, point=tuple((np.array(f.point) @ self.turn).tolist()))

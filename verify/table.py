@@ -39,18 +39,8 @@ def table_findings(read: Sequence[Program], tools: Sequence[ToolBody], setup: Pr
 def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, limit: float) -> Iterator[Finding]:
     if p.poses is None and not setup.table_known:
         return
-    up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
-    start, end = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
-    swings = np.abs(start - end).max(axis=1) > UPRIGHT
-    low = np.full(len(p), np.inf)
-    for tool in tools:
-        mine = np.flatnonzero(p.tool == tool.number)
-        low[mine] = np.minimum(_lowest(tool, setup, p.start[mine], start[mine], swings[mine]),
-                               _lowest(tool, setup, p.end[mine], end[mine], swings[mine]))
-    asked = np.isfinite(low)
-    if not setup.table_known:
-        asked &= (np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT)
-    bad = np.flatnonzero(asked & (low < limit - ROUNDING))
+    low = lowest_places(p, tools, setup, leaning=not setup.table_known)
+    bad = np.flatnonzero(low < limit - ROUNDING)
     if not len(bad):
         return
     m = int(bad[np.argmin(low[bad])])
@@ -60,6 +50,23 @@ def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, limit: float) 
                   float(limit - low[m]), float(limit),
                   f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it has to stay {setup.clearance_rapid:g} mm above {what} "
                   f"at Z{setup.table:.3f}", len(bad))
+
+
+def lowest_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, *, leaning: bool) -> F64:
+    """(m,) float64, mm: how low the assembly reaches on every move; inf without a tool of these.
+
+    leaning : of upright tools too it is inf
+    """
+    up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
+    start, end = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
+    swings = np.abs(start - end).max(axis=1) > UPRIGHT
+    asked = np.ones(len(p), np.bool_) if not leaning else np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT
+    out = np.full(len(p), np.inf)
+    for tool in tools:
+        mine = np.flatnonzero(asked & (p.tool == tool.number))
+        out[mine] = np.minimum(_lowest(tool, setup, p.start[mine], start[mine], swings[mine]),
+                               _lowest(tool, setup, p.end[mine], end[mine], swings[mine]))
+    return out
 
 
 def _lowest(tool: ToolBody, setup: ProofSetup, tip: F64, axis: F64, swings: F64) -> F64:
@@ -76,4 +83,4 @@ def _lowest(tool: ToolBody, setup: ProofSetup, tip: F64, axis: F64, swings: F64)
     return np.asarray(out)
 
 
-__all__ = ["table_findings"]
+__all__ = ["lowest_places", "table_findings"]
