@@ -8,6 +8,7 @@ aggregates as ``()``.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 
@@ -19,6 +20,7 @@ Write = Callable[[str], object]
 _LINES_A_PIECE = 4096
 _REFS_A_LINE = 12
 _TEXT_LIMIT = 256  # FILE_DESCRIPTION and FILE_NAME strings, ISO 10303-21 section 8.2
+_RUNS = re.compile(r"['\\]|[^ -~\U00010000-\U0010ffff]+|[\U00010000-\U0010ffff]")
 
 
 class Part21:
@@ -94,15 +96,17 @@ def quoted(text: str) -> str:
     """A Part 21 string: quotes and backslashes doubled, what is not printable ASCII as \\X2\\ or \\X4\\."""
     if text.isascii() and text.isprintable():
         return "'" + text.replace("\\", "\\\\").replace("'", "''") + "'"
-    out: list[str] = []
-    for c in text:
-        if " " <= c <= "~":
-            out.append({"'": "''", "\\": "\\\\"}.get(c, c))
-        elif ord(c) < 0x10000:
-            out.append(f"\\X2\\{ord(c):04X}\\X0\\")
-        else:
-            out.append(f"\\X4\\{ord(c):08X}\\X0\\")
-    return "'" + "".join(out).replace("\\X0\\\\X2\\", "") + "'"
+    return "'" + _RUNS.sub(_spelt, text) + "'"
+
+
+def _spelt(run: re.Match[str]) -> str:
+    """A sign that is doubled, or letters that are spelt by their codes: those of two bytes together, others alone."""
+    letters = run.group()
+    if letters in ("'", "\\"):
+        return 2 * letters
+    if len(letters) == 1 and ord(letters) >= 0x10000:
+        return f"\\X4\\{ord(letters):08X}\\X0\\"
+    return "\\X2\\" + "".join(f"{ord(c):04X}" for c in letters) + "\\X0\\"
 
 
 def real(value: float, digits: int = 4) -> str:

@@ -178,7 +178,7 @@ class _Upright(_Walk):
                 self.lines += self.dialect.stop()
             if self.plan.restart:
                 self._label(step)
-                self.lines += [*self._modes(), *self.dialect.rise()]
+                self.lines += [*self._modes(), *self.dialect.up()]
             self._put_in(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
@@ -370,6 +370,7 @@ def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
         *(restart if plan.restart else ()),
         d.path(tolerance),
         *d.needs,
+        *(d.needs_restart if plan.restart and plan.clamping is None else ()),
         "Tools, all lengths in mm from the tip:",
         *(tool_name(t) for t in _tools_in_use(plan)),
         *plan.comments,

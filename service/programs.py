@@ -242,7 +242,7 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
     lo, hi = ready.blank.corners(look.rotation)
     shapes = Ap238(setup.machine.ap238) is Ap238.CC2
     gauges = gauge_lengths(setup)
-    return Workplan(setup.labels.get("order", "zonemill job"), steps,
+    return Workplan(setup.labels.get("order") or "zonemill job", steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
                     StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
                     dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),

@@ -72,6 +72,7 @@ class Dialect:
     path    : 'Path mode ...', what the header says of how far the control may leave the path
     bounds_path : whether a word of the program bounds it
     needs   : what the header says of the machine that no word of the program sees to
+    needs_restart : and of a program of three axes with restart points besides
     """
 
     name = title = ending = ""
@@ -81,6 +82,7 @@ class Dialect:
     tcp_words = ""
     bounds_path = True
     needs: tuple[str, ...] = ()
+    needs_restart: tuple[str, ...] = ()
 
     def __init__(self, switches: Switches) -> None:
         self.switches = switches
@@ -177,6 +179,11 @@ class Dialect:
         """Before a step with the tool that is in the spindle, where ``stop`` leaves it low: up to machine zero."""
         return []
 
+    def up(self) -> list[str]:
+        """Behind ``modes`` and the zero of a program of three axes that may be started there: the spindle to machine
+        zero, wherever it stands."""
+        return self.rise()
+
     def stop(self) -> list[str]:
         """Spindle and coolant off, and the tool to where it can be changed."""
         return ["M5", "M9"]
@@ -246,4 +253,5 @@ class Dialect:
 
     def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
         """Feed blocks that say how often each would fit into a minute (inverse time)."""
-        return ["G93", *(f"G1 {row} F{decimal(f, 4)}" for row, f in zip(rows, per_minute, strict=True)), "G94"]
+        blocks = (f"G1 {row} {self.feed(decimal(f, 4))}" for row, f in zip(rows, per_minute, strict=True))
+        return ["G93", *blocks, "G94"]

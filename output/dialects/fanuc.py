@@ -15,6 +15,8 @@ from output.dialects.base import Dialect
 NAMED = 40
 """Characters of what stands beside the number of a program."""
 
+_SIGNS = str.maketrans({"%": "PCT", ";": ",", "{": "[", "}": "]", "\\": "/", "|": "/", "~": "-", "^": "'", "`": "'"})
+
 
 class Fanuc(Dialect):
     """Comments in capitals, of the characters that all of them show."""
@@ -29,8 +31,8 @@ class Fanuc(Dialect):
     tcp_word = "G43.4"
 
     def plain(self, text: str) -> str:
-        """% would end the file and ; the block, on a way of transfer or another."""
-        return super().plain(text).upper().replace("%", "PCT").replace(";", ",")
+        """% would end the file and ; the block, on a way of transfer or another; others its code has no sign for."""
+        return super().plain(text).upper().translate(_SIGNS)
 
     def feed(self, value: str) -> str:
         """With its decimal point."""

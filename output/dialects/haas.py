@@ -15,7 +15,8 @@ class Haas(Fanuc):
 
     name, title = "haas", "Haas"
     bounds_path = True
-    needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",)
+    needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",
+                              "Needed: rapids go straight, by the setting of linear rapids")
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G154 P1", "G154 P2", "G154 P3")
 
     def __init__(self, switches: Switches) -> None:

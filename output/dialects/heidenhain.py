@@ -89,6 +89,10 @@ class Heidenhain(Dialect):
         """The tool was called with its speed; another one is a call without a tool."""
         return ["M3", "M8"] if first else [f"TOOL CALL S{speed}"]
 
+    def up(self) -> list[str]:
+        """In coordinates of the machine."""
+        return ["L Z+0 R0 FMAX M91"]
+
     def stop(self) -> list[str]:
         """Up in coordinates of the machine."""
         return ["M5", "M9", "L Z+0 R0 FMAX M91"]

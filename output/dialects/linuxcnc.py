@@ -22,6 +22,8 @@ class LinuxCnc(Dialect):
     name, title, ending = "linuxcnc", "LinuxCNC", "ngc"
     tcp_words = "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"
 
+    needs_restart = ("Every step begins at machine zero of Z, which is taken to be the top of its travel",)
+
     def comment(self, text: str) -> list[str]:
         """Never one of the comments that act."""
         return [f"(- {c[1:]}" if _ACTIVE.match(c[1:]) else c for c in super().comment(text)]
@@ -33,6 +35,10 @@ class LinuxCnc(Dialect):
     def spindle(self, speed: str, first: bool) -> list[str]:
         """Both M words in one block: they are of two groups."""
         return [" ".join(super().spindle(speed, first))]
+
+    def modes(self, tolerance: str, turns: bool) -> list[str]:
+        """A shift by G92 or G52 outlives the program that made it, and even the control's being switched off."""
+        return [*super().modes(tolerance, turns), "G92.1"]
 
     def arc_modes(self) -> list[str]:
         """G90.1 of a run before may still be in force."""

@@ -77,6 +77,10 @@ class Siemens(Dialect):
         """With its first cutting edge."""
         return [f"T{number} M6", "D1"]
 
+    def up(self) -> list[str]:
+        """Past all frames and lengths."""
+        return ["SUPA G0 Z0 D0"]
+
     def stop(self) -> list[str]:
         """Up past all frames and lengths."""
         return ["M5", "M9", "SUPA G0 Z0 D0"]

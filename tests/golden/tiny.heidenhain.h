@@ -24,22 +24,23 @@
 23 CYCL DEF 32.1 T0.001
 24 CYCL DEF 247 DATUM SETTING ~
     Q339=+1 ;DATUM NUMBER
-25 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-26 TOOL CALL 1 Z S12000
-27 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
-28 M3
-29 M8
-30 L Z+25 R0 FMAX
-31 L X+0 Y+0 R0 FMAX
-32 L Z+6 R0 FMAX
-33 L Z+5 R0 F200
-34 L X+10 R0 F600
-35 L Y+2.5
-36 L X+0 Z+4.5
-37 L Z+6
-38 L Z+25 R0 FMAX
-39 M5
-40 M9
-41 L Z+0 R0 FMAX M91
-42 M30
-43 END PGM demo MM
+25 L Z+0 R0 FMAX M91
+26 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+27 TOOL CALL 1 Z S12000
+28 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+29 M3
+30 M8
+31 L Z+25 R0 FMAX
+32 L X+0 Y+0 R0 FMAX
+33 L Z+6 R0 FMAX
+34 L Z+5 R0 F200
+35 L X+10 R0 F600
+36 L Y+2.5
+37 L X+0 Z+4.5
+38 L Z+6
+39 L Z+25 R0 FMAX
+40 M5
+41 M9
+42 L Z+0 R0 FMAX M91
+43 M30
+44 END PGM demo MM

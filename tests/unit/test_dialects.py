@@ -487,6 +487,46 @@ def test_programs_of_joints():
                       read(still, write(still, "heidenhain"), "heidenhain")) == ""
 
 
+def test_a_whole_number_of_inverse_time_has_its_point():
+    """F60 is 0.06 on some machines; Haas programs that say it are refused."""
+    for dialect, word in (("linuxcnc", "F60"), ("fanuc", "F60."), ("haas", "F60."), ("siemens", "F60")):
+        assert DIALECTS[dialect](SHOPS["plain"]).timed(["X1. A2."], [60.0]) == ["G93", f"G1 X1. A2. {word}", "G94"]
+
+
+HOME = {"linuxcnc": "G53 G0 Z0.", "fanuc": "G91 G28 Z0.", "haas": "G91 G28 Z0.", "siemens": "SUPA G0 Z0 D0",
+        "heidenhain": "L Z+0 R0 FMAX M91"}
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("job", ["restart", "restart on five axes"])
+def test_behind_every_label_the_spindle_goes_to_machine_zero(job, dialect):
+    """Wherever it stands: before a tool is changed or turns, and the header says what that takes for granted."""
+    text = write(JOBS[job], dialect)
+    mark = {"siemens": r"^STEP_S\d+:$", "heidenhain": r'^\d+ LBL "S\d+"$'}.get(dialect, r"^N\d+$")
+    head, *parts = re.split(mark, text, flags=re.MULTILINE)
+    assert len(parts) == len(JOBS[job].steps)
+    for part in parts:
+        before = re.split(r"^(?:\d+ )?(?:T\d+ M6|TOOL CALL.*)$", part, flags=re.MULTILINE)[0]
+        assert HOME[dialect] in before
+    assert "machine zero of z" in " ".join(head.lower().split()) or "up to machine zero" in head
+
+
+def test_a_shift_of_zero_is_no_longer_there_at_a_label():
+    """LinuxCNC keeps one of G92 or G52 through M30 and being switched off."""
+    work = JOBS["restart"]
+    text = write(work, "linuxcnc")
+    whole = read(work, text, "linuxcnc")
+    for k in [m.start() for m in re.finditer(r"^N\d+$", text, flags=re.MULTILINE)]:
+        part = read(work, "%\nG21\nG52 X5. Y5. Z-5.\n" + text[k:], "linuxcnc")
+        assert not part.remarks and np.array_equal(part.end, whole.end[-len(part):])
+
+
+def test_comments_have_signs_that_controls_know():
+    work = replace(tiny(), labels={"order": "a{b}c\\d|e~f^g`h;i%j(k)l\"m'n: \u00fc \u6f22"})
+    for dialect in ("fanuc", "haas"):
+        assert """(LABEL ORDER: A[B]C/D/E-F'G'H,IPCTJ[K]L"M'N: UE ?)""" in write(work, dialect).splitlines()
+
+
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("job", ["restart", "restart on five axes", "arcs and restart"])
 def test_a_program_can_be_started_at_every_step(job, dialect):

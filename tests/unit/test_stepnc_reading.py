@@ -182,7 +182,7 @@ def test_statements_read_at_once_say_what_they_say_word_by_word():
         assert [type(v) for v in at_once.records(k)[0][1]] == [type(v) for v in by_word.records(k)[0][1]]
 
 
-@pytest.mark.parametrize("text", ["it's \\ ok", "é漢x", "😀 100 %", "a\tb", "''", "\\X2\\"])
+@pytest.mark.parametrize("text", ["it's \\ ok", "é漢x", "😀 100 %", "a\tb", "''", "\\X2\\", "é\\X0\\X2\\", "é\\é😀漢"])
 def test_strings_come_back(text):
     assert decoded(quoted(text)[1:-1]) == text
 
