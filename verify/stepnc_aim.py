@@ -398,6 +398,9 @@ class _Aim:
         planes = []
         for n in self.data.of("PROPERTY_DEFINITION"):
             owner = self.data.ref(n, "PROPERTY_DEFINITION", "definition")
+            if "MACHINING_SETUP_WORKPIECE_RELATIONSHIP" in self.file.names(owner):
+                raise self.file.error(n, ", definition: where the workpiece stands in its setup is not read; send the "
+                                         "paths in the system of the setup", owner)
             if "PRODUCT_DEFINITION" in self.file.names(owner):
                 formation = self.data.ref(owner, "PRODUCT_DEFINITION", "formation")
                 product = self.data.ref(formation, "PRODUCT_DEFINITION_FORMATION", "of_product")

@@ -69,6 +69,16 @@ def test_an_entity_in_the_other_form_is_refused(what, instead, entity):
     assert f"has {entity} " in refusal(text.replace(what, instead)).message
 
 
+def test_a_workpiece_that_is_placed_in_its_setup_is_refused():
+    """Its paths would be read in the wrong place."""
+    text = write_stepnc_aim(tiny())
+    setup = re.search(r"#(\d+)=MACHINING_SETUP_WORKPIECE_RELATIONSHIP", text)[1]
+    placed = (f"#9001=PROPERTY_DEFINITION('workpiece orientation','',#{setup});\n"
+              "#9002=REPRESENTATION('',(#13),#9);\n#9003=PROPERTY_DEFINITION_REPRESENTATION(#9001,#9002);\n")
+    error = refusal(text.replace("ENDSEC;\nEND-", placed + "ENDSEC;\nEND-"))
+    assert error.subjects[:2] == ("#9001", f"#{setup}") and "in its setup" in error.message
+
+
 def test_a_direction_of_no_size_and_a_dwell_before_now_are_refused():
     text = write_stepnc_arm(tiny())
     assert "direction_ratios" in refusal(text.replace("(0.,0.,1.)", "(0.,0.,1.E308)")).message
