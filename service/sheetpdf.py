@@ -25,6 +25,7 @@ STROKES = {"measure": 0.12, "axis": 0.08, "spindle": 0.35}
 POINTS_PER_MM = 72.0 / 25.4
 CELL = 240  # characters of a table cell; what is longer goes on in a row below, or it might not fit onto any page
 LEAST_BELOW = 34.0  # mm a heading needs below it, or it goes onto the next page with what follows
+PAGES = "\x7f\x7f"  # stands for how many pages there are; no text of the sheet has these letters (``latin``)
 BESIDE = 11  # facts beside the drawing of a tool; the rest stand below it
 
 
@@ -50,7 +51,7 @@ class _Pages(FPDF):
         self.set_title(latin(sheet.title))
         self.set_lang("en")
         self.set_producer("zonemill")
-        self.alias_nb_pages()
+        self.alias_nb_pages(PAGES)
         self.add_page()
 
     def write_as(self, size: float, style: str = "", colour: tuple[int, int, int] = INK) -> None:
@@ -72,7 +73,7 @@ class _Pages(FPDF):
         self.set_y(-FOOT)
         self.write_as(7, "", QUIET)
         self.cell(self.epw - 24.0, 5, self.fitted(self.sheet.foot, self.epw - 26.0))
-        self.cell(24.0, 5, f"page {self.page_no()} of {{nb}}", align="R")
+        self.cell(24.0, 5, f"page {self.page_no()} of {PAGES}", align="R")
 
     def fitted(self, text: str, width: float) -> str:
         """As much of a text as goes into ``width`` mm."""

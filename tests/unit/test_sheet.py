@@ -284,5 +284,12 @@ def test_a_line_is_cut_where_it_does_not_fit():
     assert re.search(r" W{40,110}\.\.\. page 1 of 2", text) and text.count("W") > 2500
 
 
+def test_what_stands_for_the_number_of_pages_is_nothing_a_user_can_write():
+    said = "{nb} \x7f\x7f"
+    sheet = Sheet(said, True, said, said, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    text = pdf_text(pdf_of(sheet))
+    assert text.count("{nb}") >= 4 and "page 1 of 2" in text and "page 2 of 2" in text
+
+
 def test_letters_the_pdf_has_not_are_spelt_out():
     assert latin("Ø8 ±0.1 → Łódź\n漢") == "Ø8 ±0.1 ? Lódz ?"
