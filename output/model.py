@@ -12,6 +12,9 @@ from geometry.toolbody import ToolBody
 from output.kinematics import RotaryMachine
 from toolpath.motion import Motion, Trajectory, Workingstep
 
+FIRST_NUMBER = 1000
+"""Of the first program of a job."""
+
 
 @dataclass(frozen=True, eq=False)
 class StockBox:
@@ -122,7 +125,7 @@ class Workplan:
     assemblies: Mapping[int, Assembly] = field(default_factory=dict)
     surfaces: Mapping[int, NurbsSurface] = field(default_factory=dict)
     ap238: Ap238 = Ap238.CC1
-    number: int = 1000
+    number: int = FIRST_NUMBER
     number_words: str = ""
 
     def assembly(self, tool: ToolBody) -> Assembly:
@@ -131,5 +134,5 @@ class Workplan:
         return known or Assembly(tool.stickout + sum(h.length for h in tool.holder))
 
 
-__all__ = ["Ap238", "Assembly", "Clamping", "Frame", "Motion", "StockBox", "StockCylinder", "Trajectory",
-           "Workingstep", "Workplan"]
+__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "Frame", "Motion", "StockBox", "StockCylinder",
+           "Trajectory", "Workingstep", "Workplan"]

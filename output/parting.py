@@ -30,7 +30,7 @@ def parts_of(plan: Workplan, dialects: Sequence[Dialect], limit: int) -> list[Wo
     """
     if _size(plan, dialects) <= limit:
         return [plan]
-    named = replace(plan, name=f"{plan.name} part 999 of 999")
+    named = replace(plan, name=f"{plan.name} part 999 of 999", number=9999)
     alone = [_size(replace(named, steps=(s,)), dialects) for s in plan.steps]
     if max(alone) > limit:
         step = plan.steps[alone.index(max(alone))]

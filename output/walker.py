@@ -21,7 +21,9 @@ from above the ball its parts lie in.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -30,11 +32,12 @@ from geometry.toolbody import ToolBody
 from output.clamping import Leg, Section, home_of, sections
 from output.dialects.base import Dialect
 from output.grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
-from output.model import Clamping, Workplan
+from output.model import FIRST_NUMBER, Clamping, Workplan
 from output.text import decimal, face_words, height_word, step_title, tool_name
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
+_PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts for fresh cutters
 LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
 
 
@@ -55,7 +58,7 @@ def write_program(plan: Workplan, dialect: Dialect) -> str:
     tolerance = decimal(path_tolerance(plan))
     walked = [] if plan.clamping is None else sections(plan)
     low, high = plan.stock.lower.tolist(), plan.stock.upper.tolist()
-    head = [*dialect.opening(plan.name, low, high), *dialect.numbered(plan.number, plan.number_words),
+    head = [*dialect.opening(_called(plan), low, high), *dialect.numbered(plan.number, plan.number_words),
             *_header(plan, dialect, zero, tolerance)]
     if plan.clamping is not None:
         turning = _Turning(plan, dialect, zero, tolerance, plan.clamping)
@@ -190,7 +193,7 @@ class _Upright(_Walk):
     def end(self) -> None:
         """Up, and off."""
         self._retract()
-        self.lines += [*self.dialect.stop(), *self.dialect.closing(self.plan.name)]
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(_called(self.plan))]
 
     def _retract(self) -> None:
         """Up to the clearance plane; never down to it."""
@@ -236,7 +239,7 @@ class _Turning(_Walk):
             self.lines += self._modes()
         for section in walked:
             self._add(section)
-        self.lines += [*self.dialect.stop(), *self.dialect.closing(self.plan.name)]
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(_called(self.plan))]
 
     def _modes(self) -> list[str]:
         d = self.dialect
@@ -339,16 +342,26 @@ class _Turning(_Walk):
 def label_number(plan: Workplan, step: Workingstep) -> int:
     """The N word a step can be started at: a hundred times the number in its id, and which part of a step it is.
 
+    So it is in a program of some of the steps too, but for ids that are not of this form.
+
     >>> from types import SimpleNamespace as S
     >>> plan = S(steps=[S(id="S07"), S(id="S07b"), S(id="S08")])
-    >>> [label_number(plan, s) for s in plan.steps]
-    [700, 701, 800]
+    >>> [label_number(plan, s) for s in plan.steps], label_number(S(steps=plan.steps[1:]), plan.steps[1])
+    ([700, 701, 800], 701)
     """
     def number(name: str) -> str:
         return "".join(c for c in name if c.isdigit())
 
+    own = 100 * int(number(step.id) or 0)
+    if named := _PARTED.fullmatch(step.id):
+        return own + reduce(lambda n, letter: 25 * n + ord(letter) - ord("a"), named[1], 0)
     same = [s.id for s in plan.steps if number(s.id) == number(step.id)]
-    return 100 * int(number(step.id) or 0) + same.index(step.id)
+    return own + same.index(step.id)
+
+
+def _called(plan: Workplan) -> str:
+    """What controls that know programs by names call it; they cut them short, so numbers of further ones are first."""
+    return plan.name if plan.number == FIRST_NUMBER else f"{plan.number} {plan.name}"
 
 
 def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:

@@ -17,7 +17,7 @@ from output.arcs import fitted
 from output.clamping import SWING, home_of
 from output.dialects import DIALECTS, Switches
 from output.figures import AWAITED, filled
-from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.model import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from output.parting import parts_of
 from output.text import decimal
 from output.walker import write_program
@@ -37,7 +37,7 @@ from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
-FIRST_NUMBER, PARTS, LAST_NUMBER = 1000, 100, 7000  # from 8000 on numbers may be locked
+PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
 
 

@@ -248,13 +248,15 @@ def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any])
 
 
 def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
-    planned, labels = {}, {}
+    planned, labels, programs = {}, {}, {}
     for p in written:
         for s in p.work.steps:
+            if len(written) > 1 and report["state"] == "proved":
+                programs[s.id] = f"program{p.end}"
             planned[s.id] = (s.access or p.access, s.top, s.bottom)
             if p.work.restart and report["state"] == "proved":
                 labels[s.id] = _label(p, s)
-    table = steps_table(report, planned, labels, {b.id: b.number for b in tool_bodies(setup)})
+    table = steps_table(report, planned, labels, programs, {b.id: b.number for b in tool_bodies(setup)})
     note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
     words = "A program can be started at the label of any step, when all steps before it have been cut."
     begun = (words,) if labels else ()

@@ -140,25 +140,26 @@ def tools_table(report: Mapping[str, Any], setup: Setup, used: Sequence[str]) ->
 
 
 def steps_table(report: Mapping[str, Any], planned: Mapping[str, tuple[str, float, float]],
-                labels: Mapping[str, str], numbers: Mapping[str, int]) -> Table:
+                labels: Mapping[str, str], programs: Mapping[str, str], numbers: Mapping[str, int]) -> Table:
     """The steps in the order they are run.
 
     planned : by id, the access in whose frame a step is, and its upper and lower end there, mm
     labels  : by id, the label a program can be started at; numbers : T numbers by id of the tool
+    programs : by id, how the names of its programs begin, where there are several of a control
     """
     rows = []
     for s in report["steps"]:
         access, top, bottom = planned.get(s["id"], ("", None, None))
         zones = s["zone"] or " ".join(w for w in s["name"].split() if ZONE.fullmatch(w)) or NONE
-        rows.append((s["id"], *((labels.get(s["id"], NONE),) if labels else ()), zones, access or NONE,
+        rows.append((s["id"], *(told.get(s["id"], NONE) for told in (programs, labels) if told), zones, access or NONE,
                      f"{s['operation']}, {s['strategy']}", f"T{numbers[s['tool']]}" + (", fresh cutter" if
                      s["fresh_cutter"] else ""), number(s["spindle_rpm"], 0), number(s["feed_mm_min"], 0),
                      number(top), number(bottom), minutes(s["machining_time_s"])))
-    heads = ("step", *(("label",) if labels else ()), "zones", "access", "what", "tool", "S 1/min", "F mm/min",
-             "top Z", "bottom Z", "min")
+    more = [name for name, told in (("program", programs), ("label", labels)) if told]
+    heads = ("step", *more, "zones", "access", "what", "tool", "S 1/min", "F mm/min", "top Z", "bottom Z", "min")
     longest = max(map(len, labels.values()), default=0)
-    wide = 1.0 if longest <= SHORT_LABEL else 2.0
-    widths = (1.0, *((wide,) if labels else ()), 1.8, 1.1, 2.6, 1.2, 1.1, 1.1, 1.1, 1.2, 0.9)
+    wide = {"program": 2.6, "label": 1.0 if longest <= SHORT_LABEL else 2.0}
+    widths = (1.0, *(wide[name] for name in more), 1.8, 1.1, 2.6, 1.2, 1.1, 1.1, 1.1, 1.2, 0.9)
     return Table("Steps in the order they are run", heads, tuple(rows), widths,
                  frozenset(range(len(heads) - 5, len(heads))), none="No step: nothing could be cut.")
 

@@ -50,9 +50,9 @@ def difference(proved: Program, other: Program) -> str:
         return f"{other.name} does not say {', '.join(taken)} before its first move"
     if other.unbounded and other.dialect in CONTROLS and CONTROLS[other.dialect].bounds_path:
         return f"{other.name} does not bound what the control leaves the path by"
-    if not (other.unbounded or proved.unbounded) and other.blend > proved.blend + 1e-12:
-        return (f"{other.name} lets the control leave the path by {other.blend:g} mm, {proved.name} by "
-                f"{proved.blend:g} mm")
+    if not (other.unbounded or proved.unbounded) and other.leaves > proved.leaves + 1e-12:
+        return (f"{other.name} lets the control leave the path by {other.leaves:g} mm, {proved.name} by "
+                f"{proved.leaves:g} mm")
     mine, yours = _evened(proved, other, _moving(proved), _moving(other))
     n = min(len(mine), len(yours))
     mine, yours = mine[:n + 1], yours[:n + 1]

@@ -26,7 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based, the one being read
-    speeds, unknown, stops, blend, changes, unbounded, pauses : as in ``Program``
+    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -46,7 +46,7 @@ class Log:
         self.speeds: dict[int, tuple[float, int]] = {}
         self.unknown: list[tuple[int, int]] = []
         self.stops: list[Stop] = []
-        self.blend = 0.0
+        self.blend = self.leaves = 0.0
         self.changes = 0
         self.unbounded = False
         self.pauses: list[Pause] = []

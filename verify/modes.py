@@ -26,7 +26,10 @@ class Modes(Rotary):
     machine     : its rotary axes, or None without any
     gauge       : mm by T number, spindle face to tip
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
+    fits        : whether the control leaves points out by the P of a G64 without Q
     """
+
+    fits = True
 
     def __init__(self, log: Log, tools: Collection[int] | None, work_offset: str, blend_limit: float,
                  machine: Kinematics | None = None, gauge: Mapping[int, float] | None = None,
@@ -197,16 +200,20 @@ class Modes(Rotary):
                             self.log.line)
 
     def _blending(self, values: dict[str, float]) -> None:
-        """G64: the control may leave the path by P (0 and none: without bound) and by Q of its own line fitting."""
+        """G64: the control may round corners by P (0 and none: without bound), of lines it leaves points out by Q of.
+
+        LinuxCNC takes P for Q where none is said; other controls have no such thing.
+        """
         limit = self.blend_limit
-        p, q = values.get("P", 0.0) * self.s.scale, values.get("Q", 0.0) * self.s.scale
-        self.log.blend = max(self.log.blend, p, q)
+        p = values.get("P", 0.0) * self.s.scale
+        q = values.get("Q", values.get("P", 0.0) if self.fits else 0.0) * self.s.scale
+        self.log.blend, self.log.leaves = max(self.log.blend, p), max(self.log.leaves, p + max(q, 0.0))
         if p == 0:
             self.log.remark("blending", f"G64 without a P above 0 lets the control leave the path by any amount (limit "
                             f"P{limit:g} mm)", self.log.line)
         elif not 0 < p <= limit + 1e-12:
             self.log.remark("blending", f"G64 P{values['P']:g} lets the control leave the path by {p:g} mm (limit "
                             f"{limit:g} mm)", self.log.line)
-        if not 0 <= q <= limit + 1e-12:
+        if "Q" in values and not 0 <= q <= limit + 1e-12:
             self.log.remark("line_fitting", f"G64 Q{values['Q']:g} lets the control leave the path by {q:g} mm (limit "
                             f"{limit:g} mm)", self.log.line)

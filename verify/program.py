@@ -92,7 +92,8 @@ class Program:
     speeds  : by T number, the highest S it turned at, 1/min, and the line
     stops   : where a tool change or the end came at a known height
     assumed : words in force without having been stated before the first move
-    blend   : mm, the most G64 lets the control leave the path by, as far as a P bounds it
+    blend   : mm, the most G64 lets the control round a corner by, as far as a P bounds it
+    leaves  : mm, the most it lets the control leave the path by: that, and what points may be left out by (Q) beside it
     lines   : number of lines read
     remarks : what should not be run
     poses   : None where the tool stands along Z throughout: no rotary axis ever leaves 0
@@ -101,7 +102,7 @@ class Program:
     coolant : (m,) bool
     changes : times a tool was taken out of the spindle for another, or for nothing
     dialect : whose words it was written in
-    unbounded : whether no word bounds, somewhere, what the control leaves the path by: ``blend`` does not hold there
+    unbounded : whether no word bounds, somewhere, what the control leaves the path by: ``leaves`` does not hold there
     pauses  : in order
     """
 
@@ -129,6 +130,7 @@ class Program:
     dialect: str = "linuxcnc"
     unbounded: bool = False
     pauses: tuple[Pause, ...] = ()
+    leaves: float = 0.0
 
     def __len__(self) -> int:
         return len(self.start)

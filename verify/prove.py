@@ -254,7 +254,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
 def error_bound(read: Sequence[Program]) -> float:
     """Largest error of a residual, mm: of the rays, of chords, of blending the programs allow, of turning tools."""
     turning = BOW if any(p.poses is not None for p in read) else 0.0
-    return RAY_ERROR + CHORD + max((p.blend for p in read), default=0.0) + turning
+    return RAY_ERROR + CHORD + max((p.leaves for p in read), default=0.0) + turning
 
 
 __all__ = ["FaceProof", "Finding", "FindingKind", "Proof", "ProofSetup", "ScoredSamples", "ZoneProof", "prove"]

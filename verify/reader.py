@@ -41,7 +41,7 @@ class Reader(Motion):
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
-        log, lines = self.log, text.split("\n")
+        log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
             blocks = spelt(lines, dialect, log)
@@ -67,7 +67,7 @@ class Reader(Motion):
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
-                       dialect, log.unbounded, tuple(log.pauses))
+                       dialect, log.unbounded, tuple(log.pauses), log.leaves)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control keeps by itself (``verify.served``)."""

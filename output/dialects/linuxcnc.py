@@ -2,7 +2,8 @@
 
 Path mode: G64 P, not G61. G61 brakes at every corner of a polyline with
 thousands of short segments and leaves dwell marks; G64 without P would round
-corners as far as the acceleration needs. Tool centre point control is a switch
+corners as far as the acceleration needs. Q0, for without a Q the control leaves
+points out by P as well, and rounds the corners of what is left by P more. Tool centre point control is a switch
 of the kinematics (M428, M429). A tool that is in the spindle is not changed by
 its own T and M6, so a fresh cutter is taken by putting the old one away.
 """
@@ -38,7 +39,12 @@ class LinuxCnc(Dialect):
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
         """A shift by G92 or G52 outlives the program that made it, and even the control's being switched off."""
-        return [*super().modes(tolerance, turns), "G92.1"]
+        words = super().modes(tolerance, turns)
+        return [*words[:-1], f"{words[-1]} Q0", "G92.1"]
+
+    def path(self, tolerance: str) -> str:
+        """Bounded by P, as Q is 0."""
+        return f"Path mode G64 P{tolerance} Q0: the control may leave the written path by P, in mm"
 
     def arc_modes(self) -> list[str]:
         """G90.1 of a run before may still be in force."""

@@ -27,6 +27,14 @@ def test_the_interpreter_goes_where_the_reader_goes(job, tmp_path):
     assert rs274.difference(read_program(text), judged, gaps=True) == ""
 
 
+def test_points_are_left_out_by_p_unless_q_is_0(tmp_path):
+    """What the reader takes for granted of G64 P, and why programs say Q0."""
+    text = write_linuxcnc(round_plan())
+    for words, said in (("P0.001 Q0", "0.0000"), ("P0.001", "0.0010")):
+        assert not rs274.judge(text.replace("P0.001 Q0\n", f"{words}\n"), tmp_path).refused
+        assert f"SET_NAIVECAM_TOLERANCE({said})" in (tmp_path / "out.txt").read_text()
+
+
 def test_an_arc_that_is_none_is_refused(tmp_path):
     """Or the test above shows nothing: ends on two circles."""
     text = write_linuxcnc(round_plan())

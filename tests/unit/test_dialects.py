@@ -252,7 +252,8 @@ def test_other_programs_of_these_controls_are_read():
     siemens = read_program("%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\nN10 G17 G90 G710 G94 G54\nN20 T=\"1\"\nN30 M6 D1\n"
                            "N40 S5000 M3\nG641 ADIS=0.005\nN50 G0 X=0 Y=0\nN60 Z50 M8\nN70 G1 Z-1 F300\n"
                            "N80 G3 X10 Y0 CR=5\nN90 G0 Z50\nSUPA G0 Z0 D0\nM30\n", dialect="siemens")
-    assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0] and siemens.blend == 0.005
+    assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0]
+    assert siemens.blend == siemens.leaves == 0.005
     plain = read_program('BEGIN PGM T INCH\nBLK FORM 0.1 Z X+0 Y+0 Z-1\nTOOL CALL 1 Z S5000 F300 ; ball\n'
                          "CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\n* - cut\n"
                          "CYCL DEF 32.0 TOLERANZ\nCYCL DEF 32.1\n"
@@ -306,6 +307,16 @@ def test_programs_of_one_job_have_numbers_of_their_own():
         lines = write(work, dialect).splitlines()
         assert lines[:2] == ["%", "O1203 (ACCESS A3 PART 4, WHICH IS SAID IN MANY)"]
         assert not read(work, "\n".join(lines) + "\n", dialect).remarks
+
+
+def test_programs_of_one_job_have_names_of_their_own():
+    """On a Heidenhain, which takes 24 characters of them."""
+    named = replace(tiny(), name="4711 blisk of the second stage part 2 of 4")
+    begun = [write(replace(named, number=n), "heidenhain").splitlines() for n in (1000, 1001, 1100)]
+    assert [lines[0] for lines in begun] == ["0 BEGIN PGM 4711_blisk_of_the_second MM",
+                                             "0 BEGIN PGM 1001_4711_blisk_of_the_s MM",
+                                             "0 BEGIN PGM 1100_4711_blisk_of_the_s MM"]
+    assert all(lines[-1].split("END PGM ")[1] == lines[0].split("BEGIN PGM ")[1] for lines in begun)
 
 
 def test_fast_contouring_is_off_before_a_step_is_begun():
@@ -552,6 +563,12 @@ def test_labels_are_the_numbers_of_the_steps():
     steps = [replace(s, id=name) for s, name in zip(plan().steps, ("S01", "S02", "S02b", "S12", "S120"), strict=True)]
     text = write(replace(plan(), steps=tuple(steps), restart=True), "fanuc")
     assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == ["100", "200", "201", "1200", "12000"]
+    part = write(replace(plan(), steps=tuple(steps[2:]), restart=True), "fanuc")
+    assert re.findall(r"^N(\d+)$", part, flags=re.MULTILINE) == ["201", "1200", "12000"]  # as the sheet has them
+    names = ("S03y", "S03z", "S03bb", "S03bc", "S04")
+    late = [replace(s, id=name) for s, name in zip(plan().steps, names, strict=True)]
+    text = write(replace(plan(), steps=tuple(late), restart=True), "fanuc")
+    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == ["324", "325", "326", "327", "400"]
 
 
 @pytest.mark.parametrize("dialect", OTHERS)

@@ -248,6 +248,8 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
         assert "X 0 to 20, Y -13 to 0, Z -40 to 0 in the frame of access A2" in standing and "G55" in standing
         assert "program.A2.linuxcnc.ngc, program.A2.part2.linuxcnc.ngc" in standing and "Z33" in standing
         assert "Z25" not in standing.split("Tools in order of use")[0]
+        rows = "".join(text.split("Steps in the order they are run")[1].split())
+        assert all(f"{s.id}program{p.end}{s.zone or 'Z'}" in rows for p in written for s in p.work.steps)
 
 
 def test_each_control_has_its_own_label():

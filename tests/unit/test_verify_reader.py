@@ -12,7 +12,7 @@ from tests.pocket_case import SETUP, TOOL, ZONES, block, program
 from tests.pocket_case import text as joined
 from verify.log import Log
 from verify.model import FindingKind, ScoredSamples
-from verify.prove import prove
+from verify.prove import error_bound, prove
 from verify.reader import FEED, RAPID, read_program
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
@@ -182,6 +182,18 @@ def test_blending_limit_is_the_tolerance_of_the_setup():
     found = {tolerance: prove([("a", joined(lines))], block(), (TOOL,), replace(SETUP, gouge_tolerance=tolerance),
                               SAMPLES, ZONES).findings for tolerance in (0.01, 0.03)}
     assert [(f.kind, f.line) for f in found[0.01]] == [(FindingKind.PROGRAM, 3)] and found[0.03] == ()
+
+
+@pytest.mark.parametrize(("words", "blend", "leaves"), [
+    ("G64 P0.002", 0.002, 0.004), ("G64 P0.002 Q0", 0.002, 0.002), ("G64 P0.002 Q0.001", 0.002, 0.003),
+    ("G61", 0.0, 0.0)])
+def test_points_are_left_out_by_p_where_no_q_is_said(words, blend, leaves):
+    """LinuxCNC's default; what both allow is in the error bound."""
+    lines = program()
+    lines.insert(2, words)
+    p = read_program(joined(lines))
+    assert (p.blend, p.leaves) == pytest.approx((blend, leaves))
+    assert error_bound([p]) - error_bound([read_program(joined(program()))]) == pytest.approx(leaves)
 
 
 def test_unit_in_force_scales_what_blending_may_take():
