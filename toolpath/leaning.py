@@ -286,7 +286,7 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     tips, axes, least = walked
     feeds = paced(tips, axes, piece.reach, cut.feed, least)
     if feeds is None:
-        return "the tip would all but stand while the flank goes round it"
+        return "the tip would all but stand while the flank goes round it, or an axis turns"
     dense = Piece(tips, axes, axes, piece.reach).at(places_along(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
         return LOADED
@@ -323,16 +323,18 @@ def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | 
     reach      : mm from the tip, how far up the flank is at work
     least      : (n - 1,) minutes each block takes the machine
 
-    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake. On a straight move of the
+    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake, or in a block slower than
+    ``LEAST_FEED``: a tip that all but stands says nothing of how long an axis takes to turn. On a straight move of the
     tip with an evenly turning axis no place between tip and ``reach`` goes farther than the farther of both ends.
     """
     gone = [np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)]
     minutes = np.maximum(gone[0], gone[1]) / feed
-    own = gone[0] / np.maximum(minutes, 1e-12)
     if gone[0].sum() < LEAST_PACE * feed * minutes.sum():
         return None
-    out = np.minimum(own, gone[0] / np.maximum(least, 1e-12))
-    return np.maximum(np.minimum(out, feed), LEAST_FEED)
+    minutes = np.maximum(minutes, least)
+    if (gone[0] < LEAST_FEED * minutes).any():
+        return None
+    return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), LEAST_FEED)
 
 
 def _steady(feeds: F64) -> list[tuple[int, int]]:

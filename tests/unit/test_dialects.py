@@ -356,6 +356,15 @@ def test_whose_program_a_text_is():
     assert unknown.value.code == "unknown_dialect"
 
 
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "haas", "siemens"])
+def test_inverse_time_is_a_feed_like_any_other(dialect):
+    """F1500 of a block of 0.4 mm at 600 mm/min is a whole number, which a Haas takes for thousandths."""
+    control = DIALECTS[dialect](SHOPS["plain"])
+    lines = control.timed(["X1.5 C2.5", "X1.6 C2.7"], [1500.0, 1234.5])
+    point = "." if dialect in ("fanuc", "haas") else ""
+    assert lines == ["G93", f"G1 X1.5 C2.5 F1500{point}", "G1 X1.6 C2.7 F1234.5", "G94"]
+
+
 @pytest.mark.parametrize("tcp", [True, False])
 @pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC"])
 def test_tables_that_count_the_other_way(kind, tcp):

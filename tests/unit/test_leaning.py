@@ -126,6 +126,20 @@ def test_no_place_of_the_flank_goes_faster_than_the_feed():
     assert LEAST_PACE < 0.2
 
 
+def test_no_feed_is_written_that_the_axes_cannot_keep_up_with():
+    """C swings by 70 degrees beside the pole while the tip goes 0.8 um: at 0.1 mm/min it would turn 8,750 deg/min of the
+    7,200 it has. And where the tip stands, F would be deg/min."""
+    tips = np.array([[0.0, 0.0, 0.0], [0.25, 0.0, 0.0], [0.2508, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    axes, swings = np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([0.0, 70.0 / 7200.0, 0.0])
+    assert paced(tips, axes, 9.0, 800.0, swings) is None
+    feeds = paced(tips * 10.0, axes, 9.0, 800.0, swings)
+    assert feeds == pytest.approx([800.0, 0.008 / swings[1], 800.0])
+    turned = axes.copy()
+    turned[2:] = [np.sin(0.01), 0.0, np.cos(0.01)]
+    assert paced(tips[[0, 1, 1, 3]], turned, 9.0, 800.0, np.zeros(3)) is None
+    assert paced(tips[[0, 1, 1, 3]], axes, 9.0, 800.0, np.zeros(3)) is not None  # a pose twice is no block
+
+
 def test_blocks_of_about_one_feed_are_one_motion():
     assert _steady(np.array([100.0, 95.0, 99.0])) == [(0, 3)]
     assert _steady(np.array([100.0, 95.0, 30.0, 29.0, 100.0])) == [(0, 2), (2, 4), (4, 5)]
