@@ -127,8 +127,8 @@ def test_no_place_of_the_flank_goes_faster_than_the_feed():
 
 
 def test_no_feed_is_written_that_the_axes_cannot_keep_up_with():
-    """C swings by 70 degrees beside the pole while the tip goes 0.8 um: at 0.1 mm/min it would turn 8,750 deg/min of the
-    7,200 it has. And where the tip stands, F would be deg/min."""
+    """C swings by 70 degrees beside the pole while the tip goes 0.8 um: at 0.1 mm/min it would turn 8,750 deg/min, and
+    has 7,200. And where the tip stands, F would be deg/min."""
     tips = np.array([[0.0, 0.0, 0.0], [0.25, 0.0, 0.0], [0.2508, 0.0, 0.0], [0.5, 0.0, 0.0]])
     axes, swings = np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([0.0, 70.0 / 7200.0, 0.0])
     assert paced(tips, axes, 9.0, 800.0, swings) is None
