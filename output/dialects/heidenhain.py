@@ -4,6 +4,8 @@ Every block has its number, from 0 on. A rapid says FMAX in every block, for FMA
 rows of the preset table (cycle 247), corners are rounded by no more than the tolerance of cycle 32. The tip is kept
 by M128, which is off (M129) before the spindle goes to machine zero (M91) and before a tool is called. Where the shop
 wants it, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL), M128 on and the axes already there (STAY).
+Rotary words go on over 360 deg. An axis whose display does not may then be turned back by a whole turn, as a machine
+parameter has it; with M126 it goes the shorter way, and no block turns by more than half a turn.
 """
 
 from __future__ import annotations
@@ -71,7 +73,9 @@ class Heidenhain(Dialect):
     def modes(self, tolerance: str, turns: bool) -> list[str]:
         """Units, plane and absolute coordinates are what they are; cycle 32 for the path, in its finishing mode."""
         way = ["CYCL DEF 32.0 TOLERANCE", f"CYCL DEF 32.1 T{tolerance}"]
-        return [*way, f"CYCL DEF 32.2 HSC-MODE:0 TA{axis_tolerance(tolerance)}", "PLANE RESET STAY"] if turns else way
+        if not turns:
+            return way
+        return [*way, f"CYCL DEF 32.2 HSC-MODE:0 TA{axis_tolerance(tolerance)}", "PLANE RESET STAY", "M126"]
 
     def state_zero(self, zero: str) -> list[str]:
         """The row of the preset table."""

@@ -397,6 +397,30 @@ def test_the_sense_of_iso_841():
     assert said_limits(np.array([[-30.0, 110.0], [-360.0, 360.0]]), (-1, 1)).tolist() == [[-110, 30], [-360, 360]]
 
 
+def test_rotary_axes_of_a_heidenhain_go_the_shorter_way():
+    """Its words go on over 360 deg, its axes need not: M126 in every program that turns, and again at every label."""
+    assert "M126" not in write(plan(), "heidenhain")
+    for work in (clamped(), replace(clamped(), restart=True)):
+        text = write(work, "heidenhain")
+        assert text.count("M126") == text.count("CYCL DEF 32.2") >= 1
+        assert text.index("M126") < text.index("A+0")
+        assert difference(read(work, write_linuxcnc(work), "linuxcnc"), read(work, text, "heidenhain")) == ""
+
+
+@pytest.mark.parametrize("on", ["M126\nL C+350 R0 FMAX", "L C+350 R0 FMAX M126"])
+def test_with_m126_a_way_of_more_than_half_a_turn_is_not_known(on):
+    def told(lines):
+        return read_program(f"BEGIN PGM A MM\nTOOL CALL 1 Z S900\nM3\n{on}\nM128\nL X+0 Y+0 Z+50 R0 FMAX\n{lines}\n"
+                            "M129\nM30\nEND PGM A MM\n", dialect="heidenhain",
+                            kinematics=Kinematics("table-table-AC"))
+
+    p = told("L C+400 F500\nL C+225\nL C+45 X+5")
+    assert np.degrees(p.poses.end_turn[-1]) == pytest.approx([0.0, 45.0])
+    with pytest.raises(ProgramError, match="with M126 C turns by -340 deg or by 20,"):
+        told("L X+1 C+10 F500")
+    assert np.degrees(told("M127\nL X+1 C+10 F500").poses.end_turn[-1]) == pytest.approx([0.0, 10.0])
+
+
 @pytest.mark.parametrize("kind", ["table-table-AC", "head-head-BC"])
 def test_planes_hold_the_steps_of_a_fixed_axis(kind):
     work = clamped(kind)

@@ -2,9 +2,9 @@
 
 Read are BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C or with CP and IPA, CR, M words, LBL, STOP,
 the cycles 247 (preset) and 32 (tolerance), and PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in the setup
-frame turned about its X, then Y, then Z, the tip is kept, and no axis moves. Planes that move axes, radius
-compensation, other incremental words (IX), other arcs, Q parameters, calls and shifts are refused by name. F of an INCH
-program counts tenths of an inch.
+frame turned about its X, then Y, then Z, the tip is kept, and no axis moves. M126 and M127 are read where they make no
+difference. Planes that move axes, radius compensation, other incremental words (IX), other arcs, Q parameters, calls
+and shifts are refused by name. F of an INCH program counts tenths of an inch.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ _PLANE = re.compile(rf"PLANE SPATIAL SPA({_NUM}) SPB({_NUM}) SPC({_NUM}) STAY")
 _START, _END = (3, 4, 8, 13, 14, 128), (0, 1, 2, 5, 9, 30, 129)  # when in the block an M word takes effect
 SMALL = 0.01
 """deg a rotary axis may leave its way by without a word about it."""
+_SHORTEST, _AS_WRITTEN = 126, 127
+HALF_A_TURN = 180.000001  # deg, and rounding
 _WORDS = {13: "M3 M8", 14: "M4 M8", 128: "M428", 129: "M429"}
 _IDLE = ("BLK FORM", "TOOL DEF", "CYCL DEF 32.0", "* -")
 
@@ -45,7 +47,8 @@ class Heidenhain(Control):
     def __init__(self) -> None:
         super().__init__()
         self.unbounded = True
-        self.preset = self.tcp = self.inch = False
+        self.preset = self.tcp = self.inch = self.shortest = False
+        self.turned: dict[str, float] = {}  # where rotary words have put their axes, deg
         self.plane: F64 | None = None  # columns are its axes in the setup frame
         self.at = [math.nan] * 3  # setup frame, mm or what the program counts in
         self.centre = [math.nan] * 2
@@ -111,6 +114,7 @@ class Heidenhain(Control):
         """The same words with X, Y, Z in the setup frame."""
         named = {w[0]: w[1:] for w in words.split()}
         linear = [float(named[k]) if k in named else math.nan for k in "XYZ"]
+        self._turn({k: float(v) for k, v in named.items() if k not in "XYZ"})
         if machine:
             self.at = [math.nan if k in named else v for k, v in zip("XYZ", self.at, strict=True)]
             return words
@@ -122,6 +126,15 @@ class Heidenhain(Control):
         self.at = placed(self.plane, self.at, named)
         turns = [k + v for k, v in named.items() if k not in "XYZ"]
         return " ".join([*(f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)), *turns])
+
+    def _turn(self, angles: dict[str, float]) -> None:
+        """Note where rotary words put their axes, deg. With M126 no way but one of half a turn or less is certain."""
+        for letter, angle in angles.items():
+            way = angle - self.turned.get(letter, angle)
+            if self.shortest and abs(way) > HALF_A_TURN:
+                raise BlockError(f"with M126 {letter} turns by {way:g} deg or by {math.remainder(way, 360.0):g}, as "
+                                 "its display goes on over 360 deg or not", "turn by half a turn or less in a block")
+        self.turned.update(angles)
 
     def _preset(self, text: str) -> list[str]:
         self.preset = False
@@ -147,9 +160,10 @@ class Heidenhain(Control):
             raise BlockError("M91 in a tilted plane")
         if self.tcp and 91 in ms:
             raise BlockError("M91 while M128 keeps the tip", "say M129 in a block before")
+        self.shortest |= _SHORTEST in ms
         words = self._setup(" ".join(places.split()), 91 in ms)
         feed = self._feed(feed) if feed and feed != "FMAX" else feed
-        self._switch(ms)
+        ms = self._switch(ms)
         if not ms:
             return [f"G0 {words}" if feed == "FMAX" else f"G1 {words} {feed}" if feed else f"G1 {words}"]
         if unknown := [m for m in ms if m not in (*_START, *_END, 91)]:
@@ -166,8 +180,11 @@ class Heidenhain(Control):
         """The F word in what the program counts in, a minute: F10 is an inch a minute in an INCH program."""
         return f"F{0.1 * float(word[1:]):.9f}" if self.inch else word
 
-    def _switch(self, ms: list[int]) -> None:
+    def _switch(self, ms: list[int]) -> list[int]:
+        """The M words but those of the ways of rotary axes."""
         self.tcp = 129 not in ms and (self.tcp or 128 in ms)
+        self.shortest = _AS_WRITTEN not in ms and (self.shortest or _SHORTEST in ms)
+        return [m for m in ms if m not in (_SHORTEST, _AS_WRITTEN)]
 
     def _arc(self, m: re.Match[str]) -> list[str]:
         """C round the centre of CC, or CR by a radius, whose sign says which of both arcs."""
@@ -200,7 +217,7 @@ class Heidenhain(Control):
         return [f"{block} {self._feed(feed)}" if feed else block]
 
     def _machine(self, ms: list[int], stop: str) -> list[str]:
-        self._switch(ms)
+        ms = self._switch(ms)
         if unknown := [m for m in ms if m not in (*_START, *_END)]:
             raise BlockError(f"unknown word M{unknown[0]}")
         return [*(_WORDS.get(m, f"M{m}") for m in ms), *([stop] if stop else [])]
