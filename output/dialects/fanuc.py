@@ -25,7 +25,8 @@ class Fanuc(Dialect):
     line = 72
     bounds_path = False
     needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",
-                              "Needed: parameters 1401#1 LRP 1 and, on five axes, 19696#5 WKP 0")
+                              "Needed: parameters 1401#1 LRP 1 and, on five axes, 19696#5 WKP 0 and, of rotary axes "
+                              "that roll over, 1008#1 RAB 0")
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G54.1 P1", "G54.1 P2", "G54.1 P3")
     tcp_words = "G43.4: the control keeps the tool tip on the part while axes turn; G49: it does not any more"
     tcp_word = "G43.4"

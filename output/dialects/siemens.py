@@ -23,7 +23,9 @@ class Siemens(Dialect):
 
     name, title, ending = "siemens", "Siemens 840D", "mpf"
     zeros = ("G54", "G55", "G56", "G57", "G505", "G506", "G507", "G508", "G509")
-    needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",)
+    needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",
+                              "Needed on five axes, of a modulo axis: MD30455 bits 0 and 2 set, for its words go below "
+                              "0 and over 360 deg and mean the shorter way")
     length_words = "D1 holds the length of its tool"
     tcp_words = "TRAORI: the control keeps the tool tip on the part while axes turn; TRAFOOF: it does not any more"
 
