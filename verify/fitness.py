@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from verify.blank import stock_bounds
 from verify.cycles import FEED
+from verify.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program import Program
 from verify.table import UPRIGHT, lowest_places
@@ -19,6 +21,7 @@ from verify.table import UPRIGHT, lowest_places
 UP = np.array([0.0, 0.0, 1.0])
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 Z_AXIS = 4
+HALF_A_TURN = 180.0 + 1e-6  # deg, and rounding
 LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
 RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from decimals
 
@@ -248,9 +251,26 @@ def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
         m = int(np.argmin(p.end[:, 2]))
         yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
                "part; what stands there is not known unless it is a fixture of the setup")
+    yield from _long_turns(p, setup)
     if joints_of(p, setup) is None:
         yield (f"{p.name} turns rotary axes and machine.pivots_mm is not given: travel and rates of the linear axes "
                "were not held against the machine's")
+
+
+def _long_turns(p: Program, setup: ProofSetup) -> Iterator[str]:
+    """Blocks of other controls than LinuxCNC's, whose rotary axes may count from 0 to 360 deg, of over half a turn."""
+    if p.poses is None or setup.kinematics is None or p.dialect == LINUXCNC or not len(p):
+        return
+    first = np.flatnonzero(np.r_[True, p.line[1:] != p.line[:-1]])
+    last = np.r_[first[1:], len(p)] - 1
+    turned = np.degrees(p.poses.end_turn[last] - p.poses.start_turn[first])
+    rows, axes = np.nonzero(np.abs(turned) > HALF_A_TURN)
+    if len(rows):
+        way = float(turned[rows[0], axes[0]])
+        more = f" (and {len(rows) - 1} more such blocks)" if len(rows) > 1 else ""
+        yield (f"{p.name}, line {p.line[first[rows[0]]]} turns {setup.kinematics.letters[axes[0]]} by {way:g} deg, and "
+               f"was read so; on a machine that counts it from 0 to 360 deg the block may turn it by "
+               f"{math.remainder(way, 360.0):g}, or by the sign of its word{more}")
 
 
 def _place(point: F64) -> str:

@@ -58,3 +58,20 @@ def test_without_pivots_it_is_said_that_joints_were_not_checked():
     assert findings == [] and [n for n in notes if "machine.pivots_mm is not given" in n]
     assert not [n for n in found("G0 Z100\nA90\n")[1] if "pivots" in n]
 
+
+
+def test_of_more_than_half_a_turn_it_is_said_that_the_way_is_the_machines():
+    """From C350 to C10 the proof turns back by 340 deg; a table that rolls over goes 20 on."""
+    def notes(dialect, *lines):
+        body = "\n".join(["G0 A0. C0.", "G0 X0. Y0.", "G0 G43.4 Z50. H1", "G1 X5. C175. F100.", "C350.", *lines])
+        head = "%\nO1\nG21\nG17 G90 G94 G40 G80\nG54\nT1 M6\nS1000 M3\n"
+        text = head.replace("O1\n", "" if dialect == "linuxcnc" else "O1\n") + body + "\nG91 G28 Z0.\nM30\n%\n"
+        p = read_program(text, kinematics=MACHINE, dialect=dialect, gauge_length={1: 80.0})
+        setup = ProofSetup(kinematics=MACHINE, gauge_length={1: 80.0})
+        return [n for n in notes_on(p, -100.0, setup) if "turns C" in n]
+
+    (note,) = notes("fanuc", "X10. C10.")
+    assert "line 13 turns C by -340 deg" in note and "may turn it by 20," in note
+    (note,) = notes("haas", "X10. C10.", "G0 C200.", "C-5.")
+    assert "(and 2 more such blocks)" in note
+    assert notes("fanuc", "X10. C365.", "C545.") == [] == notes("linuxcnc", "X10. C10.")
