@@ -41,10 +41,13 @@ def test_containers_write_to_their_volumes_alone_and_gain_no_rights(compose):
     for name in ("api", "worker", "scheduler"):
         service = compose["services"][name]
         assert service["read_only"] is True and service["cap_drop"] == ["ALL"], name
-        assert service["security_opt"] == ["no-new-privileges:true"]
+        assert service["security_opt"] == ["no-new-privileges:true"] and service["init"] is True
         assert [m.split(":")[0] for m in service["tmpfs"]] == ["/tmp"]
         assert {v.split(":")[0] for v in service["volumes"]} <= set(compose["volumes"])
+    assert compose["services"]["postgres"]["security_opt"] == ["no-new-privileges:true"]
     assert compose["services"]["api"]["environment"]["ZONEMILL_AUTH"] == "keys"
+    assert {"ZONEMILL_WEBHOOK_SECRET", "ZONEMILL_WEBHOOK_SECRET_BEFORE"} <= set(
+        compose["services"]["api"]["environment"])
 
 
 def test_every_setting_it_names_is_one():
