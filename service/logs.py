@@ -48,6 +48,15 @@ class _Stderr:
 STDERR = cast(TextIO, _Stderr())
 
 
+def configure_once(level: str, form: str) -> None:
+    """The same in a process where nobody has said how to log: a worker of the cluster.
+
+    What structlog does by itself goes to stdout in colours, and shows the values of all variables with a trace.
+    """
+    if not structlog.is_configured():
+        configure(level, form)
+
+
 def configure(level: str, form: str) -> None:
     """Send the log to stderr. level: 'debug' ... 'error'; form: 'console' or 'json'."""
     number = getattr(logging, level.upper())

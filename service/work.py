@@ -20,6 +20,7 @@ from sqlalchemy.engine import RowMapping
 from geometry.errors import CamError, CancelledError, InternalError, ResourceError
 from service.artifacts import Artifacts, key_of
 from service.db import AWAY, connect
+from service.logs import configure_once
 from service.storage import STORAGE_FULL, is_full, storage_full
 from service.store import WORKER, JobStore
 from service.supervisor import Limits, supervise
@@ -36,6 +37,7 @@ class WorkConfig:
     url, data_dir : database and data folder, as the worker sees them
     chain         : module with ``plan``, ``zones_only`` and ``verify_program``
     max_attempts  : after so many a job that found the disk full fails
+    log_level, log_format : how a worker logs that has not been told otherwise
     """
 
     url: str
@@ -44,6 +46,8 @@ class WorkConfig:
     lease_s: float
     chain: str = "service.chain"
     max_attempts: int = 3
+    log_level: str = "info"
+    log_format: str = "console"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data; Dask writes the arguments of a task that failed into its log, and the URL holds a password."""
@@ -60,6 +64,7 @@ class Unshown(str):
 def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
     """Run one attempt of a claimed job to its end; returns what became of it, for the log only."""
     config = WorkConfig(**{**data, "limits": Limits(**data["limits"])})
+    configure_once(config.log_level, config.log_format)
     store, owner = JobStore(connect(config.url)), f"{WORKER}{uuid.uuid4().hex}"
     if not store.start(job_id, claim, owner, config.lease_s, config.max_attempts):
         return "superseded"

@@ -1,5 +1,6 @@
 """Connections: what is told of a database that fails, how long one is waited for, and who brings it up to date."""
 
+import json
 import socket
 import subprocess
 import sys
@@ -8,14 +9,16 @@ from types import SimpleNamespace
 
 import pytest
 import sqlalchemy as sa
+import structlog
 from sqlalchemy.exc import IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
 import service.db
 from service.db import AWAY, connect, migrate
+from service.logs import configure
 from service.store import JobStore, NewJob
 from service.supervisor import Limits
-from service.work import WorkConfig, _Attempt
+from service.work import WorkConfig, _Attempt, run_job
 
 
 def test_what_the_database_raises_holds_no_values(tmp_path):
@@ -45,6 +48,24 @@ def test_a_server_that_says_nothing_is_given_up_soon(monkeypatch):
         with pytest.raises(OperationalError):
             connect(url).connect()
     assert time.monotonic() - started < 10
+
+
+def test_a_worker_logs_as_the_service_does_and_shows_no_variables(tmp_path, capfd):
+    url = f"sqlite:///{tmp_path / 'x.db'}"
+    migrate(url)
+    config = WorkConfig(url, str(tmp_path), Limits(1, 1), 20.0, log_format="json")
+    structlog.reset_defaults()  # as in the process of a worker
+    try:
+        assert run_job("j0", 1, config.as_dict()) == "superseded"
+        hidden = "of a customer"
+        try:
+            raise KeyError("a bug")
+        except KeyError:
+            structlog.get_logger("x").exception("bug in the worker")
+        said, line = capfd.readouterr()
+        assert not said and json.loads(line)["event"] == "bug in the worker" and hidden not in line
+    finally:
+        configure("error", "console")
 
 
 def test_no_free_connection_is_a_database_that_is_away_and_stops_no_job():
