@@ -2,6 +2,9 @@
 
 A kernel that meets a cut-off or foreign file may return an empty shape, a partial one, or crash. These checks
 read the clear-text encoding (ISO 10303-21) itself: header, sections, end mark, references that lead nowhere.
+
+The text is that of a stranger and may be built to be slow to read: every search here goes over it once. A pattern that
+starts again at each of many places and runs to the end from each takes hours for a few megabytes.
 """
 
 from __future__ import annotations
@@ -21,7 +24,6 @@ MAX_BYTES = 512 * 1024 * 1024
 REFERENCE_CHECK_BYTES = 64 * 1024 * 1024
 
 _STRING = re.compile(rb"'[^']*'")
-_COMMENT = re.compile(rb"/\*.*?\*/", re.DOTALL)
 _DEFINED = re.compile(rb"#(\d+)\s*=")
 _REFERENCE = re.compile(rb"#(\d+)")
 _FACE = re.compile(rb"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
@@ -31,7 +33,9 @@ _PRODUCT = re.compile(rb"=\s*PRODUCT\s*\(\s*'([^']*)'\s*,\s*'([^']*)'")
 _NOT_FINITE = re.compile(rb"[(,]\s*([-+]?(?:nan|inf|infinity|1\.#(?:inf|ind|[qs]nan))(?:\([^()]*\))?)\s*(?=[,)])",
                          re.IGNORECASE)
 # No coordinate has a three-digit exponent; kernels write such numbers for "unbounded", but not into points.
-_HUGE_POINT = re.compile(rb"CARTESIAN_POINT\s*\([^;]*?([-+]?[0-9.]+E\+?[1-9][0-9]{2,})", re.IGNORECASE)
+_POINT = re.compile(rb"CARTESIAN_POINT\s*\(", re.IGNORECASE)
+_HUGE = re.compile(rb"(?<=[0-9.])E\+?[1-9][0-9]{2,}", re.IGNORECASE)
+_SHOWN = 60  # characters of a number that an error shows
 _START = b"ISO-10303-21;"
 _END = b"END-ISO-10303-21"
 
@@ -66,7 +70,7 @@ def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
     """
     data = _read(Path(path), max_bytes)
     _check_frame(data)
-    bare = _COMMENT.sub(b"", _STRING.sub(b"''", data))
+    bare = _without_comments(_STRING.sub(b"''", data))
     _check_numbers(bare)
     if len(data) <= REFERENCE_CHECK_BYTES:
         _check_references(bare)
@@ -101,7 +105,7 @@ def _read(path: Path, max_bytes: int) -> bytes:
 
 def _check_frame(data: bytes) -> None:
     head = data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
-    head = _COMMENT.sub(b"", head).lstrip()
+    head = _without_comments(head).lstrip()
     if not head.upper().startswith(_START):
         raise StepError(f"the file is not a STEP file: it starts with {_shown(data)} instead of 'ISO-10303-21;'",
                         code="not_step", measured=_shown(data), limit="ISO-10303-21;", remedy=_format_hint(data))
@@ -120,24 +124,49 @@ def _check_frame(data: bytes) -> None:
 
 def _check_numbers(bare: bytes) -> None:
     """Refuse numbers that are none: a CAD kernel may take such a point for a place and never come back."""
-    wrong = _NOT_FINITE.search(bare) or _HUGE_POINT.search(bare)
-    if wrong is None:
+    found = _NOT_FINITE.search(bare)
+    place = found.span(1) if found else _huge_coordinate(bare)
+    if place is None:
         return
-    owners = _DEFINED.findall(bare, 0, wrong.start(1))
-    name = f"#{owners[-1].decode()}" if owners else "the header"
-    value = wrong.group(1).decode("latin-1")
+    owners = _DEFINED.findall(bare, 0, place[0])
+    name = f"#{owners[-1][:_SHOWN].decode()}" if owners else "the header"
+    value = bare[place[0]:min(place[1], place[0] + _SHOWN)].decode("latin-1")
     raise StepError(f"{name} of the STEP file holds {value}, which is no place in space", code="bad_number",
                     subjects=(name,), measured=value, limit="a finite number below 1E100",
                     remedy=f"repair the shape that {name} belongs to in the CAD program and export the part again")
 
 
+def _huge_coordinate(bare: bytes) -> tuple[int, int] | None:
+    """Where the first number beyond all space stands between a point and the end of its statement."""
+    at = 0 if _HUGE.search(bare) else len(bare)
+    while point := _POINT.search(bare, at):
+        end = bare.find(b";", point.end())
+        at = end if end >= 0 else len(bare)
+        if exponent := _HUGE.search(bare, point.end(), at):
+            digits = bare[point.end():exponent.start()]
+            number = len(digits) - len(digits.rstrip(b"0123456789."))
+            start = exponent.start() - number
+            return start - (bare[start - 1:start] in (b"-", b"+")), exponent.end()
+    return None
+
+
+def _without_comments(text: bytes) -> bytes:
+    """Without what stands between ``/*`` and ``*/``; one that is never closed stays."""
+    kept, at = [], 0
+    while (start := text.find(b"/*", at)) >= 0 and (end := text.find(b"*/", start + 2)) >= 0:
+        kept.append(text[at:start])
+        at = end + 2
+    kept.append(text[at:])
+    return b"".join(kept)
+
+
 def _check_references(bare: bytes) -> None:
     defined = set(_DEFINED.findall(bare))
     used = set(_REFERENCE.findall(bare))
-    lost = sorted(int(x) for x in used - defined)
+    lost = sorted(used - defined, key=lambda digits: (len(digits), digits))
     if lost:
-        names = tuple(f"#{n}" for n in lost[:10])
-        raise StepError(f"{len(lost)} entities are used but nowhere defined, the first is #{lost[0]}; part of the file "
+        names = tuple(f"#{n[:_SHOWN].decode()}" for n in lost[:10])
+        raise StepError(f"{len(lost)} entities are used but nowhere defined, the first is {names[0]}; part of the file "
                         "is missing", code="dangling_reference", subjects=names, measured=len(lost), limit=0,
                         remedy="transfer or export the file again")
 

@@ -21,6 +21,7 @@ from verify.kinematics import Kinematics
 
 LOWEST_AXIS = -0.5  # Z of the unit tool axis: 30 degrees below level
 OBJECT_WANTED = ("model_type", "model_attributes_type", "dict_type")
+MOST_TOLD = 200  # problems of one setup, or of one request; a few megabytes can have a million
 Library = Mapping[str, Mapping[str, Any]]
 
 
@@ -33,8 +34,8 @@ def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None =
     Raises
     ------
     SetupError
-        Code 'setup_not_json', 'repeated_key', 'bad_text', 'bad_setup' (``measured`` lists every problem as {"at",
-        "problem"}, ``subjects`` the places), or as ``check_blank``.
+        Code 'setup_not_json', 'repeated_key', 'bad_text', 'bad_setup' (``measured`` lists every problem, or the first
+        ``MOST_TOLD``, as {"at", "problem"}, ``subjects`` the places), or as ``check_blank``.
     """
     if isinstance(data, bytes | str):
         try:
@@ -272,8 +273,8 @@ def sentence(kind: str, message: str) -> str:
 def setup_error(error: ValidationError) -> SetupError:
     """The ``SetupError`` that says what a failed validation found."""
     problems = problems_of(error)
-    first = problems[0]
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    first, more = problems[0], f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    problems = problems[:MOST_TOLD]
     prefix = "" if first["at"] == "setup" else f"{first['at']}: "
     return SetupError(f"{prefix}{first['problem']}{more}", code="bad_setup",
                       subjects=tuple(p["at"] for p in problems), measured=problems,

@@ -15,7 +15,7 @@ from starlette.routing import compile_path
 
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
-from service.convert import sentence
+from service.convert import MOST_TOLD, sentence
 from service.db import AWAY
 from service.errors import (
     ERROR_TABLE,
@@ -105,7 +105,7 @@ def _offered(request: Request) -> list[str]:
 async def _validation(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": sentence(e["type"], e["msg"])}
-                for e in error.errors()]
+                for e in error.errors()[:MOST_TOLD]]
     first = problems[0]
     return problem_response(request, RequestError(f"{first['at']}: {first['problem']}", measured=problems,
                                                   subjects=tuple(p["at"] for p in problems),

@@ -42,6 +42,15 @@ def test_every_problem_of_a_setup_is_told_at_once(client, post):
     assert body["subjects"] == ["tools[0].diameter_mm", "unit"]
 
 
+def test_of_very_many_problems_the_first_are_told(client, post):
+    setup = {"tools": [TOOL], **{f"x{k}": 0 for k in range(3000)}}
+    answer = post(client, setup=setup)
+    body = _is_problem(answer, 422, "bad_setup")
+    assert len(body["subjects"]) == len(body["measured"]) == 200 and "2999 more" in body["detail"]
+    answer = client.put("/v1/tools/x", json={**TOOL, **{f"x{k}": 0 for k in range(3000)}})
+    assert len(_is_problem(answer, 422, "malformed_request")["measured"]) == 200
+
+
 @pytest.mark.parametrize(("setup", "code"), [("{", "setup_not_json"), ('{"tools": NaN}', "bad_setup"),
                                              ("[" * 100_000, "setup_not_json")])
 def test_setup_text_that_is_no_setup(client, post, setup, code):

@@ -103,6 +103,43 @@ def test_a_coordinate_that_is_none(tmp_path, box_text, number):
     assert found.subjects == (entity,) and found.measured == number and entity in found.remedy
 
 
+HEAD, TAIL = b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n", b"\nENDSEC;\nEND-ISO-10303-21;\n"
+
+
+@pytest.mark.parametrize("middle", [
+    b"/* " * 200_000, b"CARTESIAN_POINT(" + b"1" * 500_000, b"CARTESIAN_POINT(" * 40_000,
+    b"CARTESIAN_POINT(1E" * 40_000, b"1E400 CARTESIAN_POINT(;" * 40_000, b"'" * 500_001, b"#1" + b" " * 500_000,
+    b"(nan(" * 100_000, b"=PRODUCT('" * 50_000], ids=lambda m: m[:20].decode())
+def test_a_text_that_is_built_to_be_slow_takes_its_length_and_no_more(tmp_path, middle):
+    path = tmp_path / "slow.step"
+    path.write_bytes(HEAD + middle + TAIL)
+    began = time.process_time()
+    try:
+        check_text(path)
+    except StepError as error:
+        assert error.code in ("dangling_reference", "truncated_step", "bad_number")
+    assert time.process_time() - began < 2.0
+
+
+def test_names_and_numbers_of_any_length_are_told_in_short(tmp_path):
+    path = tmp_path / "long.step"
+    path.write_bytes(HEAD + b"#1=X(#" + b"9" * 10_000 + b",#30,#4);" + TAIL)
+    found = refused(StepError, "dangling_reference", lambda: check_text(path))
+    assert found.subjects == ("#4", "#30", "#" + "9" * 60) and found.measured == 3
+    path.write_bytes(HEAD + b"#1=CARTESIAN_POINT('',(0.,-" + b"9" * 10_000 + b".E+100,0.));" + TAIL)
+    found = refused(StepError, "bad_number", lambda: check_text(path))
+    assert found.subjects == ("#1",) and found.measured == "-" + "9" * 59
+
+
+def test_a_comment_ends_where_it_says_and_a_huge_number_counts_in_a_point_alone(tmp_path, box_text):
+    path = tmp_path / "comments.step"
+    harmless = "DATA;\n/* CARTESIAN_POINT(1.E400) */ #99998=X(1.E400);/**/ #99997=Y(); /*/ 1.E400 /* */"
+    path.write_text(box_text.replace("DATA;", harmless, 1))
+    assert check_text(path).faces == 6
+    path.write_text(box_text.replace("DATA;", "DATA;\n#99998=(X() CARTESIAN_POINT ('',(0.,/* */ 1.E400)));", 1))
+    assert refused(StepError, "bad_number", lambda: check_text(path)).measured == "1.E400"
+
+
 def test_words_that_look_like_no_number_are_no_harm(tmp_path, box_text):
     path = tmp_path / "words.step"
     path.write_text(box_text.replace("'Open CASCADE STEP", "'(NAN,INF) Open CASCADE STEP", 1)
