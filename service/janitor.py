@@ -23,6 +23,7 @@ log = structlog.get_logger(__name__)
 GRACE_S = 3600.0
 LEFTOVER_S = 86400.0
 DAY_S = 86400.0
+CLOCK_STEP_S = 600.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Janitor:
     def __init__(self, settings: Settings, jobs: JobStore, artifacts: Artifacts) -> None:
         self.settings, self.jobs, self.artifacts = settings, jobs, artifacts
         self._stop = threading.Event()
+        self._clock = time.time() - time.monotonic()
         self._thread = threading.Thread(target=self._run, name="janitor", daemon=True)
 
     def start(self) -> None:
@@ -78,11 +80,23 @@ class Janitor:
         wanted = {key_of(row) for row in self.jobs.unfinished()} if candidates else set()
         return sum(self.artifacts.remove(p, before) for p in candidates if p.name not in wanted)
 
+    def _clock_was_set(self) -> bool:
+        """Whether the time of the day jumped since this was asked last.
+
+        What is too old by a clock that is wrong may not be: who set it has until the next round to set it right.
+        """
+        clock = time.time() - time.monotonic()
+        moved, self._clock = clock - self._clock, clock
+        if abs(moved) > CLOCK_STEP_S:
+            log.warning("the clock was set; nothing is swept in this round", by_s=round(moved))
+        return abs(moved) > CLOCK_STEP_S
+
     def _run(self) -> None:
         pause = self.settings.sweep_every_s / 10
         while not self._stop.wait(timeout=pause):
             pause = self.settings.sweep_every_s
             try:
-                self.sweep()
+                if not self._clock_was_set():
+                    self.sweep()
             except Exception:
                 log.exception("janitor stumbled")  # database or disk away: the next round tries again
