@@ -149,6 +149,11 @@ class Artifacts:
         """Where the blob of that hash lies."""
         return self.root / "blobs" / sha256[:2] / f"{sha256}.bin"
 
+    def missing(self, row: Mapping[Any, Any]) -> list[str]:
+        """Hashes of the uploads of a job that are not there."""
+        named = (row["part_sha256"], row["stock_sha256"], row["program_sha256"])
+        return [sha for sha in named if sha and not self.blob(sha).is_file()]
+
     def put_blob(self, chunks: Iterable[bytes], check: Callable[[Path], object] | None = None) -> tuple[str, int]:
         """Store bytes; returns their SHA-256 and their number. What is there already is left alone.
 

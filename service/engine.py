@@ -38,6 +38,7 @@ SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
 READY_EVERY_S, CHORES_EVERY_S = 1.0, 1.0
 MERCY_S = 1e9  # no lease counts as run out
 STEP_S = 1.0  # how far the clock has to jump to have been set
+CLAIMS_IN_VAIN = 10  # so often a job is claimed before it is asked why no worker takes it up
 SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 8.0, 10.0
 
 
@@ -330,6 +331,12 @@ class Engine:
                               self._slots)
         if row is None:
             return False
+        if row["claims"] > CLAIMS_IN_VAIN and (lost := self.artifacts.missing(row)):
+            error = ResourceError("what was uploaded for the job is gone from the data folder", code="upload_lost",
+                                  measured=lost, remedy="post it again; who runs the service should look at its disk")
+            log.error("uploads are gone", job=row["id"], missing=lost)
+            self.jobs.finish(row["id"], self.owner, "failed", error=error)
+            return True
         key = f"{row['id']}-{row['claims']}"
         future = self._client.submit(run_job, row["id"], row["claims"], self.work.as_dict(), key=key, pure=False,
                                      retries=0)

@@ -21,7 +21,7 @@ from geometry.errors import CamError, CancelledError, InternalError, ResourceErr
 from service.artifacts import Artifacts, key_of
 from service.db import AWAY, connect
 from service.logs import configure_once
-from service.storage import STORAGE_FULL, is_full, storage_full
+from service.storage import STORAGE_FULL, check_writable, is_full, storage_full
 from service.store import WORKER, JobStore
 from service.supervisor import Limits, supervise
 
@@ -66,10 +66,13 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
     config = WorkConfig(**{**data, "limits": Limits(**data["limits"])})
     configure_once(config.log_level, config.log_format)
     store, owner = JobStore(connect(config.url)), f"{WORKER}{uuid.uuid4().hex}"
+    artifacts = _data_folder(config, store.get(job_id))
+    if artifacts is None:
+        return "unfit"
     if not store.start(job_id, claim, owner, config.lease_s, config.max_attempts):
         return "superseded"
     row, key, summary = store.get(job_id), None, None
-    attempt, artifacts = row["attempt"], Artifacts(Path(config.data_dir))
+    attempt = row["attempt"]
     failure: CamError | None = None
     try:
         state, key, summary = _Attempt(store, artifacts, config, row, owner).run()
@@ -90,6 +93,25 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
                     config.lease_s)
     log.info("job ended", job=job_id, attempt=attempt, state=state, recorded=ended)
     return state if ended else "superseded"
+
+
+def _data_folder(config: WorkConfig, row: RowMapping) -> Artifacts | None:
+    """The data folder, if this worker can use it and sees there what the job needs.
+
+    Of a host whose share is not mounted every job would fail at once, as a part that is no STEP file. Such a worker
+    takes none up; the claim runs out and costs no attempt.
+    """
+    try:
+        artifacts = Artifacts(Path(config.data_dir))
+        check_writable(artifacts.tmp)
+        lost = artifacts.missing(row)
+    except OSError as error:
+        log.error("this worker cannot write to the data folder", job=row["id"], error=str(error))
+        return None
+    if lost:
+        log.error("this worker does not see the uploads of a job: is it the data folder of the service?", job=row["id"],
+                  data=config.data_dir, missing=lost)
+    return None if lost else artifacts
 
 
 def summary_of(folder: Path) -> dict[str, Any] | None:

@@ -2,9 +2,11 @@
 
 import os
 import time
+from dataclasses import replace
 
 import pytest
 
+import service.engine as engine_module
 from service.janitor import GRACE_S, Janitor, Swept
 from service.settings import Settings
 from tests.contract.test_service_input import STEP
@@ -53,6 +55,46 @@ def test_files_of_old_jobs_go_and_the_rest_of_them_stays(make_client, post, fini
     assert old["part_sha256"] in stored(client)
     again = post(client, setup=setup_json(labels={"order": "1"}), key="k").json()
     assert again["id"] != old["id"] and finish(client, again)["state"] == "proved"
+
+
+def test_a_worker_that_does_not_see_the_uploads_takes_no_job_up(make_client, post, finish, monkeypatch, tmp_path):
+    """Of a host whose share is not mounted each job failed at once, as a part that is no STEP file."""
+    client = make_client(lease_s=0.3)
+    engine, folder = client.app.state.engine, client.app.state.engine.work.data_dir
+    elsewhere = tmp_path / "not mounted"
+    monkeypatch.setattr(engine, "work", replace(engine.work, data_dir=str(elsewhere)))
+    job = post(client, "").json()
+    deadline = time.monotonic() + 15
+    while engine.jobs.get(job["id"])["claims"] < 3 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    row = engine.jobs.get(job["id"])
+    assert row["claims"] >= 3 and row["attempt"] == 0 and row["state"] in ("queued", "running")
+    monkeypatch.setattr(engine, "work", replace(engine.work, data_dir=folder))
+    job = finish(client, job)
+    assert (job["state"], job["attempt"]) == ("proved", 1)
+
+
+def test_a_job_whose_uploads_are_gone_fails_by_name_and_is_not_claimed_for_ever(make_client, post, finish, monkeypatch):
+    monkeypatch.setattr(engine_module, "CLAIMS_IN_VAIN", 1)
+    client = make_client(lease_s=0.2)
+    busy = post(client, "sleep").json()
+    finish(client, busy, until=("queued",))
+    job = post(client, "", part=STEP + b"\n").json()
+    client.app.state.engine.artifacts.blob(job["part_sha256"]).unlink()
+    client.delete(busy["links"]["self"])
+    job = finish(client, job)
+    assert (job["state"], job["attempt"], job["error"]["code"]) == ("failed", 0, "upload_lost")
+
+
+def test_a_round_is_left_out_after_the_clock_was_set(make_client, monkeypatch):
+    client = make_client()
+    janitor = Janitor(client.app.state.engine.settings, client.app.state.engine.jobs, client.app.state.engine.artifacts)
+    assert not janitor._clock_was_set()
+    true = time.time
+    monkeypatch.setattr(time, "time", lambda: true() + 400 * DAY)
+    assert janitor._clock_was_set() and not janitor._clock_was_set()  # the next round believes it
+    monkeypatch.setattr(time, "time", true)
+    assert janitor._clock_was_set()
 
 
 def test_one_job_takes_nothing_from_another_with_the_same_content(make_client, post, finish):
