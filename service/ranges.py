@@ -37,6 +37,10 @@ def check_range(request: Request, size: int, etag: str) -> None:
     if not parts or backwards or len(parts) > MOST_RANGES or (condition is not None and condition != etag):
         request.scope["headers"] = [(k, v) for k, v in request.scope["headers"] if k not in (b"range", b"if-range")]
         return
-    if not all(int(a) < size if a else int(b) > 0 and size > 0 for a, b in parts):
+    there = [(a, b) for a, b in parts if (int(a) < size if a else int(b) > 0 and size > 0)]
+    if not there:
         raise RangeError(f"the file has {size} bytes, and the range lies beyond them", measured=text[:200], limit=size,
                          remedy="ask for bytes that are there, or leave the Range header out")
+    if len(there) < len(parts):  # those that can be met are sent (RFC 9110, 14.1.2); the framework would send none
+        kept = b"bytes=" + b",".join(f"{a}-{b}".encode() for a, b in there)
+        request.scope["headers"] = [(k, kept if k == b"range" else v) for k, v in request.scope["headers"]]

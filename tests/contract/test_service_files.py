@@ -31,7 +31,8 @@ def file(client, fake_path):
 @pytest.mark.parametrize(("asked", "want", "told"), [
     ("bytes=0-3", TEXT[:4], "bytes 0-3/11"), ("bytes=2-", TEXT[2:], "bytes 2-10/11"),
     ("bytes=-3", TEXT[-3:], "bytes 8-10/11"), ("bytes=5-999", TEXT[5:], "bytes 5-10/11"),
-    ("bytes=-999", TEXT, "bytes 0-10/11"), ("BYTES=0-0", TEXT[:1], "bytes 0-0/11")])
+    ("bytes=-999", TEXT, "bytes 0-10/11"), ("BYTES=0-0", TEXT[:1], "bytes 0-0/11"),
+    ("bytes=0-1,50-", TEXT[:2], "bytes 0-1/11"), ("bytes=-0, 11-12, 3-4,99-", TEXT[3:5], "bytes 3-4/11")])
 def test_a_part_of_a_file(client, file, asked, want, told):
     path, tag = file
     answer = client.get(path, headers={"Range": asked})
@@ -51,7 +52,7 @@ def test_several_parts_of_a_file(client, file):
     assert b"content-range: bytes 3-4/11" in answer.content.lower() and b"\r\n\r\n21\r\n" in answer.content
 
 
-@pytest.mark.parametrize("asked", ["bytes=11-", "bytes=99-100", "bytes=-0", "bytes=0-1,50-"])
+@pytest.mark.parametrize("asked", ["bytes=11-", "bytes=99-100", "bytes=-0", "bytes=11-12,50-,-0"])
 def test_a_part_that_is_not_there(client, file, asked):
     answer = client.get(file[0], headers={"Range": asked})
     assert answer.status_code == 416 and answer.headers["content-range"] == "bytes */11"
