@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
+import structlog
 from fastapi import APIRouter, Header, Request
 from fastapi.responses import Response, StreamingResponse
 from fastapi.sse import format_sse_event
@@ -21,11 +22,13 @@ from sqlalchemy.engine import RowMapping
 from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
+from service.db import AWAY
 from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
 from service.principals import Principal, Who
 from service.problems import responses
 from service.resources import event_data
 
+log = structlog.get_logger(__name__)
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 KEEP_ALIVE_S = 10.0
@@ -82,8 +85,12 @@ async def _stream(request: Request, row: RowMapping, seen: int, key_id: str | No
         if final or stopping.is_set():
             return
         await asyncio.sleep(interval)
-        if key_id is not None and time.monotonic() - looked > KEY_LOOK_S:
-            looked = time.monotonic()
-            if not await run_in_threadpool(keys.is_live, key_id):
-                return  # revoked or expired: who comes back is asked again
-        row = await run_in_threadpool(jobs.get, row["id"])
+        try:
+            if key_id is not None and time.monotonic() - looked > KEY_LOOK_S:
+                looked = time.monotonic()
+                if not await run_in_threadpool(keys.is_live, key_id):
+                    return  # revoked or expired: who comes back is asked again
+            row = await run_in_threadpool(jobs.get, row["id"])
+        except AWAY as error:
+            log.warning("a stream ends, for the database does not answer", error=type(error).__name__)
+            return  # who comes back gets 503 until it does

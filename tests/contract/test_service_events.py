@@ -2,6 +2,9 @@
 
 import json
 
+from fastapi.testclient import TestClient
+from sqlalchemy.exc import OperationalError
+
 
 def _events(text):
     found = []
@@ -61,6 +64,23 @@ def test_a_principal_has_so_many_streams_at_a_time(make_client, post):
     with client.stream("GET", job["links"]["events"]) as stream:
         assert "event: end" in "".join(stream.iter_text())
     assert streams["local"] == 1  # what has ended counts no more
+
+
+def test_a_stream_ends_in_order_when_the_database_goes_away(make_client, post, monkeypatch):
+    client = make_client()
+    job, jobs = post(client, "sleep").json(), client.app.state.engine.jobs
+    get = jobs.get
+
+    def away(job_id, principal=None):
+        if principal is None:  # as the stream asks, once it is open
+            raise OperationalError("SELECT", {}, Exception("gone"))
+        return get(job_id, principal)
+
+    monkeypatch.setattr(jobs, "get", away)
+    strict = TestClient(client.app, base_url=str(client.base_url))  # raises what the server would log as its error
+    answer = strict.get(job["links"]["events"])
+    assert answer.status_code == 200 and len(_events(answer.text)) == 1
+    assert client.app.state.streams["local"] == 0
 
 
 def test_no_such_job(client):
