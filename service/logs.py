@@ -60,15 +60,19 @@ def configure_once(level: str, form: str) -> None:
 def configure(level: str, form: str) -> None:
     """Send the log to stderr. level: 'debug' ... 'error'; form: 'console' or 'json'."""
     number = getattr(logging, level.upper())
-    logging.basicConfig(stream=STDERR, level=max(number, logging.WARNING), format="%(levelname)s %(name)s "
-                                                                                       "%(message)s")
-    for noisy in ("distributed", "dask", "alembic", "asyncio", "uvicorn"):
-        logging.getLogger(noisy).setLevel(logging.ERROR)
     renderer = structlog.processors.JSONRenderer() if form == "json" else structlog.dev.ConsoleRenderer(
         colors=sys.stderr.isatty())
+    common: list[Any] = [_request_id, structlog.processors.add_log_level,
+                         structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
+                         *([] if form == "json" else [_harmless])]
+    others = logging.StreamHandler(STDERR)  # what libraries say, in the same form
+    others.setFormatter(structlog.stdlib.ProcessorFormatter(
+        foreign_pre_chain=[structlog.stdlib.add_logger_name, *common],
+        processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer]))
+    logging.basicConfig(handlers=[others], level=max(number, logging.WARNING))
+    for noisy in ("distributed", "dask", "alembic", "asyncio", "uvicorn"):
+        logging.getLogger(noisy).setLevel(logging.ERROR)
     structlog.configure(
-        processors=[structlog.contextvars.merge_contextvars, _request_id, structlog.processors.add_log_level,
-                    structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
-                    *([] if form == "json" else [_harmless]), renderer],
+        processors=[structlog.contextvars.merge_contextvars, *common, renderer],
         wrapper_class=structlog.make_filtering_bound_logger(number),
         logger_factory=structlog.PrintLoggerFactory(STDERR), cache_logger_on_first_use=False)
