@@ -250,7 +250,8 @@ def test_other_programs_of_these_controls_are_read():
                          dialect="fanuc")
     assert fanuc.dwell == 0.5 and not fanuc.remarks and fanuc.end[-1].tolist() == [10.0, 0.0, 50.0]
     siemens = read_program("%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\nN10 G17 G90 G710 G94 G54\nN20 T=\"1\"\nN30 M6 D1\n"
-                           "N40 S5000 M3\nG641 ADIS=0.005\nN50 G0 X=0 Y=0\nN60 Z50 M8\nN70 G1 Z-1 F300\n"
+                           "N40 S5000 M3\nMSG(\"wall 3, first side\")\nG641 ADIS=0.005\n"
+                           "N50 G0 X=0 Y=0\nN60 Z50 M8\nN70 G1 Z-1 F300\n"
                            "N80 G3 X10 Y0 CR=5\nN90 G0 Z50\nSUPA G0 Z0 D0\nM30\n", dialect="siemens")
     assert not siemens.remarks and siemens.end[-1].tolist() == [10.0, 0.0, 50.0]
     assert siemens.blend == siemens.leaves == 0.005

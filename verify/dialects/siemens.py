@@ -278,6 +278,8 @@ class Siemens(Control):
         if name == "CYCLE800":
             self._swivel(parts)
             return []
+        if name == "MSG":  # a line on the screen
+            return []
         if name == "CYCLE832":
             if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
                 self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
