@@ -100,6 +100,7 @@ class Workplan:
     part_mesh       : the part, faces by number, or None where nobody wants it written
     assemblies      : by T number; surfaces : by face number, in the frame of the plan, where strategies follow them
     ap238           : what the AP238 file is for
+    coolant         : whether it runs while a tool cuts
     number, number_words : of the program, where a control tells programs apart by numbers, and what is said beside it
     """
 
@@ -125,6 +126,7 @@ class Workplan:
     assemblies: Mapping[int, Assembly] = field(default_factory=dict)
     surfaces: Mapping[int, NurbsSurface] = field(default_factory=dict)
     ap238: Ap238 = Ap238.CC1
+    coolant: bool = True
     number: int = FIRST_NUMBER
     number_words: str = ""
 

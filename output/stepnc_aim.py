@@ -252,7 +252,8 @@ class _Aim:
 
     def _functions(self) -> None:
         self.functions = self.file.add("MACHINING_FUNCTIONS('','milling','','')")
-        for name, value in (("coolant", "coolant on"), ("through spindle coolant", "through spindle coolant off"),
+        wet = "coolant on" if self.plan.coolant else "coolant off"
+        for name, value in (("coolant", wet), ("through spindle coolant", "through spindle coolant off"),
                             ("chip removal", "chip removal off")):
             self._property(name, "'milling'", self.functions, self._symbol(value))
         item = self.file.add("DESCRIPTIVE_REPRESENTATION_ITEM('','rapid')")

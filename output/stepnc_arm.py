@@ -107,7 +107,8 @@ class _Arm:
         self.channel = add("CHANNEL('channel 1')")
         if self.plan.clamping is None:
             self.three_axes = add("THREE_AXES()")
-        self.functions = add("MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(),.F.,$,$,())")
+        wet = ".T." if self.plan.coolant else ".F."
+        self.functions = add(f"MILLING_MACHINE_FUNCTIONS({wet},$,$,.F.,$,(),.F.,$,$,())")
 
     def _placement(self, name: str, point: int) -> int:
         return self.file.add(f"AXIS2_PLACEMENT_3D({quoted(name)},#{point},#{self.up},#{self.along})")

@@ -103,7 +103,7 @@ class _Walk:
     def _set_speed(self, step: Workingstep) -> None:
         speed = decimal(step.spindle_rpm, 0)
         if speed != self.speed:
-            self.lines += self.dialect.spindle(speed, not self.speed)
+            self.lines += self.dialect.spindle(speed, not self.speed, self.plan.coolant)
             self.speed = speed
 
     def _arrive(self, step: Workingstep, place: Sequence[int], tcp: bool) -> None:

@@ -51,6 +51,9 @@ class Machine(WireModel):
                                   "the tool where it can be, into programs that run one after the other: "
                                   "program.linuxcnc.ngc, program.part2.linuxcnc.ngc, each with its STEP-NC. null: not "
                                   "limited.")] = None
+    coolant: Annotated[Literal["flood", "off"], Field(
+        description="Whether programs and STEP-NC turn the coolant on with the spindle (M8) or say that it is off "
+                    "(M9). Cutting data that the setup does not give are for flood: dry, give your own.")] = "flood"
     high_speed: Annotated[bool, Field(
         description="Say the word for fast contouring where a control has it as an option: G05.1 Q1 on fanuc, CYCLE832 "
                     "on siemens.")] = False

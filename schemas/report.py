@@ -125,6 +125,7 @@ class Caution(ReportModel):
     """What a machinist is to be told although it is no finding."""
 
     kind: Annotated[str, Field(description="limited: the setup asks a tool for more than it or the machine allows. "
+                                           "dry: it cuts without coolant at figures for it. "
                                            "deflection: a tool bends too far at its full feed. thin_wall: a wall "
                                            "is high for its thickness; measured is height over thickness. support: "
                                            "thin walls are finished without stock beside them near by; measured is how "

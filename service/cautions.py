@@ -33,7 +33,7 @@ MOST_RATIO = 10.0
 class Caution:
     """One of them.
 
-    kind      : 'limited', 'thin_wall', 'support', 'deflection', 'tool_life' or 'center_cutting'
+    kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life' or 'center_cutting'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -74,6 +74,18 @@ def limited(setup: Setup) -> list[Caution]:
             message = f"tool {tool.id}: {field} {asked:g} is more than {whose} {limit:g}"
             out.append(Caution("limited", (tool.id,), message, asked, limit,
                                f"it runs at {limit:g}; ask for no more, or correct the limit"))
+    return out
+
+
+def dry(setup: Setup) -> list[Caution]:
+    """Tools that cut without coolant at figures that are meant for it."""
+    out = []
+    for tool in setup.tools if setup.machine.coolant == "off" else ():
+        if tool.spindle_rpm is None or tool.feed_mm_min is None:
+            speed = cutting_data(setup.material, tool, setup.machine).cutting_speed
+            out.append(Caution("dry", (tool.id,),
+                               f"tool {tool.id} cuts dry, at {speed:.0f} m/min, and its speed or feed is a figure for "
+                               "coolant", speed, math.nan, "give its spindle_rpm and feed_mm_min for dry cutting"))
     return out
 
 

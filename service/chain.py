@@ -25,7 +25,7 @@ from schemas.setup import Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.artifacts import clear_results
-from service.cautions import bent, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld
+from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -107,7 +107,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    cautions = [*limited(setup), *thin_walls(ready)]
+    cautions = [*limited(setup), *dry(setup), *thin_walls(ready)]
     ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
     checks = scored.checks(ready)
@@ -263,7 +263,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
     """
     check_plannable(setup)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *thin_walls(ready)])))
+    ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *dry(setup), *thin_walls(ready)])))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
     return out

@@ -249,6 +249,7 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
                     stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
                     stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,
                     part_mesh=look.part.mesh if shapes else None, ap238=Ap238(setup.machine.ap238),
+                    coolant=setup.machine.coolant == "flood",
                     assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
                                 for t, b in zip(setup.tools, tool_bodies(setup), strict=True)})
 

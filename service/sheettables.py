@@ -61,6 +61,7 @@ def job_section(report: Mapping[str, Any], setup: Setup, material: str) -> Secti
         ("Material", material),
         ("Machine", f"{axes}; {', '.join(machine.dialects)}"),
         ("Units", "mm, mm/min, 1/min, degrees"),
+        ("Coolant", machine.coolant),
         ("Size of the part", " x ".join(number(v) for v in size)),
         ("Programs", f"{len(programs)}, for {', '.join(machine.dialects)}" if programs else "none written"),
         ("Time", f"{minutes(report['machining_time_s'])} min as simulated, {minutes(time['in_cut_s'])} of them in cut; "

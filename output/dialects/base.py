@@ -63,6 +63,11 @@ def about_y(angle: float) -> F64:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
+def coolant(wet: bool) -> str:
+    """The word that turns it on or off."""
+    return "M8" if wet else "M9"
+
+
 class Dialect:
     """One control. Methods return lines unless they say otherwise.
 
@@ -168,12 +173,12 @@ class Dialect:
         """Stop for a fresh cutter in the place of the tool that is in the spindle, which stands still."""
         return [*self.comment(f"Fresh cutter in T{number}: change it and set its length"), "M0"]
 
-    def spindle(self, speed: str, first: bool) -> list[str]:
-        """Turn clockwise at 1/min; ``first``: with the coolant, after a tool was taken.
+    def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
+        """Turn clockwise at 1/min; ``first``: and say whether the coolant runs, after a tool was taken.
 
         A block has one M word: many controls take no more.
         """
-        return [f"S{speed} M3", *(["M8"] if first else [])]
+        return [f"S{speed} M3", *([coolant(wet)] if first else [])]
 
     def rise(self) -> list[str]:
         """Before a step with the tool that is in the spindle, where ``stop`` leaves it low: up to machine zero."""

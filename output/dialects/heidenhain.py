@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 
 from geometry.errors import OutputError
-from output.dialects.base import Dialect, axis_tolerance
+from output.dialects.base import Dialect, axis_tolerance, coolant
 from output.grid import PER_MM, GridArc
 from output.text import decimal
 
@@ -89,9 +89,9 @@ class Heidenhain(Dialect):
         """With its speed."""
         return [f"TOOL CALL {number} Z S{speed}"]
 
-    def spindle(self, speed: str, first: bool) -> list[str]:
+    def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
         """The tool was called with its speed; another one is a call without a tool."""
-        return ["M3", "M8"] if first else [f"TOOL CALL S{speed}"]
+        return ["M3", coolant(wet)] if first else [f"TOOL CALL S{speed}"]
 
     def up(self) -> list[str]:
         """In coordinates of the machine."""

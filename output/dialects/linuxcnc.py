@@ -33,9 +33,9 @@ class LinuxCnc(Dialect):
         """The tool is put away first, as the control takes no tool that it has."""
         return ["T0 M6", *super().fresh(number)]
 
-    def spindle(self, speed: str, first: bool) -> list[str]:
+    def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
         """Both M words in one block: they are of two groups."""
-        return [" ".join(super().spindle(speed, first))]
+        return [" ".join(super().spindle(speed, first, wet))]
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
         """A shift by G92 or G52 outlives the program that made it, and even the control's being switched off."""

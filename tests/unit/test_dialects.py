@@ -42,6 +42,7 @@ JOBS = {
     "speeds": faster(plan()), "speeds on five axes": faster(clamped()),
     "arcs": round_plan(), "arcs of a clamping": fitted(round_clamped(), HALF),
     "arcs and restart": replace(round_plan(), restart=True),
+    "dry": replace(plan(), restart=True, coolant=False),
     "fresh cutters": replace(plan(), steps=tuple(replace(s, fresh=k > 1) for k, s in enumerate(plan().steps))),
 }
 
@@ -104,7 +105,7 @@ def test_what_is_read_is_the_plan(job, dialect):
         k = cuts[at]
         axis = up if p.poses is None else p.poses.end_axis[k]
         assert np.linalg.norm(axis - row[12:15]) < 1e-6 + 2 * np.radians(0.5e-4)
-        assert p.feed[k] == row[6] and p.tool[k] == row[7] and p.speed[k] == row[8] and p.coolant[k]
+        assert p.feed[k] == row[6] and p.tool[k] == row[7] and p.speed[k] == row[8] and p.coolant[k] == work.coolant
         at += 1
 
 
@@ -323,6 +324,14 @@ def test_programs_of_one_job_have_names_of_their_own():
 def test_fast_contouring_is_off_before_a_step_is_begun():
     text = write(JOBS["restart"], "fanuc", SHOPS["fast"])
     assert len(re.findall(r"^N\d+\nG05\.1 Q0\nG21\n", text, flags=re.MULTILINE)) == len(JOBS["restart"].steps)
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_a_program_without_coolant_says_so_where_it_may_be_started(dialect):
+    """A run that was broken off, or the operator, may have left it on."""
+    text = write(JOBS["dry"], dialect)
+    assert not re.search(r"\bM8\b", text) and re.search(r"\bM8\b", write(JOBS["restart"], dialect))
+    assert len(re.findall(r"\bM9\b", text)) == len(re.findall(r"\bM9\b", write(JOBS["restart"], dialect))) + 5
 
 
 def test_arcs_in_plain_language():

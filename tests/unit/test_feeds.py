@@ -12,7 +12,7 @@ from benchmarks import feeds_sweep
 from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
-from service.cautions import bent, limited, uncut_centres
+from service.cautions import bent, dry, limited, uncut_centres
 from service.chain import cut_table
 from service.convert import parse_setup, tool_bodies
 from service.materials import MOST_THINNING, chip_thinning, cutting_data
@@ -94,6 +94,15 @@ def test_an_own_figure_may_pass_the_caution_for_machines_that_state_no_limit():
     fast = setup({**BALL, "spindle_rpm": 40000, "feed_mm_min": 9000})
     cut = cut_table(fast)["T1"]
     assert (cut.spindle_rpm, cut.feed) == (40000, 9000) and limited(fast) == []
+
+
+def test_figures_for_coolant_are_told_of_where_there_is_none():
+    own = {**FLAT, "spindle_rpm": 4000, "feed_mm_min": 300}
+    assert dry(setup(BALL, own)) == []
+    (told,) = dry(setup(BALL, own, machine={"coolant": "off"}))
+    assert told.kind == "dry" and told.subjects == ("T1",) and "cuts dry" in told.message
+    half = {**FLAT, "spindle_rpm": 4000}
+    assert [c.subjects for c in dry(setup(half, machine={"coolant": "off"}))] == [("T2",)]
 
 
 @pytest.mark.parametrize("seed", range(len(OVERRIDES)))

@@ -80,6 +80,15 @@ def test_planned_points_feeds_and_tools_come_back(write):
 
 
 @both
+def test_that_there_is_no_coolant_comes_back(write):
+    dry = replace(plan(), coolant=False)
+    assert not read_moves(write(dry)).coolant.any()
+    check_agreement(nc_of(dry), read_stepnc(write(dry), tools=dry.tools))
+    with pytest.raises(InternalError, match="coolant"):
+        check_agreement(nc_of(plan()), read_stepnc(write(dry), tools=dry.tools))
+
+
+@both
 def test_a_fresh_cutter_stops_the_program_at_the_clearance_plane(write):
     job = full()
     read = read_stepnc(write(job), tools=job.tools)
