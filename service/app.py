@@ -52,8 +52,9 @@ def create_app(settings: Settings | None = None, chain: str = "service.chain") -
             app.state.stopping.set()
             await run_in_threadpool(engine.close)
 
-    app = FastAPI(title="zonemill", version=VERSION, description=DESCRIPTION, lifespan=lifespan,
-                  separate_input_output_schemas=False, redirect_slashes=False)
+    # The framework's pages about the contract run scripts of another host, which could read the key a tab keeps.
+    app = FastAPI(title="zonemill", version=VERSION, description=DESCRIPTION, lifespan=lifespan, docs_url=None,
+                  redoc_url=None, separate_input_output_schemas=False, redirect_slashes=False)
     app.state.settings, app.state.engine, app.state.metrics = settings, Engine(settings, chain), Metrics()
     app.state.stopping, app.state.startup_error = threading.Event(), None
     app.state.streams = Counter()

@@ -27,7 +27,7 @@ NOT_BUILT = """<!DOCTYPE html>
 <body><h1>The page is not built here</h1>
 <p>This service runs, but the files of its page were not made when it was installed.</p>
 <p>Remedy: run <code>make web</code> in the folder of the project, and load this page again. No restart is needed.</p>
-<p>Everything else works without it: <a href="/docs">the HTTP interface</a>, or <code>zonemill plan</code>.</p>
+<p>Everything else works without it: <a href="/openapi.json">the HTTP interface</a>, or <code>zonemill plan</code>.</p>
 </body></html>
 """
 

@@ -27,6 +27,13 @@ def test_the_page_runs_nothing_but_its_own_files(client, built):
         assert answer.headers["referrer-policy"] == "no-referrer"
 
 
+def test_no_page_runs_scripts_of_another_host(client):
+    """Those of the framework about the contract would, beside the key that a tab keeps."""
+    for path in ("/docs", "/redoc", "/docs/oauth2-redirect"):
+        assert client.get(path).status_code == 404
+    assert client.get("/openapi.json").status_code == 200
+
+
 def test_files_of_the_page_are_kept_for_good_and_packed(client, built):
     plain = client.get("/assets/index-abc123.js", headers={"Accept-Encoding": "identity"})
     packed = client.get("/assets/index-abc123.js")
