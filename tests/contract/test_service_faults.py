@@ -198,6 +198,7 @@ def _play(service, part, alone, fault, repeat, real, seconds):
         again += turn.check_mail()
         last = {k: round(v, 1) for k, v in took[-1].items()}
         print(f"{fault} {nth + 1}: {last}", flush=True)
+    assert len(took) == repeat, f"{len(took)} of {repeat} rounds in {seconds:.0f} s: give it FAULT_SECONDS"
     for what in ("outage", "ready", "hit", "all"):
         values = [t[what] for t in took]
         print(f"{fault}: {what} median {statistics.median(values):.1f} s, longest {max(values):.1f} s")

@@ -22,6 +22,20 @@ def _report(setup, state, findings):
     }
 
 
+def _raise_in_the_kernel():
+    """An exception of Open CASCADE's own, on the way that those of its readings take."""
+    from geometry import step_child
+    from geometry.occ import loading
+
+    def load_part(**_):
+        from OCP.gp import gp_Dir
+
+        return gp_Dir(0.0, 0.0, 0.0)
+
+    loading.load_part = load_part
+    step_child._load({"placement": None})
+
+
 def _misbehave(what, progress):
     if what in NAPS:
         steps = NAPS[what]
@@ -35,6 +49,11 @@ def _misbehave(what, progress):
         while True:
             kept.append(bytearray(os.urandom(1000) * 20000))
             time.sleep(0.005)
+    elif what == "loop":
+        while True:
+            pass
+    elif what == "kernel":
+        _raise_in_the_kernel()
     elif what == "killed":
         os.kill(os.getpid(), 9)
     elif what == "look about":
