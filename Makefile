@@ -11,7 +11,7 @@ PORT ?= 8000
 # uv installs into a given interpreter; plain pip is called by the interpreter itself.
 INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 
-.PHONY: setup check types test test-slow soak clients audit golden bench docs demo serve lock clean
+.PHONY: setup peers check types test test-slow soak clients audit golden bench docs demo serve lock clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -35,6 +35,9 @@ $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
 	$(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
+
+# Programs by others that judge ours; tests that want them skip without, with the reason.
+peers: $(BENCH_STAMP)
 
 web: $(PAGE)
 
