@@ -61,7 +61,7 @@ test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
 
 test-slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m "slow and not soak" -n 2 --dist worksteal --ignore tests/contract/test_clients.py
+	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
 
 # What takes longer than CI waits; each test prints its figures. K chooses among them, SOAK_COUNT=50, FAULT_REPEAT=5 and
 # LOAD_MINUTES=2 are for a quick look.
