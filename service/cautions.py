@@ -18,13 +18,18 @@ from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
 from toolpath.deflection import Bend
+from toolpath.finish import ZonePlan
 from toolpath.life import minutes_in_cut
 from toolpath.motion import Workingstep
 from toolpath.ramps import LEAST_RUN
+from toolpath.settings import Leaned
+from toolpath.strategies import flank, led, matched
 from verify.model import Support
 from zones.model import Wall
 from zones.thinness import slender_walls
 
+LEANING = frozenset((flank.NAME, matched.NAME, led.NAME))
+MOST_REASONS = 3  # a caution says
 MOST_RATIO = 10.0
 """Height of a wall over its thickness, above which it is told of."""
 
@@ -33,7 +38,7 @@ MOST_RATIO = 10.0
 class Caution:
     """One of them.
 
-    kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life' or 'center_cutting'
+    kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life', 'center_cutting' or 'upright'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit the message says
     at        : mm, setup frame, where it is of a place
@@ -98,6 +103,20 @@ def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
                     LEAST_RUN * used[tool.id].radius, tool.diameter_mm,
                     "look at its first cuts in closed pockets, drill them first, or take one that cuts to the centre")
             for tool in setup.tools if not tool.center_cutting and tool.id in used]
+
+
+def upright(asked: Leaned | None, zones: Sequence[ZonePlan]) -> list[Caution]:
+    """Zones that are finished by an upright tool although it is asked to lean there, each with the reasons."""
+    out = []
+    for z in zones:
+        if led.asked(asked, z.zone.form, z.zone.tool) is None or z.step is None or z.strategy in LEANING:
+            continue
+        told = [str(r["reason"]) for r in z.rejected if r["strategy"] == led.NAME]
+        why = "; ".join(told[:MOST_REASONS]) or "it has no curved face, or is finished in bands"
+        out.append(Caution("upright", (z.zone.id, z.zone.tool.id),
+                           f"zone {z.zone.id}: tool {z.zone.tool.id} is asked to lean and stays upright ({why})",
+                           math.nan, math.nan, "give it a slimmer or longer tool, another lean, or leave it as it is"))
+    return out
 
 
 def walls_to_cut(ready: Prepared) -> list[Wall]:

@@ -21,11 +21,11 @@ import numpy as np
 from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
 from output.arcs import SHARE as ARCS
-from schemas.setup import Setup
+from schemas.setup import Lean, Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.artifacts import clear_results
-from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld
+from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld, upright
 from service.convert import (
     check_plannable,
     check_spindle_tool,
@@ -60,7 +60,7 @@ from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.life import with_fresh_cutters, worn
 from toolpath.plan import Plan, plan_job
-from toolpath.settings import CutData, PlanSettings
+from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
@@ -140,7 +140,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
     late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps),
-            *uncut_centres(setup, made.steps)]
+            *uncut_centres(setup, made.steps), *upright(_leaned(setup.operations.lean), made.zones)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest, stays = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
@@ -365,7 +365,17 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
-                        rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing)
+                        rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing,
+                        leaned=_leaned(ops.lean))
+
+
+def _leaned(lean: Lean | None) -> Leaned | None:
+    """How noses are asked to lean, in the words of the plan."""
+    if lean is None:
+        return None
+    walls = lean.walls_tilt_deg
+    return Leaned(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),
+                  None if walls is None else math.radians(walls))
 
 
 def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:

@@ -30,13 +30,13 @@ from toolpath.levels import Line, serving, thinned, true_runs
 from toolpath.linking import Linker
 from toolpath.motion import Motion, Trajectory, Workingstep
 from toolpath.order import nearest_order
-from toolpath.posed import enters
+from toolpath.posed import Blocked, enters
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
-from toolpath.strategies import flank, floor, isoparametric, matched, spot, zigzag, zlevel
+from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
 from toolpath.strategies.isoparametric import Faces
 from toolpath.strategies.zigzag import Pattern
 from toolpath.travel import Motions
@@ -144,8 +144,10 @@ class Finish:
 
         Where passes along the borders of its faces are not much more way than the usual ones, where the flank of a tool
         that leans lies on its walls, or where its tilted end has the curvature of its faces, these are walked as well,
-        each until no more than the scallop is left. What leaves the fewest samples above it stays, of those that leave
-        as many the fastest. It stays for the bands below too, and a zone in bands has no leaning passes.
+        each until no more than the scallop is left; where noses are asked to lean, passes of one that does as well.
+        What leaves the fewest samples above it stays, of those that leave as many the fastest, but an upright tool
+        only where none leans that is asked to. It stays for the bands below too, and a zone in bands has no leaning
+        passes.
         """
         every = np.ones(len(self.checks.points), np.bool_) if wanted is None else wanted
         if not bool((every & (self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height))).any()):
@@ -169,12 +171,17 @@ class Finish:
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
-        best = min(range(len(tries)), key=lambda k: (not made[k], left[k], seconds[k]))
+        asked = led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
+        upright = [asked and not t.begun_with for t in tries]
+        best = min(range(len(tries)), key=lambda k: (not made[k], left[k], upright[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]
         for k, lost in enumerate(tries):
             why: dict[str, object] = {"reason": "no pass is walked", "value": 0, "limit": 0}
             if made[k] and left[k] > left[best]:
                 why = {"reason": "more samples are left above the scallop", "value": left[k], "limit": left[best]}
+            elif made[k] and upright[k] and not upright[best]:
+                why = {"reason": "the tool is asked to lean and this is upright, s", "value": round(seconds[k], 1),
+                       "limit": round(seconds[best], 1)}
             elif made[k]:
                 why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[k], 1),
                        "limit": round(seconds[best], 1)}
@@ -199,15 +206,24 @@ class Finish:
             curved = [face for face in alone if not face.flat]
             found.append((matched.NAME, matched.matched(curved, *given, self._surroundings(), self.field.allowance,
                                                         most)))
+        if (leaned := led.asked(self.settings.leaned, self.zone.form, self.field.tool)) is not None:
+            found.append((led.NAME, led.led(self.faces, self.checks, self.field, self.cut, self.settings,
+                                            self._surroundings(), self._enters(led.WARY), leaned)))
         return [(name, runs.runs) for name, runs in found if runs.runs], tuple(
             {"strategy": name, "reason": reason} for name, runs in found for reason in runs.refused)
 
     def _surroundings(self) -> Surroundings:
         field, settings = self.field, self.settings
-        met = enters(field.tree, field.tool, field.clear, field.allowance - settings.lift)
+        met = self._enters()
         assert settings.turning is not None
         skins = Skins(self.residual.copied(), settings.scallop_height, self.stock.lattice.step)
         return Surroundings(met, settings.turning, self.stock.copied(), field.discs, field.clear, skins)
+
+    def _enters(self, more: float = 0.0) -> Blocked:
+        """Whether the tool enters part or fixtures; more : mm beside the clearance of neck, shank and holder."""
+        field, c = self.field, self.field.clear
+        clear = replace(c, neck=c.neck + more, shank=c.shank + more, holder=c.holder + more)
+        return enters(field.tree, field.tool, clear, field.allowance - self.settings.lift)
 
     def _led(self, step_id: str, name: str, runs: Sequence[tuple[Trajectory, ...]],
              wanted: NDArray[np.bool_]) -> list[Workingstep]:

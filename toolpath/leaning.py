@@ -114,11 +114,12 @@ class Runs:
 
 
 def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, settings: PlanSettings,
-            around: Surroundings) -> Runs:
+            around: Surroundings, divided: float = math.inf) -> Runs:
     """Passes as far as they can be walked one after the other, each off the stock that those before it leave.
 
-    found  : name of the face and pass, for each
-    around : Surroundings; its stock is taken off
+    found   : name of the face and pass, for each
+    around  : Surroundings; its stock is taken off
+    divided : mm; what is longer and cannot be walked as a whole is walked in halves
     """
     runs: list[tuple[Trajectory, ...]] = []
     refused: list[str] = []
@@ -127,7 +128,7 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
         before = around.copied() if len(layers) > 1 else None
         mine: list[tuple[Trajectory, ...]] = []
         for layer in layers:
-            made, why = _walked(layer, tool, cut, settings, around)
+            made, why = _walked(layer, tool, cut, settings, around, divided)
             refused += [f"{name}: {reason}" for reason in why]
             mine += made
         if before is not None and not made:  # layers for nothing
@@ -137,15 +138,20 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
     return Runs(tuple(runs), tuple(dict.fromkeys(refused)))
 
 
-def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
-            around: Surroundings) -> tuple[list[tuple[Trajectory, ...]], list[str]]:
+def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings, around: Surroundings,
+            divided: float) -> tuple[list[tuple[Trajectory, ...]], list[str]]:
     """What of a pass is walked, taken off the stock, and why the rest is not, in words."""
-    parts = free_parts(piece, tool, settings, around)
-    runs, refused = [], [] if parts else [LOADED]
-    for part in parts:
+    todo = free_parts(piece, tool, settings, around)
+    runs, refused = [], [] if todo else [LOADED]
+    while todo:
+        part = todo.pop(0)
         made = with_ways(part, tool, cut, settings, around)
         if isinstance(made, str):
-            refused.append(made)
+            if len(part.tips) > 2 and part.length > divided:
+                rows, half = np.arange(len(part.tips), dtype=np.float64), len(part.tips) // 2
+                todo[:0] = [part.at(rows[:half + 1]), part.at(rows[half:])]
+            else:
+                refused.append(made)
             continue
         runs.append(made)
         for t in made:
@@ -257,7 +263,7 @@ def _begun_level(piece: Piece, slope: float, least: float) -> Piece | None:
     if not len(level):
         return None
     kept = piece.at(np.arange(level[0], level[-1] + 2, dtype=np.float64))
-    return kept if float(np.linalg.norm(np.diff(kept.tips, axis=0), axis=1).sum()) >= least else None
+    return kept if kept.length >= least else None
 
 
 def _steps_down(piece: Piece, slope: float) -> tuple[F64, NDArray[np.bool_]]:

@@ -57,9 +57,14 @@ class Piece:
         for i, j in true_runs(good):
             own = np.arange(np.floor(places[i]) + 1.0, np.ceil(places[j - 1]))
             part = self.at(np.concatenate([[places[i]], own, [places[j - 1]]]))
-            if j - i > 1 and float(np.linalg.norm(np.diff(part.tips, axis=0), axis=1).sum()) >= least:
+            if j - i > 1 and part.length >= least:
                 out.append(part)
         return out
+
+    @property
+    def length(self) -> float:
+        """mm, of the tip's way."""
+        return float(np.linalg.norm(np.diff(self.tips, axis=0), axis=1).sum())
 
     @property
     def top(self) -> float:

@@ -75,6 +75,18 @@ class Turning:
 
 
 @dataclass(frozen=True)
+class Leaned:
+    """How far a nose is asked to lean off the normal of faces, rad: forwards along a pass, and to one side of it.
+
+    walls : to one side on walls; None where it leans on others alone
+    """
+
+    lead: float
+    tilt: float
+    walls: float | None = None
+
+
+@dataclass(frozen=True)
 class PlanSettings:
     """Tolerances and heights of a plan; mm and rad.
 
@@ -84,6 +96,7 @@ class PlanSettings:
     either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
     pattern         : of passes over shallow area
     turning         : what the rotary axes can do; None on a machine without
+    leaned          : how far noses are asked to lean on faces; None where that is left to the plan
     found           : what a proof found wrong with the plans before, in the frame of this one
     rates           : what the machine does, for times
     planes          : heights of contact, descending, above which all is finished before any tool goes below
@@ -108,3 +121,4 @@ class PlanSettings:
     rates: Rates = RATES
     planes: tuple[float, ...] = ()
     semi_finishing: bool = False
+    leaned: Leaned | None = None

@@ -25,6 +25,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
+from scipy.ndimage import maximum_filter1d
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
@@ -183,7 +184,7 @@ def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.b
            step: float, spread: float) -> tuple[F64, NDArray[np.bool_]]:
     """Axes led round what is in the way, and where even so the tool is blocked."""
     reach = int(np.ceil(limits.cone / limits.per_mm / step)) + 1  # so many stations it takes to get round
-    near = np.convolve(bad, np.ones(2 * reach + 1), "same") > 0.5
+    near = maximum_filter1d(bad, 2 * reach + 1, mode="constant")
     rows = np.flatnonzero(near)
     tries = fan(smooth[rows], limits.cone)
     inside = (tries * wanted[rows, None]).sum(axis=2) >= np.cos(limits.cone)

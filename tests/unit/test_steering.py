@@ -147,3 +147,19 @@ def test_passes_between_walls_are_walked_whole_with_steered_axes_and_not_with_th
     assert made.free.all()
     assert sum(b - a for a, b in blunt.left) > 0.9 * profile.length
     assert sum(b - a for a, b in led.left) == 0.0 and len(led.pieces) == 1
+
+
+def test_a_pass_shorter_than_it_takes_to_get_round_is_led_too():
+    """Both ends are nearer than it takes to turn through the cone at the limit."""
+    profile, slow = profile_over(wall(0.0)), Limits(np.radians(40.0), np.radians(0.2))
+    assert slow.cone / slow.per_mm > profile.length
+    blocked = beside = 0
+
+    def post(tip, axis):
+        nonlocal blocked, beside
+        met = (np.abs(tip[:, 0]) < 1.0) & (axis @ [0.0, 0.0, 1.0] > np.cos(np.radians(10.0)))
+        blocked, beside = blocked + int(met.sum()), beside + int((~met).sum())
+        return met
+
+    made = steered(profile, ball(2.0 * R), upright, post, slow)
+    assert len(made.axis) == len(made.contact) and made.free.all() and blocked and beside

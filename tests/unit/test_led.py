@@ -1,0 +1,158 @@
+"""Passes of a nose that leans as it is asked to: what they leave by the proof's measure, how they get round a post."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geometry.bvh import TriangleTree
+from service.cautions import upright
+from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
+from tests.unit.test_matched import measured
+from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
+from toolpath.family import Target
+from toolpath.leaning import Surroundings
+from toolpath.posed import enters
+from toolpath.settings import CutData, Leaned
+from toolpath.steering import Limits
+from toolpath.stock import StockMap
+from toolpath.strategies import led
+from toolpath.strategies.isoparametric import TrimmedFace
+from zones.machinable import Form
+from zones.reach import Clearances
+
+BALL = ball(6.0)
+TILTED, LEADING = Leaned(0.0, np.radians(15.0)), Leaned(np.radians(10.0), 0.0)
+POST = joined(HOLLOW, box_mesh([4, 4, -1], [9, 9, 30]))
+
+
+def found(leaned=TILTED, mesh=HOLLOW, allowance=0.0, turning=FREE, body=BALL, margin=0.1):
+    tree, clear = TriangleTree(mesh), Clearances()
+    samples = samples_of(HOLLOW, 2.0, {2})
+    target = Target(samples.points, samples.normals, samples.points, 0.7)
+    around = Surroundings(enters(tree, body, clear, allowance - LIFT), turning,
+                          StockMap.around(tree, HOLLOW.bounds, margin, 0.25), (), clear)
+    wider = replace(clear, neck=clear.neck + led.WARY, shank=clear.shank + led.WARY)
+    cut = CutData(10_000, FEED, 200, 3000, 3.6)
+    return led.led([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, SimpleNamespace(tool=body, allowance=allowance),
+                   cut, settings_of(turning), around, enters(tree, body, wider, allowance - LIFT), leaned), around
+
+
+def normals_at(poses, radius):
+    """Tool axes, the hollow's normals (z = x² / 120 + y² / 300) where a ball stands on it, and mm its centre is off."""
+    tips, axes = (np.vstack(k) for k in zip(*poses, strict=True))
+    centre = tips + radius * axes
+    x, y = centre[:, 0], centre[:, 1]
+    for _ in range(30):  # a ball much smaller than the hollow is round: the foot moves less and less
+        normal = np.column_stack([-x / 60.0, -y / 150.0, np.ones(len(x))])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        x, y = (centre - radius * normal)[:, :2].T
+    return axes, normal, np.linalg.norm(centre - np.column_stack([x, y, x * x / 120.0 + y * y / 300.0]), axis=1)
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    return found()[0]
+
+
+@pytest.fixture(scope="module")
+def past_a_post():
+    return found(mesh=POST)
+
+
+def test_it_leaves_no_more_than_the_scallop_and_cuts_no_deeper(tilted):
+    left = measured(SURFACE, BALL, cuts(tilted))
+    assert left.max() <= SCALLOP and left.min() > -0.002
+    assert not tilted.refused
+
+
+def test_it_leans_off_the_normal_as_asked_to_one_side_of_all_passes(tilted):
+    axes, normals, far = normals_at(cuts(tilted), BALL.radius)
+    np.testing.assert_allclose(far, BALL.radius, atol=0.002)
+    lean = np.degrees(np.arccos(np.clip((axes * normals).sum(axis=1), -1.0, 1.0)))
+    assert np.percentile(np.abs(lean - 15.0), 99) < 0.5 and np.abs(lean - 15.0).max() < 2.0
+    assert (np.linalg.norm(axes[1:] - axes[:-1], axis=1)).max() < 0.1  # nor does it swing over from pass to pass
+
+
+def test_passes_to_and_fro_are_one_run_where_nothing_is_between_them(tilted):
+    (run,) = tilted.runs
+    assert sum(len(t.points) for t in run) > 1000
+
+
+def test_a_lead_leans_forward_in_passes_of_both_directions():
+    runs, _ = found(LEADING)
+    ways = []
+    for run in runs.runs:
+        tips, axes = (np.vstack(k) for k in zip(*cuts(SimpleNamespace(runs=(run,))), strict=True))
+        along = tips[-1] - tips[0]
+        along /= np.linalg.norm(along)
+        normal = normals_at([(tips, axes)], BALL.radius)[1]
+        assert np.degrees(np.arcsin(((axes - normal) @ along).mean())) == pytest.approx(10.0, abs=1.0)
+        ways.append(along)
+    ways = np.array(ways)
+    assert (ways @ ways[0] > 0.9).sum() > 10 and (ways @ ways[0] < -0.9).sum() > 10
+
+
+def test_an_allowance_is_left_on_all_of_it():
+    left = measured(SURFACE, BALL, cuts(found(allowance=0.2)[0])) - 0.2
+    assert left.max() <= SCALLOP and left.min() > -0.002
+
+
+def test_a_bull_nose_leaves_no_more_in_the_middle_and_cuts_no_deeper():
+    body = tool(8.0, 1.0)
+    left = measured(SURFACE, body, cuts(found(LEADING, body=body)[0])).reshape(120, 120)
+    assert left[12:-12, 12:-12].max() <= SCALLOP and left.min() > -0.01
+
+
+def test_it_goes_round_a_post_and_never_into_it(past_a_post):
+    runs, around = past_a_post
+    for tips, axes in cuts(runs):
+        assert not around.blocked(tips, axes, BALL).any()
+    axes, normals, _ = normals_at(cuts(runs), BALL.radius)
+    lean = np.degrees(np.arccos(np.clip((axes * normals).sum(axis=1), -1.0, 1.0)))
+    assert np.median(lean) == pytest.approx(15.0, abs=0.1)
+    assert lean.max() > 17.0  # somewhere another axis than the one wanted is the nearest that is free
+    assert lean.max() < 15.0 + np.degrees(led.LIMITS.cone) + 1.0
+
+
+def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monkeypatch):
+    def uncut(runs):
+        g = (np.arange(120) + 0.5) / 120 * 40.0 - 20.0
+        x, y = np.meshgrid(g, g, indexing="ij")
+        outside = np.maximum(np.abs(x - 6.5), np.abs(y - 6.5)).ravel() > 2.5 + BALL.radius
+        return int((measured(SURFACE, BALL, cuts(runs))[outside] > SCALLOP).sum())
+
+    monkeypatch.setattr(led, "LIMITS", Limits(1e-4, led.LIMITS.per_mm))
+    assert uncut(past_a_post[0]) < 0.5 * uncut(found(mesh=POST)[0])
+
+
+def test_what_the_machine_cannot_take_is_left_with_the_reason():
+    runs, _ = found(turning=replace(FREE, stands=lambda axes: np.zeros(len(axes), bool)))
+    assert not runs.runs and runs.refused == ("the tool is hardly anywhere free",)
+
+
+def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
+    asked = Leaned(0.1, 0.2, walls=1.0)
+    assert led.asked(None, Form.SHALLOW, BALL) is None
+    assert led.asked(asked, Form.LEVEL, BALL) is None and led.asked(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
+    assert led.asked(asked, Form.SHALLOW, BALL) == asked
+    assert led.asked(asked, Form.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
+    assert led.asked(TILTED, Form.STEEP, BALL) is None
+
+
+def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
+    def zone(name, form, strategy, *reasons, step="S01", body=BALL):
+        return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step=step,
+                               rejected=tuple({"strategy": led.NAME, "reason": r} for r in reasons))
+
+    zones = [zone("Z1", Form.SHALLOW, "led"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
+             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "spiral", step=None),
+             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0))]
+    first, second = upright(TILTED, zones)
+    assert first.subjects == ("Z2", "T1") and "(a reason; another)" in first.message
+    assert second.subjects == ("Z5", "T1") and "no curved face" in second.message
+    assert [c.subjects[0] for c in upright(Leaned(0.0, 0.2, walls=1.0), zones)] == ["Z2", "Z3", "Z5"]
+    assert not upright(None, zones)

@@ -1,0 +1,200 @@
+"""Passes along faces with a ball or bull nose that leans off their normal, led round what is in the way, as motions.
+
+The axis wanted leans by a lead along the pass and a tilt aside of it, off the normal, so that the centre of the nose
+does not rub. Where the tool would meet something with it, or the machine cannot take it, the nearest axes that are free
+are taken, turning evenly along each pass and from one to the next (``toolpath.steering``); where there is none the
+pass breaks off and the rest is left to others. Where the ends of neighbours are close, with nothing in between, the
+tool stays down and walks them to and fro.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import GeometryError
+from geometry.mesh import F64
+from geometry.toolbody import ToolBody
+from toolpath.family import Target
+from toolpath.leaning import LOOK, THICK, Runs, Surroundings, in_turn
+from toolpath.piece import LEAST_PIECE, Piece, places_along
+from toolpath.posed import Axes, Blocked, lead_and_tilt, posed
+from toolpath.settings import CutData, Leaned, PlanSettings
+from toolpath.steering import Limits, Steered, steered
+from toolpath.strategies.isoparametric import Course, Faces, Stretch, course
+from zones.machinable import Form
+from zones.reach import TipField
+
+NAME = "led"
+LAID_SHARE = 0.8  # of the scallop, given to the distance between passes; chords and facets take the rest
+CHORD_SHARE = 0.5  # of the chordal tolerance, given to locations; leaving out poses takes a quarter
+LIMITS = Limits(math.radians(45.0), math.radians(4.0))
+WARY = 0.3  # mm that necks, shanks and holders keep more at stations, for what lies between these and what layers leave
+JOINED = math.radians(15.0)  # the most the axis turns from the end of a pass to the beginning of the next
+APART, ACROSS = 2.0, 0.5  # of the distance between passes, and of the radius: the tool stays down from one to the next
+DIVIDED = 8.0  # of the radius: what is longer and cannot be walked as a whole is walked in halves
+MOST_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
+TRIED = 24  # stretches of a course on which both sides of a tilt are tried
+
+
+@dataclass(frozen=True, eq=False)
+class _Nose:
+    """The nose of a tool on faces, and what it must not meet.
+
+    grown     : the tool with the allowance all round: its tip is lower by that along the axis
+    wary      : whether the tool enters something, with more room than it needs
+    chord     : mm, of its locations
+    """
+
+    tool: ToolBody
+    grown: ToolBody
+    around: Surroundings
+    wary: Blocked
+    allowance: float
+    lift: float
+    scallop: float
+    chord: float
+
+    def blocked(self, tips: F64, axes: F64) -> NDArray[np.bool_]:
+        """(n,) bool: whether the tool cannot be where the grown one has its tip (n, 3), mm."""
+        return self.around.blocked(tips + self.allowance * axes, axes, self.tool)
+
+    def close(self, tips: F64, axes: F64) -> NDArray[np.bool_]:
+        """(n,) bool: the same, with more room round neck, shank and holder."""
+        out = self.blocked(tips, axes)
+        free = np.flatnonzero(~out)
+        out[free] = self.wary(tips[free] + self.allowance * axes[free], axes[free])
+        return out
+
+    def led(self, s: Stretch, wanted: Axes, before: Steered | None) -> tuple[list[Piece], Steered]:
+        """The pieces of a stretch where the tool is free, in the order they are walked, and the axes of all of it.
+
+        Raises
+        ------
+        GeometryError
+            As ``Stretch.stepped``, ``steered`` and ``posed``.
+        """
+        profile, ends = s.stepped(self.grown.corner_radius, self.scallop, self.chord)
+        axes = steered(profile, self.grown, wanted, self.close, LIMITS, before, self.lift)
+        found = posed(profile, ends, self.grown, axes, self.blocked, self.chord, self.lift)
+        if s.turned:
+            found = found.reversed()
+        made = [Piece(tips, axis, axis, self.tool.radius, on_end=True).raised(self.allowance)
+                for tips, axis in found.pieces]
+        return [piece for piece in made if piece.length >= LEAST_PIECE * self.tool.radius], axes
+
+    def free(self, s: Stretch, wanted: Axes) -> float:
+        """How much of a stretch, mm, is free with the axes wanted.
+
+        Raises
+        ------
+        GeometryError
+            As ``Stretch.stepped`` and ``posed``.
+        """
+        profile, ends = s.stepped(self.grown.corner_radius, self.scallop, self.chord)
+        found = posed(profile, ends, self.grown, wanted, self.close, self.chord, self.lift)
+        return profile.length - sum(b - a for a, b in found.left)
+
+
+def asked(leaned: Leaned | None, form: Form, tool: ToolBody) -> Leaned | None:
+    """How a tool is asked to lean on a zone of a form: not on level ones, nor without a corner; None if it is not."""
+    if leaned is None or form is Form.LEVEL or tool.corner_radius <= 0.0:
+        return None
+    if form is not Form.STEEP:
+        return leaned
+    return None if leaned.walls is None else replace(leaned, lead=0.0, tilt=leaned.walls)
+
+
+def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, settings: PlanSettings,
+        around: Surroundings, wary: Blocked, leaned: Leaned) -> Runs:
+    """The passes of a nose that leans, for what of faces is wanted.
+
+    faces  : of the zone, exact
+    target : Target; faces are wanted where its points are
+    field  : TipField of the tool
+    around : Surroundings
+    wary   : whether the tool enters part or fixtures, with ``WARY`` mm more round neck, shank and holder
+    leaned : how far off the normal
+    """
+    tool, spare = field.tool, field.allowance
+    grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
+    nose = _Nose(tool, grown, around, wary, spare, settings.lift, LAID_SHARE * settings.scallop_height,
+                 CHORD_SHARE * settings.chordal_tolerance)
+    planned = course(faces, target, field, nose.scallop, nose.chord, None)
+    refused = list(planned.refused)
+    side = _freer(planned, nose, leaned, refused)
+    found: list[tuple[str, Piece]] = []
+    for group in planned.groups:
+        mine: list[Piece] = []
+        before: dict[bool, Steered] = {}  # with a lead the axes of passes to and fro are not near each other
+        for s in group:
+            way = s.turned and leaned.lead > 0.0
+            try:
+                made, before[way] = nose.led(s, _wanted(s, leaned, side), before.get(way))
+            except GeometryError as refusal:
+                refused.append(refusal.message)
+                continue
+            mine += made
+        found += [(NAME, p) for p in _to_and_fro(mine, nose, max(APART * planned.side_step, ACROSS * tool.radius))]
+    if planned.groups and not found:
+        refused.append("the tool is hardly anywhere free")
+    runs = in_turn(found, tool, cut, settings, around, DIVIDED * tool.radius)
+    return replace(runs, refused=tuple(dict.fromkeys([*refused, *runs.refused])))
+
+
+def _wanted(s: Stretch, leaned: Leaned, side: float) -> Axes:
+    """The axes wanted along a stretch: the nose leans forward the way it is walked, its tilt is on one side of it."""
+    return lead_and_tilt(-leaned.lead if s.turned else leaned.lead, side * leaned.tilt)
+
+
+def _freer(planned: Course, nose: _Nose, leaned: Leaned, refused: list[str]) -> float:
+    """To which side, 1 or -1, a tilt leaves more of the passes free; what cannot be tried is told in ``refused``."""
+    if leaned.tilt == 0.0:
+        return 1.0
+    every = [s for group in planned.groups for s in group]
+    free = np.zeros(2)
+    for s in every[::max(len(every) // TRIED, 1)]:
+        for k, side in enumerate((1.0, -1.0)):
+            try:
+                free[k] += nose.free(s, _wanted(s, leaned, side))
+            except GeometryError as refusal:
+                refused.append(refusal.message)
+    return 1.0 if free[0] >= free[1] else -1.0
+
+
+def _to_and_fro(pieces: Sequence[Piece], nose: _Nose, apart: float) -> list[Piece]:
+    """Pieces joined where the tool can stay down from the end of one to the beginning of the next.
+
+    What stock has to be taken off of in layers stays alone: all that is joined would be walked once a layer.
+
+    apart : mm, the most from one to the next
+    """
+    tool, around = nose.tool, nose.around
+    look = min(LOOK * tool.radius, MOST_LOOK)
+
+    def thick(piece: Piece) -> bool:
+        dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, look))
+        return bool(around.met(dense.tips, dense.axes, tool, THICK * tool.diameter).any())
+
+    out: list[Piece] = []
+    loaded = True
+    for piece in pieces:
+        before, loaded = loaded, thick(piece)
+        if out and not (before or loaded):
+            across = Piece(np.stack([out[-1].tips[-1], piece.tips[0]]), np.stack([out[-1].axes[-1], piece.axes[0]]),
+                           np.stack([out[-1].away[-1], piece.away[0]]), piece.reach, on_end=True)
+            turn = float(np.arccos(np.clip(across.axes[0] @ across.axes[1], -1.0, 1.0)))
+            if across.length <= apart and turn <= JOINED:
+                dense = across.at(places_along(across.tips, across.axes, tool.stickout, look))
+                if not (around.blocked(dense.tips, dense.axes, tool).any() or thick(across)):
+                    tips, axes, away = (np.concatenate([getattr(p, a) for p in (out[-1], piece)])
+                                        for a in ("tips", "axes", "away"))
+                    out[-1] = Piece(tips, axes, away, piece.reach, on_end=True)
+                    continue
+        out.append(piece)
+    return out
+
