@@ -43,6 +43,7 @@ ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than
 STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 LAYER, MOST_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
+WIDENED = 1.5  # of the radius: what a layer of a pass is long, at least, where it goes on before and behind
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 LOADED = "there is more stock in its way than a leaning tool may take off"
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
@@ -119,12 +120,12 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
 
     found   : name of the face and pass, for each
     around  : Surroundings; its stock is taken off
-    divided : mm; what is longer and cannot be walked as a whole is walked in halves
+    divided : mm; what is longer and cannot be walked as a whole is walked in halves; such passes are layered already
     """
     runs: list[tuple[Trajectory, ...]] = []
     refused: list[str] = []
     for name, piece in found:
-        layers = lowered(piece, tool, around) if piece.on_end else [piece]
+        layers = lowered(piece, tool, around) if piece.on_end and math.isinf(divided) else [piece]
         before = around.copied() if len(layers) > 1 else None
         mine: list[tuple[Trajectory, ...]] = []
         for layer in layers:
@@ -203,8 +204,18 @@ def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
     Where not even ``MOST_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
     What a pose is free of, part and fixtures, it stays free of when raised along its axis.
     """
+    return [layer for _, layer in layers_over(piece, tool, around)]
+
+
+def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
+                share: float = LAYER, widened: bool = False) -> list[tuple[int, Piece]]:
+    """The same with how many layers each is raised by, 0 for the pass itself, which is last.
+
+    share   : of what its end may take, a layer
+    widened : a layer that would be too short to be walked goes on before and behind; else it is left out
+    """
     thick = THICK * tool.diameter
-    layer = LAYER * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
+    layer = share * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
     dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     need, todo = np.zeros(len(dense.tips), np.int64), np.arange(len(dense.tips))
     for k in range(MOST_LAYERS + 1):
@@ -216,12 +227,16 @@ def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
     need[todo] = 0
     free = np.ones(len(need), np.bool_)
     free[todo] = False
-    at, out = np.arange(len(need), dtype=np.float64), []
+    at, out = np.arange(len(need), dtype=np.float64), list[tuple[int, Piece]]()
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense.tips, axis=0), axis=1))])
     for k in range(int(need.max()), 0, -1):
         own = np.flatnonzero(binary_dilation(need >= k))
-        through = free & (at >= own[0]) & (at <= own[-1])  # to begin again in the middle of it costs more than to go on
-        out += [part.raised(k * layer) for part in dense.parts(through, at, LEAST_PIECE * tool.radius)]
-    return [*out, piece]
+        low, high = gone[own[0]], gone[own[-1]]
+        more = max(WIDENED * tool.radius - (high - low), 0.0) if widened else 0.0
+        # to begin again in the middle of it costs more than to go on
+        through = free & (gone >= low - more) & (gone <= high + more)
+        out += [(k, part.raised(k * layer)) for part in dense.parts(through, at, LEAST_PIECE * tool.radius)]
+    return [*out, (0, piece)]
 
 
 def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:

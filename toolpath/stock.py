@@ -18,7 +18,7 @@ from geometry.drop import drop_grid
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.kernels.shell import highest_of_four, stands_in
-from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_leaning, standing
+from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.piece import between, places_along
 from toolpath.shell import Shell
 from toolpath.underway import StockNow
@@ -218,7 +218,8 @@ class StockMap:
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Take away what a leaning tool has cut along poses, tips (n, 3) mm and axes (n, 3) unit.
 
-        Of its cutting part cylinders that lie inside, at poses a few lattice steps apart: neither map falls too low.
+        Of its cutting part cylinders that lie inside, and the whole of a ball, at poses a few lattice steps apart: neither
+        map falls too low.
         """
         lat, self._ceilings = self.lattice, None
         spacing = max(APART * lat.step, MOST_POSED * tool.radius)
@@ -230,6 +231,9 @@ class StockMap:
             for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
                 stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
                               np.ascontiguousarray(axes), sides, radius, low, high, shrink)
+        if r == tool.radius:
+            for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
+                stamp_balls(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips + r * axes), r, shrink)
 
     def stands_in(self, tips: F64, axes: F64, flank: Shell, bodies: Shell) -> NDArray[np.bool_]:
         """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.

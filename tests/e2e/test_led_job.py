@@ -39,10 +39,11 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     part = part.union(cq.Workplane().box(3, 3, 12, centered=(True, True, False)).translate((0, 3.5, 0)))
     cq.exporters.export(part, str(folder / "part.step"))
     faces = cq.importers.importStep(str(folder / "part.step")).faces().vals()
-    (number,) = [k for k, f in enumerate(faces, 1) if f.geomType() == "SPHERE"]
+    inner = [f"F{k}" for k, f in enumerate(faces, 1) if np.all(np.abs(f.Center().toTuple()[:2]) < (6.5, 4.5))
+             and f.Center().z > 3.0]  # the hollow and the post
     setup = {"tools": [TOOL], "quality": {"scallop_height_mm": 0.03, "chordal_tolerance_mm": 0.01},
              "material": "AlMgSi1 6082", "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.1}, "machine": MACHINE,
-             "operations": {"lean": {"tilt_deg": 15}, "faces": [f"F{number}"]}}
+             "operations": {"lean": {"tilt_deg": 15}, "faces": inner}}
     return folder / "out", chain.plan(folder / "part.step", parse_setup(json.dumps(setup)), folder / "out", quiet)
 
 
@@ -52,6 +53,10 @@ def test_the_hollow_is_finished_leaning_and_proved(job: tuple[Path, dict[str, An
     zones = [z for z in report["zones"] if z["form"] == "shallow"]
     assert zones and all(z["strategy"] == "led" and z["coverage"] > 0.99 for z in zones)
     assert report["gouge_max_mm"] <= 0.01
+    assert not [w for w in report["warnings"] if w["kind"] == "upright"]
+    own = [s for s in report["steps"] if s["id"] in {i for z in zones for i in z["steps"]}]
+    upright = sum(s["cutting_length_mm"] for s in own if s["strategy"] != "led")
+    assert upright < 0.1 * sum(s["cutting_length_mm"] for s in own)  # what is left in the corners of the post
 
 
 def test_what_was_walked_upright_was_not_asked_for(job: tuple[Path, dict[str, Any]]) -> None:
@@ -70,7 +75,7 @@ def test_the_ball_leans_as_asked_where_it_cuts_the_hollow(job: tuple[Path, dict[
     led = (np.abs(far - (DEEP - R)) < 0.02) & (axes[:, 2] < 0.9999)
     assert led.sum() > 200
     assert np.percentile(np.abs(lean[led] - 15.0), 60) < 0.5
-    assert np.percentile(lean[led], 5) > 5.0  # so its centre does not rub
+    assert np.percentile(lean[led], 2) > 5.0  # so its centre does not rub
     assert lean[led].max() < 15.0 + 45.0 + 1.0
 
 

@@ -83,6 +83,33 @@ def test_a_lattice_too_coarse_to_tell_lets_nothing_through():
     assert asked(block((0.0, 0.0), (1.0, 1.0, 1.0)), [15.0, 15.0, 5.0], LEAN, tool(0.6, 0.1), 0.06)
 
 
+def test_a_leaning_ball_takes_off_all_that_is_in_it_and_no_more():
+    """Against the capsule its nose sweeps, over random places: the lowest of it is known however the ball leans."""
+    body = ball(6.0, neck=20.0, stickout=30.0)
+    stock = block((5.0, 5.0), (25.0, 25.0, 3.0))
+    tips = np.array([[12.0, 7.5, 1.0], [12.0, 22.5, 1.0]])
+    stock.cut_leaning(tips, np.repeat(LEAN, 2, axis=0), body)
+    x, y, z = tips[0] + body.radius * LEAN[0]
+    gx = stock.lattice.x0 + STEP * np.arange(stock.lattice.nx)
+    row = int(round((15.0 - stock.lattice.y0) / STEP))
+    near = np.abs(gx - x) < 2.0
+    lowest = z - np.sqrt(body.radius**2 - (gx[near] - x) ** 2)
+    cusp = 0.002  # poses are taken off two lattice steps apart: STEP² / 2 r
+    assert (lowest < 3.0).all()
+    np.testing.assert_array_less(stock.top[row, near] - lowest, cusp)
+    np.testing.assert_array_less(lowest - 1e-9, stock.top[row, near])
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform(5.0, 25.0, (40_000, 2)), rng.uniform(0.0, 3.0, 40_000)])
+    centre = np.array([x, y, z])
+    beside = points - centre
+    beside[:, 1] = np.where(points[:, 1] < y, points[:, 1] - y, np.maximum(points[:, 1] - 22.5, 0.0))
+    along = beside @ LEAN[0]
+    off = np.linalg.norm(beside - along[:, None] * LEAN[0], axis=1)
+    inside = np.where(along > 0.0, off < body.radius, np.linalg.norm(beside, axis=1) < body.radius)
+    stands = stock.cover[stock.lattice.cells(points)] >= points[:, 2]
+    assert inside.sum() > 1000 and stands[~inside].all()
+
+
 def test_what_a_leaning_flank_takes_off_the_stock_is_gone_and_no_more():
     """Against the cutting part itself, moved along a line of which two poses are given: columns over random places."""
     body = tool(6.0, 1.0, neck=20.0, stickout=30.0)

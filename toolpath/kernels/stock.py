@@ -241,3 +241,33 @@ def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, s
                     continue
                 if under < z <= over:
                     heights[i, j] = tz + under
+
+
+@njit(cache=True, nogil=True)
+def stamp_balls(heights, x0, y0, step, centres, radius, shrink):
+    """Lower heights by balls, one after the other.
+
+    centres : (n, 3) mm; radius : mm; shrink : mm, by which they are made smaller, for heights of cells
+
+    A column is lowered where a ball takes its top: from there down to where the ball leaves it.
+    """
+    ny, nx = heights.shape
+    r = radius - shrink
+    if r <= 0.0:
+        return
+    for k in range(len(centres)):
+        cx, cy, cz = centres[k]
+        i0 = max(int(np.ceil((cy - r - y0) / step)), 0)
+        i1 = min(int(np.floor((cy + r - y0) / step)), ny - 1)
+        j0 = max(int(np.ceil((cx - r - x0) / step)), 0)
+        j1 = min(int(np.floor((cx + r - x0) / step)), nx - 1)
+        for i in range(i0, i1 + 1):
+            dy = y0 + i * step - cy
+            for j in range(j0, j1 + 1):
+                dx = x0 + j * step - cx
+                room = r * r - dx * dx - dy * dy
+                if room <= 0.0:
+                    continue
+                half = np.sqrt(room)
+                if cz - half < heights[i, j] <= cz + half:
+                    heights[i, j] = cz - half

@@ -20,7 +20,7 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
-from toolpath.leaning import LOOK, THICK, Runs, Surroundings, in_turn
+from toolpath.leaning import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.piece import LEAST_PIECE, Piece, places_along
 from toolpath.posed import Axes, Blocked, lead_and_tilt, posed
 from toolpath.settings import CutData, Leaned, PlanSettings
@@ -36,6 +36,7 @@ LIMITS = Limits(math.radians(45.0), math.radians(4.0))
 WARY = 0.3  # mm that necks, shanks and holders keep more at stations, for what lies between these and what layers leave
 JOINED = math.radians(15.0)  # the most the axis turns from the end of a pass to the beginning of the next
 APART, ACROSS = 2.0, 0.5  # of the distance between passes, and of the radius: the tool stays down from one to the next
+LAYER = 0.6  # of what an end may take at once, a layer: cusps and lattice of the stock that one leaves take their share
 DIVIDED = 8.0  # of the radius: what is longer and cannot be walked as a whole is walked in halves
 MOST_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
 TRIED = 24  # stretches of a course on which both sides of a tilt are tried
@@ -127,9 +128,9 @@ def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, s
     planned = course(faces, target, field, nose.scallop, nose.chord, None)
     refused = list(planned.refused)
     side = _freer(planned, nose, leaned, refused)
-    found: list[tuple[str, Piece]] = []
+    passes: list[list[Piece]] = []
     for group in planned.groups:
-        mine: list[Piece] = []
+        passes.append([])
         before: dict[bool, Steered] = {}  # with a lead the axes of passes to and fro are not near each other
         for s in group:
             way = s.turned and leaned.lead > 0.0
@@ -138,11 +139,11 @@ def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, s
             except GeometryError as refusal:
                 refused.append(refusal.message)
                 continue
-            mine += made
-        found += [(NAME, p) for p in _to_and_fro(mine, nose, max(APART * planned.side_step, ACROSS * tool.radius))]
-    if planned.groups and not found:
+            passes[-1] += made
+    if planned.groups and not any(passes):
         refused.append("the tool is hardly anywhere free")
-    runs = in_turn(found, tool, cut, settings, around, DIVIDED * tool.radius)
+    found = _layered(passes, nose, max(APART * planned.side_step, ACROSS * tool.radius))
+    runs = in_turn([(NAME, piece) for piece in found], tool, cut, settings, around, DIVIDED * tool.radius)
     return replace(runs, refused=tuple(dict.fromkeys([*refused, *runs.refused])))
 
 
@@ -166,35 +167,38 @@ def _freer(planned: Course, nose: _Nose, leaned: Leaned, refused: list[str]) -> 
     return 1.0 if free[0] >= free[1] else -1.0
 
 
+def _layered(passes: Sequence[Sequence[Piece]], nose: _Nose, apart: float) -> list[Piece]:
+    """The passes of groups, each group preceded by itself raised, layer by layer, where too much stands over it.
+
+    A layer goes over the whole of a group before the next: what stands beside a pass is in the way of its nose too.
+    """
+    out: list[Piece] = []
+    for group in passes:
+        layers = [layer for piece in group for layer in layers_over(piece, nose.tool, nose.around, LAYER,
+                                                                                widened=True)]
+        for k in sorted({k for k, _ in layers}, reverse=True):
+            out += _to_and_fro([piece for at, piece in layers if at == k], nose, apart)
+    return out
+
+
 def _to_and_fro(pieces: Sequence[Piece], nose: _Nose, apart: float) -> list[Piece]:
     """Pieces joined where the tool can stay down from the end of one to the beginning of the next.
 
-    What stock has to be taken off of in layers stays alone: all that is joined would be walked once a layer.
-
     apart : mm, the most from one to the next
     """
-    tool, around = nose.tool, nose.around
+    tool, out = nose.tool, list[Piece]()
     look = min(LOOK * tool.radius, MOST_LOOK)
-
-    def thick(piece: Piece) -> bool:
-        dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, look))
-        return bool(around.met(dense.tips, dense.axes, tool, THICK * tool.diameter).any())
-
-    out: list[Piece] = []
-    loaded = True
     for piece in pieces:
-        before, loaded = loaded, thick(piece)
-        if out and not (before or loaded):
-            across = Piece(np.stack([out[-1].tips[-1], piece.tips[0]]), np.stack([out[-1].axes[-1], piece.axes[0]]),
-                           np.stack([out[-1].away[-1], piece.away[0]]), piece.reach, on_end=True)
-            turn = float(np.arccos(np.clip(across.axes[0] @ across.axes[1], -1.0, 1.0)))
-            if across.length <= apart and turn <= JOINED:
-                dense = across.at(places_along(across.tips, across.axes, tool.stickout, look))
-                if not (around.blocked(dense.tips, dense.axes, tool).any() or thick(across)):
+        if out:
+            tips, axes, away = (np.stack([getattr(out[-1], a)[-1], getattr(piece, a)[0]])
+                                for a in ("tips", "axes", "away"))
+            across = Piece(tips, axes, away, piece.reach, on_end=True)
+            if across.length <= apart and axes[0] @ axes[1] >= math.cos(JOINED):
+                dense = across.at(places_along(tips, axes, tool.stickout, look))
+                if not nose.around.blocked(dense.tips, dense.axes, tool).any():
                     tips, axes, away = (np.concatenate([getattr(p, a) for p in (out[-1], piece)])
                                         for a in ("tips", "axes", "away"))
                     out[-1] = Piece(tips, axes, away, piece.reach, on_end=True)
                     continue
         out.append(piece)
     return out
-
