@@ -218,8 +218,8 @@ class StockMap:
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Take away what a leaning tool has cut along poses, tips (n, 3) mm and axes (n, 3) unit.
 
-        Of its cutting part cylinders that lie inside, and the whole of a ball, at poses a few lattice steps apart: neither
-        map falls too low.
+        Of its cutting part cylinders that lie inside, and the whole of a ball, at poses a few lattice steps apart:
+        neither map falls too low.
         """
         lat, self._ceilings = self.lattice, None
         spacing = max(APART * lat.step, MOST_POSED * tool.radius)
