@@ -249,6 +249,9 @@ class Engine:
                 self._loop.start()
             self._client = Client(self.settings.scheduler, set_as_default=False, timeout=SCHEDULER_WAIT_S,
                                   loop=self._loop.loop)
+            from service.orderly import OrderlyEnd
+
+            self._client.register_plugin(OrderlyEnd())
             return
         # Both dashboard addresses: without them Dask listens on 0.0.0.0.
         self._cluster = LocalCluster(processes=False, n_workers=1, threads_per_worker=self.settings.workers,
@@ -353,7 +356,7 @@ class Engine:
             if isinstance(future.exception(), AWAY):
                 log.warning("the database was away; the job is taken up again", job=job_id, claim=claim)
                 continue  # its lease runs out
-            error = ResourceError(f"the workers that ran the job were lost ({future.exception()!r})",
+            error = ResourceError(f"the workers that ran the job were lost ({type(future.exception()).__name__})",
                                   code="worker_lost", remedy="look into the log of the workers")
             log.error("task lost", job=job_id, claim=claim, error=str(future.exception()))
             if self.jobs.take_over(job_id, int(claim), self.owner, self.settings.lease_s):

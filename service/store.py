@@ -308,10 +308,11 @@ class JobStore:
                 state="queued", stage="queued", progress=0.0, lease_owner=None, lease_until=None,
                 event_seq=jobs.c.event_seq + 1)).rowcount
 
-    def put_back(self, job_id: str, owner: str) -> bool:
-        """Let a job that ``owner`` holds wait again; the attempt counts."""
+    def put_back(self, job_id: str, owner: str, counts: bool = True) -> bool:
+        """Let a job that ``owner`` holds wait again; counts : whether that was an attempt."""
         return self._change(self._held(job_id, owner), state="queued", stage="queued", progress=0.0, lease_owner=None,
-                            lease_until=None, event_seq=jobs.c.event_seq + 1)
+                            lease_until=None, attempt=jobs.c.attempt - (0 if counts else 1),
+                            event_seq=jobs.c.event_seq + 1)
 
     def miss_deadlines(self) -> int:
         """Fail the jobs that should have ended by now; holders see that they lost them and stop their children."""

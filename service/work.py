@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
+import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping
@@ -28,6 +30,13 @@ from service.supervisor import Limits, supervise
 log = structlog.get_logger(__name__)
 
 PATIENCE_S = 120.0  # beyond it another attempt finds the result that is there
+SHORT_OF = frozenset((errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM))  # what starting a process runs out of
+AGAIN_S = 1.0  # until a process that could not be started is tried again
+
+ending = threading.Event()
+"""Set when the process of this worker is told to end: attempts under way stop and do not count."""
+under_way: set[str] = set()
+"""Holders of the attempts that run in this process."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +80,24 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
         return "unfit"
     if not store.start(job_id, claim, owner, config.lease_s, config.max_attempts):
         return "superseded"
+    under_way.add(owner)
+    try:
+        return _attempted(store, artifacts, config, owner, job_id)
+    finally:
+        under_way.discard(owner)
+
+
+def _attempted(store: JobStore, artifacts: Artifacts, config: WorkConfig, owner: str, job_id: str) -> str:
+    """Run an attempt that was begun to its end; returns what became of it."""
     row, key, summary = store.get(job_id), None, None
     attempt = row["attempt"]
     failure: CamError | None = None
     try:
         state, key, summary = _Attempt(store, artifacts, config, row, owner).run()
     except CancelledError:
+        if ending.is_set() and store.put_back(job_id, owner, counts=False):
+            log.info("this worker ends; the job waits for another", job=job_id, attempt=attempt)
+            return "put back"
         return "stopped"
     except CamError as error:
         failure = error
@@ -180,12 +201,31 @@ class _Attempt:
             "chain": self.config.chain,
         }
         try:
-            state = supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
-                              on_resumed=self._resumed, keep=self._keep)
+            state = self._supervised(request)
             (workspace / "state").write_text(f"{state}\n")
             self.artifacts.commit(workspace, key)
         finally:
             shutil.rmtree(workspace, ignore_errors=True)
+
+    def _supervised(self, request: dict[str, Any]) -> str:
+        """The state a child ends with; where none can be started, for want of handles or processes, it is waited."""
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                return supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
+                                 on_resumed=self._resumed, keep=self._keep)
+            except OSError as error:
+                if error.errno not in SHORT_OF:
+                    raise
+                if time.monotonic() > until:
+                    raise ResourceError(f"the worker could not start a process for {PATIENCE_S:.0f} s "
+                                        f"({error.strerror})", code="worker_exhausted", measured=error.strerror,
+                                        remedy="post it again; who runs the service should look at its limits of open "
+                                               "files, processes and memory") from None
+                log.warning("no process can be started for a job, once more", job=self.row["id"], error=str(error))
+            time.sleep(AGAIN_S)
+            if not self._keep():
+                raise CancelledError("the job was cancelled")
 
     def _progress(self, stage: str, fraction: float) -> None:
         try:
@@ -202,6 +242,8 @@ class _Attempt:
 
     def _keep(self) -> bool:
         """Whether to go on; renews the lease in good time. A database that does not answer is no reason to stop."""
+        if ending.is_set():
+            return False
         try:
             if time.monotonic() - self.renewed < self.config.lease_s / 4:
                 return self.store.is_held(self.row["id"], self.owner)

@@ -133,3 +133,19 @@ def test_two_apis_and_two_workers_lose_nothing_when_one_of_each_is_killed(cluste
     assert [j["state"] for j in ended] == ["proved"] * 8, ended
     assert max(j["attempt"] for j in ended) <= 3 and time.monotonic() - started < 60
     assert second.poll() is None and there.get("/readyz").json()["checks"]["database"] == "ok"
+
+
+def test_a_worker_that_is_told_to_stop_costs_its_job_no_attempt(cluster, post, finish):
+    first = cluster.worker()
+    (_, here), (_, there) = cluster.api(), cluster.api()
+    for client in (here, there):  # the second takes the place of what the first told the worker
+        _until_ready(client)
+    job = post(here, "sleep", key="k").json()
+    while here.get(job["links"]["self"]).json()["stage"] != "asleep":  # claimed is not begun
+        time.sleep(0.1)
+    other = cluster.worker()
+    first.send_signal(signal.SIGTERM)
+    assert first.wait(timeout=6) is not None  # not after the 20 s that the job takes
+    ended = finish(there, job, patience=60)
+    assert (ended["state"], ended["attempt"]) == ("proved", 1), ended
+    assert other.poll() is None

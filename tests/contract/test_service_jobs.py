@@ -1,7 +1,9 @@
 """The life of a job over HTTP."""
 
+import errno
 import hashlib
 import runpy
+import subprocess
 import time
 from pathlib import Path
 
@@ -232,3 +234,30 @@ def test_a_blank_that_is_not_sent_or_not_asked_for_or_no_step_file(client, post,
                          (post(client, setup=setup, stock=b""), "empty_file")):
         assert answer.status_code == 422 and answer.json()["code"] == code, answer.json()
         assert answer.json()["remedy"] and answer.json()["subjects"]
+
+
+def test_a_child_that_cannot_be_started_for_want_of_handles_is_waited_for(client, post, finish, monkeypatch):
+    """Twice there are no handles left, then there are: it is one attempt, and no bug."""
+    popen, left = subprocess.Popen, [errno.EMFILE, errno.EAGAIN]
+
+    def starts(*args, **kwargs):
+        if "service.child" in args[0] and left:
+            raise OSError(left.pop(), "none left")
+        return popen(*args, **kwargs)
+
+    monkeypatch.setattr("service.supervisor.subprocess.Popen", starts)
+    monkeypatch.setattr("service.work.AGAIN_S", 0.1)
+    job = finish(client, post(client, "few handles").json())
+    assert (job["state"], job["attempt"]) == ("proved", 1) and not left
+
+
+def test_a_worker_that_can_start_no_child_at_all_says_so(client, post, finish, monkeypatch):
+    def never(*_args, **_kwargs):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr("service.supervisor.subprocess.Popen", never)
+    monkeypatch.setattr("service.work.AGAIN_S", 0.05)
+    monkeypatch.setattr("service.work.PATIENCE_S", 0.3)
+    job = finish(client, post(client, "no handles").json())
+    assert (job["state"], job["error"]["code"]) == ("failed", "worker_exhausted")
+    assert "limits of open files" in job["error"]["remedy"]
