@@ -171,7 +171,7 @@ class Finish:
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
-        asked = led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
+        asked = any(name == led.NAME for name, _ in leaning)
         upright = [asked and not t.begun_with for t in tries]
         best = min(range(len(tries)), key=lambda k: (not made[k], left[k], upright[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]

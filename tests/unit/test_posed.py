@@ -13,7 +13,7 @@ from toolpath.family import Target
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out
 from toolpath.posed import enters, lead_and_tilt, leaned, posed
-from toolpath.strategies.isoparametric import TrimmedFace, course, laid_leaning
+from toolpath.strategies.isoparametric import TrimmedFace, course
 from verify.removal import Moves, residual_on_normals
 from verify.toolaxes import ToolAxes
 from zones.reach import Clearances, TipField
@@ -96,9 +96,13 @@ def test_a_course_over_a_face_is_walked_leaning_with_the_material_on_the_right()
     field = TipField(tree, body, Clearances(), np.array([points.min(axis=0), points.max(axis=0)]), 5.0, 0.2)
     face = TrimmedFace(3, surface, (np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),), 360.0)
     found = course([face], Target(points, normals, points, 0.5), field, SCALLOP, CHORD, Flank(RADIUS, 0.0))
-    groups, refused = laid_leaning(found, body, leaned(np.radians(15.0)), enters(tree, body, Clearances()), SCALLOP,
-                                   CHORD, 0.003)
-    assert not refused and not any(one.left for group in groups for one in group)
+    free = enters(tree, body, Clearances())
+    groups = []
+    for stretches in found.groups:
+        made = [posed(*s.stepped(RADIUS, SCALLOP, CHORD), body, leaned(np.radians(15.0)), free, CHORD, 0.003)
+                for s in stretches]
+        groups.append([one.reversed() if s.turned else one for s, one in zip(stretches, made, strict=True)])
+    assert not any(one.left for group in groups for one in group)
     pieces = [piece for group in groups for one in group for piece in one.pieces]
     left = left_by(pieces, body, surface)
     assert left.max() <= SCALLOP and left.min() > -1.05 * CHORD

@@ -27,7 +27,6 @@ from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 from toolpath.levels import Line, true_runs
 from toolpath.locations import lifted
-from toolpath.posed import Axes, Blocked, Posed, posed
 from zones.reach import TipField
 
 NAME = "isoparametric"
@@ -286,27 +285,6 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
                     if len(p) > 1]
             lines += [line.reversed() for line in reversed(made)] if s.turned else made
         out.append(lines)
-    return out, tuple(dict.fromkeys(refused))
-
-
-def laid_leaning(planned: Course, tool: ToolBody, axes: Axes, blocked: Blocked, scallop: float, chord: float,
-                 lift: float) -> tuple[list[list[Posed]], tuple[str, ...]]:
-    """The passes of a course with a tool axis of their own at every place, group by group, and why stretches have none.
-
-    axes, blocked : as for ``toolpath.posed.posed``; the others as for ``laid``
-    """
-    out, refused = [], []
-    for group in planned.groups:
-        made: list[Posed] = []
-        for s in group:
-            try:
-                profile, ends = s.stepped(tool.corner_radius, scallop, chord)
-                one = posed(profile, ends, tool, axes, blocked, chord, lift)
-            except GeometryError as refusal:
-                refused.append(refusal.message)
-                continue
-            made.append(one.reversed() if s.turned else one)
-        out.append(made)
     return out, tuple(dict.fromkeys(refused))
 
 
