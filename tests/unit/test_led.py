@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
+from geometry.nurbs import NurbsSurface
 from service.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
@@ -95,6 +96,30 @@ def test_a_lead_leans_forward_in_passes_of_both_directions():
         ways.append(along)
     ways = np.array(ways)
     assert (ways @ ways[0] > 0.9).sum() > 10 and (ways @ ways[0] < -0.9).sum() > 10
+
+
+def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
+    """Two bulging walls back to back, the parameters of one turned round: upwards is left of one's passes, right of the
+    other's, and downwards no tool goes."""
+    knots, at = np.array([0.0, 0, 0, 0, 1, 1, 1, 1]), np.linspace(-10.0, 10.0, 4)
+    y, z = np.meshgrid(at, at[::-1] * 0.5, indexing="ij")
+    control = np.stack([12.0 - 0.02 * y * y, y, z], axis=-1)
+    walls = [NurbsSurface(control, knots, knots, side=-1), NurbsSurface((control * [-1, -1, 1])[::-1], knots, knots)]
+    g = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 24)] * 2), axis=-1).reshape(-1, 2)
+    points, normals = (np.vstack(k) for k in zip(*(w.points_and_normals(g) for w in walls), strict=True))
+    assert (points[:, 0] * normals[:, 0] > 0.0).all()
+    mesh, clear = box_mesh([-30, -30, -40], [30, 30, -30]), Clearances()
+    tree = TriangleTree(mesh)
+    around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
+    runs = led.led([TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)], Target(points, normals, points, 1.0),
+                   SimpleNamespace(tool=BALL, allowance=0.0), CutData(10_000, FEED, 200, 3000, 3.6), settings_of(),
+                   around, enters(tree, BALL, clear), Leaned(0.0, np.radians(65.0), np.radians(65.0)))
+    tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
+    centre = tips + BALL.radius * axes
+    for side in (1.0, -1.0):
+        mine = side * centre[:, 0] > 0.0
+        assert np.linalg.norm(np.diff(centre[mine], axis=0), axis=1).sum() > 500.0
+        np.testing.assert_allclose(np.degrees(np.arccos(axes[mine, 2])), 25.0, atol=3.0)
 
 
 def test_an_allowance_is_left_on_all_of_it():
