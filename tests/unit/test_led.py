@@ -16,6 +16,7 @@ from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
 from toolpath.family import Target
 from toolpath.leaning import Surroundings
+from toolpath.motion import Motion, Trajectory
 from toolpath.posed import enters
 from toolpath.settings import CutData, Leaned
 from toolpath.steering import Limits
@@ -111,9 +112,10 @@ def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
     mesh, clear = box_mesh([-30, -30, -40], [30, 30, -30]), Clearances()
     tree = TriangleTree(mesh)
     around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
-    runs = led.led([TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)], Target(points, normals, points, 1.0),
-                   SimpleNamespace(tool=BALL, allowance=0.0), CutData(10_000, FEED, 200, 3000, 3.6), settings_of(),
-                   around, enters(tree, BALL, clear), Leaned(0.0, np.radians(65.0), np.radians(65.0)))
+    faces = [TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)]
+    runs = led.led(faces, Target(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
+                   CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around, enters(tree, BALL, clear),
+                   Leaned(0.0, np.radians(65.0), np.radians(65.0)))
     tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
     centre = tips + BALL.radius * axes
     for side in (1.0, -1.0):
@@ -171,15 +173,27 @@ def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_
 
 
 def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
-    def zone(name, form, strategy, *reasons, step="S01", body=BALL):
-        return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step=step,
+    def zone(name, form, strategy, *reasons, body=BALL):
+        return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step="S01",
                                rejected=tuple({"strategy": led.NAME, "reason": r} for r in reasons))
 
+    def step(name, strategy, way=30.0):
+        points = np.array([[0.0, 0, 0], [way, 0, 0], [way, 0, 9.0]])
+        return SimpleNamespace(zone=name, strategy=strategy, trajectories=[
+            Trajectory(Motion.CUT, points[:2], FEED), Trajectory(Motion.LIFT, points[1:], FEED)])
+
     zones = [zone("Z1", Form.SHALLOW, "led"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
-             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "spiral", step=None),
-             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0))]
-    first, second = upright(TILTED, zones)
-    assert first.subjects == ("Z2", "T1") and "(a reason; another)" in first.message
-    assert second.subjects == ("Z5", "T1") and "no curved face" in second.message
-    assert [c.subjects[0] for c in upright(Leaned(0.0, 0.2, walls=1.0), zones)] == ["Z2", "Z3", "Z5"]
-    assert not upright(None, zones)
+             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "layers"),
+             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
+             zone("Z7", Form.SHALLOW, "led"), zone("Z8", Form.SHALLOW, "matched", "too slow")]
+    steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "layers"]
+    steps += [step(None, "layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
+    first, second, third, fourth = upright(TILTED, zones, steps)
+    assert first.subjects == ("Z2", "T1") and "stays upright (a reason; another)" in first.message
+    assert (first.measured, first.limit) == (30.0, 15.0)
+    assert second.subjects == ("Z5", "T1") and "no pass lies on it" in second.message
+    assert third.subjects == ("Z7", "T1") and "along 31 of 61 mm it cuts (no axis near is free there)" in third.message
+    assert fourth.subjects == ("Z8", "T1") and "along 90 of 120 mm it cuts (too slow)" in fourth.message
+    asked = Leaned(0.0, 0.2, walls=1.0)
+    assert [c.subjects[0] for c in upright(asked, zones, steps)] == ["Z2", "Z3", "Z5", "Z7", "Z8"]
+    assert not upright(None, zones, steps)
