@@ -15,12 +15,13 @@ from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
 from toolpath.family import Target
-from toolpath.leaning import Surroundings
+from toolpath.leaning import SKIMMED, Surroundings, free_parts
 from toolpath.motion import Motion, Trajectory
+from toolpath.piece import Piece
 from toolpath.posed import enters
 from toolpath.settings import CutData, Leaned
 from toolpath.steering import Limits
-from toolpath.stock import StockMap
+from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.strategies.isoparametric import TrimmedFace
 from zones.machinable import Form
@@ -122,6 +123,21 @@ def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
         mine = side * centre[:, 0] > 0.0
         assert np.linalg.norm(np.diff(centre[mine], axis=0), axis=1).sum() > 500.0
         np.testing.assert_allclose(np.degrees(np.arccos(axes[mine, 2])), 25.0, atol=3.0)
+
+
+def test_a_nose_goes_downhill_where_a_thin_skin_is_under_it_and_nowhere_deeper():
+    """Down along its axis by 1 in 5, into stock with a level top at 0, from 1 mm above it."""
+    x = np.linspace(-5.0, 5.0, 101)
+    up = np.tile([0.0, 0.0, 1.0], (101, 1))
+    piece = Piece(np.column_stack([x, np.zeros(101), -0.2 * x]), up, up, BALL.radius, on_end=True)
+    mesh = box_mesh([-20, -20, -30], [20, 20, -20])
+    tree, clear = TriangleTree(mesh), Clearances()
+    around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.box(
+        tree, np.array([-20.0, -20, -30]), np.array([20.0, 20, 0]), 0.1), (), clear)
+    assert not free_parts(piece, BALL, settings_of(), around)  # so of a matched end, which has no layers for that
+    (part,) = free_parts(piece, BALL, settings_of(), around, skims=True)
+    most = SKIMMED * SKIN * BALL.diameter
+    assert part.tips[0, 0] == -5.0 and -0.5 * most > part.tips[-1, 2] > -most - 1e-9
 
 
 def test_an_allowance_is_left_on_all_of_it():
