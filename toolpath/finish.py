@@ -174,7 +174,7 @@ class Finish:
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
-        asked = led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
+        asked = leans and led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
         way = [upright_way(steps) if asked else 0.0 for steps in made]
         upright = [0 if not asked else round(UPRIGHT * w / max(*way, 1e-9)) if t.begun_with else UPRIGHT + 1
                    for t, w in zip(tries, way, strict=True)]
