@@ -132,7 +132,8 @@ class Caution(ReportModel):
                                            "far they are free, in times their thickness. tool_life: a "
                                            "tool takes more than one cutter, or more than one for a run. "
                                            "center_cutting: a tool that does not cut to its centre goes down into "
-                                           "stock. upright: a tool is asked to lean on a zone and does not.")]
+                                           "stock. upright: a tool is asked to lean on a zone and does not, or not for "
+                                           "half of what it cuts there; measured is how much is cut upright, mm.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, steps, walls.")]
     message: str
     measured: Annotated[float | None, Field(description="In the unit the message says, as limit.")] = None

@@ -180,11 +180,11 @@ class Operations(WireModel):
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Passes over shallow area. auto: zigzag or spiral, whichever is less way.")] = "auto"
     lean: Annotated[Lean | None, Field(
-        description="On a 5-axis machine: balls and bull noses lean that far off the normal of curved faces, so that "
-                    "their centre does not rub; where they would meet something so, by the nearest axis that is free, "
-                    "up to 45 degrees off, turning evenly. Flanks and matched ends go first where they are faster. "
-                    "Where no axis is free, and on level faces, the tool stays upright. null: tools lean where that "
-                    "is faster.")] = None
+        description="On a 5-axis machine: balls and bull noses lean that far off the normal of faces that are not "
+                    "level, so that their centre does not rub; where they would meet something so, by the nearest axis "
+                    "that is free, up to 45 degrees off, turning evenly. Flanks and matched ends go first where they "
+                    "leave as little upright and are faster. Where no axis is free, and on level faces, the tool "
+                    "stays upright. null: tools lean where that is faster.")] = None
     walls_in_turn: Annotated[bool, Field(
         description="Both sides of a wall more than 10 times as high as thick go down in turn, so that it is never "
                     "free for more than 10 times its thickness where it is finished; a program of one access on a "

@@ -18,18 +18,18 @@ from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
 from toolpath.deflection import Bend
-from toolpath.finish import ZonePlan
+from toolpath.finish import LEANING, ZonePlan, upright_way
 from toolpath.life import minutes_in_cut
-from toolpath.motion import Workingstep
+from toolpath.motion import Motion, Workingstep
 from toolpath.ramps import LEAST_RUN
 from toolpath.settings import Leaned
-from toolpath.strategies import flank, led, matched
+from toolpath.strategies import led
 from verify.model import Support
 from zones.model import Wall
 from zones.thinness import slender_walls
 
-LEANING = frozenset((flank.NAME, matched.NAME, led.NAME))
 MOST_REASONS = 3  # a caution says
+MOSTLY = 0.5  # of what a tool that is asked to lean cuts in a zone: where more is upright it is told of
 MOST_RATIO = 10.0
 """Height of a wall over its thickness, above which it is told of."""
 
@@ -105,17 +105,26 @@ def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
             for tool in setup.tools if not tool.center_cutting and tool.id in used]
 
 
-def upright(asked: Leaned | None, zones: Sequence[ZonePlan]) -> list[Caution]:
-    """Zones that are finished by an upright tool although it is asked to lean there, each with the reasons."""
+def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
+    """Zones finished by an upright tool, or mostly so, although it is asked to lean there, each with the reasons."""
     out = []
     for z in zones:
-        if led.asked(asked, z.zone.form, z.zone.tool) is None or z.step is None or z.strategy in LEANING:
+        mine = [s for s in steps if s.zone == z.zone.id]
+        if led.asked(asked, z.zone.form, z.zone.tool) is None or not mine:  # where layers leave nothing there are none
             continue
+        way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is Motion.CUT)
         told = [str(r["reason"]) for r in z.rejected if r["strategy"] == led.NAME]
-        why = "; ".join(told[:MOST_REASONS]) or "it has no curved face, or is finished in bands"
+        if z.strategy not in LEANING:
+            found, without = "stays upright", "it is finished in bands, or no pass lies on it"
+        elif way > MOSTLY * whole:
+            found, without = f"is upright along {way:.0f} of {whole:.0f} mm it cuts", "no axis near is free there"
+        else:
+            continue
+        why = "; ".join(told[:MOST_REASONS]) or without
         out.append(Caution("upright", (z.zone.id, z.zone.tool.id),
-                           f"zone {z.zone.id}: tool {z.zone.tool.id} is asked to lean and stays upright ({why})",
-                           math.nan, math.nan, "give it a slimmer or longer tool, another lean, or leave it as it is"))
+                           f"zone {z.zone.id}: tool {z.zone.tool.id} is asked to lean and {found} ({why})",
+                           way, MOSTLY * whole,
+                           "give it a slimmer or longer tool, another lean, or leave it as it is"))
     return out
 
 

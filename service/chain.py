@@ -140,7 +140,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
     late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps),
-            *uncut_centres(setup, made.steps), *upright(_leaned(setup.operations.lean), made.zones)]
+            *uncut_centres(setup, made.steps), *upright(_leaned(setup.operations.lean), made.zones, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest, stays = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,

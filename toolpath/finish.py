@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -51,6 +51,8 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
+LEANING = frozenset((flank.NAME, matched.NAME, led.NAME))  # strategies of a tool that leans
+UPRIGHT = 10  # of a zone asked to lean that is walked upright, of so many parts: which strategy leaves fewest
 LEAST_AGAIN = 4  # moves of a line that it walks a second time, to be left out
 AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
@@ -145,9 +147,10 @@ class Finish:
         Where passes along the borders of its faces are not much more way than the usual ones, where the flank of a tool
         that leans lies on its walls, or where its tilted end has the curvature of its faces, these are walked as well,
         each until no more than the scallop is left; where noses are asked to lean, passes of one that does as well.
-        What leaves the fewest samples above it stays, of those that leave as many the fastest, but an upright tool
-        only where none leans that is asked to. It stays for the bands below too, and a zone in bands has no leaning
-        passes.
+        What leaves the fewest samples above it stays, of those that leave as many the fastest. Where the tool is asked
+        to lean, an upright one only where none leans, and before the fastest what walks least upright, to a tenth: what
+        passes that lean leave is walked upright too. It stays for the bands below too, and a zone in bands has no
+        leaning passes.
         """
         every = np.ones(len(self.checks.points), np.bool_) if wanted is None else wanted
         if not bool((every & (self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height))).any()):
@@ -171,17 +174,22 @@ class Finish:
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
-        asked = any(name == led.NAME for name, _ in leaning)
-        upright = [asked and not t.begun_with for t in tries]
+        asked = leans and led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
+        way = [upright_way(steps) if asked else 0.0 for steps in made]
+        upright = [0 if not asked else round(UPRIGHT * w / max(*way, 1e-9)) if t.begun_with else UPRIGHT + 1
+                   for t, w in zip(tries, way, strict=True)]
         best = min(range(len(tries)), key=lambda k: (not made[k], left[k], upright[k], seconds[k]))
         rejected = [*tries[best].strategy.rejected, *refused]
         for k, lost in enumerate(tries):
             why: dict[str, object] = {"reason": "no pass is walked", "value": 0, "limit": 0}
             if made[k] and left[k] > left[best]:
                 why = {"reason": "more samples are left above the scallop", "value": left[k], "limit": left[best]}
-            elif made[k] and upright[k] and not upright[best]:
+            elif made[k] and upright[k] > UPRIGHT >= upright[best]:
                 why = {"reason": "the tool is asked to lean and this is upright, s", "value": round(seconds[k], 1),
                        "limit": round(seconds[best], 1)}
+            elif made[k] and upright[k] > upright[best]:
+                why = {"reason": "the tool is asked to lean and more of this is upright, mm", "value": round(way[k], 1),
+                       "limit": round(way[best], 1)}
             elif made[k]:
                 why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[k], 1),
                        "limit": round(seconds[best], 1)}
@@ -506,6 +514,11 @@ def _laid_later(anew: Callable[[], Finish], name: str) -> Rounds:
 def turned(line: Line, settings: PlanSettings) -> Line:
     """A line in climb order, the other way where the setup wants conventional milling."""
     return line if settings.climb or settings.either_way else line.reversed()
+
+
+def upright_way(steps: Iterable[Workingstep]) -> float:
+    """mm that the tool cuts upright in finishing steps."""
+    return sum(t.length for s in steps if s.strategy not in LEANING for t in s.trajectories if t.motion is Motion.CUT)
 
 
 def motions_of(cut: CutData, settings: PlanSettings) -> Motions:

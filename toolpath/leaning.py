@@ -42,6 +42,7 @@ UP_Z = np.array([0.0, 0.0, 1.0])
 ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
 STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
+SKIMMED = 0.75  # of the skin, under what goes down steeper than that all the same: it adds up along a way
 LAYER, MOST_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
 WIDENED = 1.5  # of the radius: what a layer of a pass is long, at least, where it goes on before and behind
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
@@ -142,7 +143,7 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
 def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings, around: Surroundings,
             divided: float) -> tuple[list[tuple[Trajectory, ...]], list[str]]:
     """What of a pass is walked, taken off the stock, and why the rest is not, in words."""
-    todo = free_parts(piece, tool, settings, around)
+    todo = free_parts(piece, tool, settings, around, skims=math.isfinite(divided))
     runs, refused = [], [] if todo else [LOADED]
     while todo:
         part = todo.pop(0)
@@ -212,15 +213,16 @@ def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
     """The same with how many layers each is raised by, 0 for the pass itself, which is last.
 
     share   : of what its end may take, a layer
-    widened : a layer that would be too short to be walked goes on before and behind; else it is left out
+    widened : a layer that would be too short to be walked goes on before and behind; else it is left out. No more is
+              left under the pass than lets it go downhill (``free_parts``)
     """
-    thick = THICK * tool.diameter
+    thick, under = THICK * tool.diameter, SKIMMED * SKIN * tool.diameter if widened else None
     layer = share * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
     dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     need, todo = np.zeros(len(dense.tips), np.int64), np.arange(len(dense.tips))
     for k in range(MOST_LAYERS + 1):
         there = dense.raised(k * layer)
-        todo = todo[around.met(there.tips[todo], there.axes[todo], tool, thick)]
+        todo = todo[around.met(there.tips[todo], there.axes[todo], tool, thick, under)]
         need[todo] = k + 1
         if not len(todo):
             break
@@ -239,12 +241,16 @@ def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
     return [*out, (0, piece)]
 
 
-def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings) -> list[Piece]:
+def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
+               skims: bool = False) -> list[Piece]:
     """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
 
     Over what stands on the floor a flank is raised along its axis. Where it goes down steeper than the ramp, as behind
     what it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill; of a pass
     on the end it is left out.
+
+    skims : a pass on the end goes downhill where no more than most of a skin is under it, as an upright one does: axes
+            that turn less than the surface go down on one side of each wave of it
     """
     thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
 
@@ -261,6 +267,9 @@ def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Sur
         met = binary_dilation(met)
     slope = math.tan(settings.ramp_angle)
     down = _descends(dense, slope, DIP * SKIN * tool.diameter)
+    if skims and down.any():
+        down[down] = around.met(dense.tips[down], dense.axes[down], tool, thick, SKIMMED * SKIN * tool.diameter)
+        down = binary_dilation(down)
     at = np.arange(len(met), dtype=np.float64)
     uphill = [] if piece.on_end else [p.reversed() for p in dense.parts(binary_dilation(down) & ~met, at, least)]
     parts = [*dense.parts(~(met | down), at, least), *(_begun_level(part, slope, least) for part in uphill)]

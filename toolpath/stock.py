@@ -218,8 +218,8 @@ class StockMap:
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Take away what a leaning tool has cut along poses, tips (n, 3) mm and axes (n, 3) unit.
 
-        Of its cutting part cylinders that lie inside, and the whole of a ball, at poses a few lattice steps apart:
-        neither map falls too low.
+        Of its cutting part cylinders that lie inside, and the whole of a ball where flutes are on all of it that is
+        seen from below, at poses a few lattice steps apart: neither map falls too low.
         """
         lat, self._ceilings = self.lattice, None
         spacing = max(APART * lat.step, MOST_POSED * tool.radius)
@@ -232,8 +232,11 @@ class StockMap:
                 stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
                               np.ascontiguousarray(axes), sides, radius, low, high, shrink)
         if r == tool.radius:
+            # from under a ball that leans its side is seen up to there, and above short flutes it does not cut
+            cuts = high >= r * (1.0 + np.sqrt(np.maximum(1.0 - axes[:, 2]**2, 0.0)))
+            centres = np.ascontiguousarray((tips + r * axes)[cuts])
             for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
-                stamp_balls(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips + r * axes), r, shrink)
+                stamp_balls(heights, lat.x0, lat.y0, lat.step, centres, r, shrink)
 
     def stands_in(self, tips: F64, axes: F64, flank: Shell, bodies: Shell) -> NDArray[np.bool_]:
         """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.

@@ -1,5 +1,7 @@
 """Passes of a leaning tool as motions: what the stock lets through, and how fast tip and flank go."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,22 @@ def test_a_leaning_ball_takes_off_all_that_is_in_it_and_no_more():
     inside = np.where(along > 0.0, off < body.radius, np.linalg.norm(beside, axis=1) < body.radius)
     stands = stock.cover[stock.lattice.cells(points)] >= points[:, 2]
     assert inside.sum() > 1000 and stands[~inside].all()
+
+
+def test_a_leaning_ball_takes_nothing_off_above_short_flutes():
+    """A ball with flutes up to its widest place, and a slim neck: leaning flat, most of its lower side cuts nothing."""
+    body = replace(ball(6.0, neck=20.0, stickout=30.0), flute_length=3.2, neck_diameter=2.0)
+    axes = np.tile([np.sin(np.radians(75.0)), 0.0, np.cos(np.radians(75.0))], (2, 1))
+    tips = np.array([[12.0, 7.5, 3.2], [12.0, 22.5, 3.2]])
+    centre = tips[0] + body.radius * axes[0]
+    stock = block((5.0, 5.0), (25.0, 25.0, 3.0))
+    stock.cut_leaning(tips, axes, body)
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform(10.0, 20.0, 20_000), np.full(20_000, 15.0), rng.uniform(0.0, 3.0, 20_000)])
+    beside = points - [centre[0], 15.0, centre[2]]
+    unfluted = (beside @ axes[0] > body.flute_length - body.radius) & (np.linalg.norm(beside, axis=1) < body.radius)
+    assert unfluted.sum() > 1000
+    assert (stock.top[stock.lattice.cells(points)] >= points[:, 2])[unfluted].all()
 
 
 def test_what_a_leaning_flank_takes_off_the_stock_is_gone_and_no_more():

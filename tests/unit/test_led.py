@@ -9,16 +9,19 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
+from geometry.nurbs import NurbsSurface
 from service.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
 from toolpath.family import Target
-from toolpath.leaning import Surroundings
+from toolpath.leaning import SKIMMED, Surroundings, free_parts
+from toolpath.motion import Motion, Trajectory
+from toolpath.piece import Piece
 from toolpath.posed import enters
 from toolpath.settings import CutData, Leaned
 from toolpath.steering import Limits
-from toolpath.stock import StockMap
+from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.strategies.isoparametric import TrimmedFace
 from zones.machinable import Form
@@ -97,6 +100,46 @@ def test_a_lead_leans_forward_in_passes_of_both_directions():
     assert (ways @ ways[0] > 0.9).sum() > 10 and (ways @ ways[0] < -0.9).sum() > 10
 
 
+def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
+    """Two bulging walls back to back, the parameters of one turned round: upwards is left of one's passes, right of the
+    other's, and downwards no tool goes."""
+    knots, at = np.array([0.0, 0, 0, 0, 1, 1, 1, 1]), np.linspace(-10.0, 10.0, 4)
+    y, z = np.meshgrid(at, at[::-1] * 0.5, indexing="ij")
+    control = np.stack([12.0 - 0.02 * y * y, y, z], axis=-1)
+    walls = [NurbsSurface(control, knots, knots, side=-1), NurbsSurface((control * [-1, -1, 1])[::-1], knots, knots)]
+    g = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 24)] * 2), axis=-1).reshape(-1, 2)
+    points, normals = (np.vstack(k) for k in zip(*(w.points_and_normals(g) for w in walls), strict=True))
+    assert (points[:, 0] * normals[:, 0] > 0.0).all()
+    mesh, clear = box_mesh([-30, -30, -40], [30, 30, -30]), Clearances()
+    tree = TriangleTree(mesh)
+    around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
+    faces = [TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)]
+    runs = led.led(faces, Target(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
+                   CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around, enters(tree, BALL, clear),
+                   Leaned(0.0, np.radians(65.0), np.radians(65.0)))
+    tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
+    centre = tips + BALL.radius * axes
+    for side in (1.0, -1.0):
+        mine = side * centre[:, 0] > 0.0
+        assert np.linalg.norm(np.diff(centre[mine], axis=0), axis=1).sum() > 500.0
+        np.testing.assert_allclose(np.degrees(np.arccos(axes[mine, 2])), 25.0, atol=3.0)
+
+
+def test_a_nose_goes_downhill_where_a_thin_skin_is_under_it_and_nowhere_deeper():
+    """Down along its axis by 1 in 5, into stock with a level top at 0, from 1 mm above it."""
+    x = np.linspace(-5.0, 5.0, 101)
+    up = np.tile([0.0, 0.0, 1.0], (101, 1))
+    piece = Piece(np.column_stack([x, np.zeros(101), -0.2 * x]), up, up, BALL.radius, on_end=True)
+    mesh = box_mesh([-20, -20, -30], [20, 20, -20])
+    tree, clear = TriangleTree(mesh), Clearances()
+    around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.box(
+        tree, np.array([-20.0, -20, -30]), np.array([20.0, 20, 0]), 0.1), (), clear)
+    assert not free_parts(piece, BALL, settings_of(), around)  # so of a matched end, which has no layers for that
+    (part,) = free_parts(piece, BALL, settings_of(), around, skims=True)
+    most = SKIMMED * SKIN * BALL.diameter
+    assert part.tips[0, 0] == -5.0 and -0.5 * most > part.tips[-1, 2] > -most - 1e-9
+
+
 def test_an_allowance_is_left_on_all_of_it():
     left = measured(SURFACE, BALL, cuts(found(allowance=0.2)[0])) - 0.2
     assert left.max() <= SCALLOP and left.min() > -0.002
@@ -146,15 +189,27 @@ def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_
 
 
 def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
-    def zone(name, form, strategy, *reasons, step="S01", body=BALL):
-        return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step=step,
+    def zone(name, form, strategy, *reasons, body=BALL):
+        return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step="S01",
                                rejected=tuple({"strategy": led.NAME, "reason": r} for r in reasons))
 
+    def step(name, strategy, way=30.0):
+        points = np.array([[0.0, 0, 0], [way, 0, 0], [way, 0, 9.0]])
+        return SimpleNamespace(zone=name, strategy=strategy, trajectories=[
+            Trajectory(Motion.CUT, points[:2], FEED), Trajectory(Motion.LIFT, points[1:], FEED)])
+
     zones = [zone("Z1", Form.SHALLOW, "led"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
-             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "spiral", step=None),
-             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0))]
-    first, second = upright(TILTED, zones)
-    assert first.subjects == ("Z2", "T1") and "(a reason; another)" in first.message
-    assert second.subjects == ("Z5", "T1") and "no curved face" in second.message
-    assert [c.subjects[0] for c in upright(Leaned(0.0, 0.2, walls=1.0), zones)] == ["Z2", "Z3", "Z5"]
-    assert not upright(None, zones)
+             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "layers"),
+             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
+             zone("Z7", Form.SHALLOW, "led"), zone("Z8", Form.SHALLOW, "matched", "too slow")]
+    steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "layers"]
+    steps += [step(None, "layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
+    first, second, third, fourth = upright(TILTED, zones, steps)
+    assert first.subjects == ("Z2", "T1") and "stays upright (a reason; another)" in first.message
+    assert (first.measured, first.limit) == (30.0, 15.0)
+    assert second.subjects == ("Z5", "T1") and "no pass lies on it" in second.message
+    assert third.subjects == ("Z7", "T1") and "along 31 of 61 mm it cuts (no axis near is free there)" in third.message
+    assert fourth.subjects == ("Z8", "T1") and "along 90 of 120 mm it cuts (too slow)" in fourth.message
+    asked = Leaned(0.0, 0.2, walls=1.0)
+    assert [c.subjects[0] for c in upright(asked, zones, steps)] == ["Z2", "Z3", "Z5", "Z7", "Z8"]
+    assert not upright(None, zones, steps)

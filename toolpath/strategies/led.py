@@ -25,7 +25,7 @@ from toolpath.piece import LEAST_PIECE, Piece, places_along
 from toolpath.posed import Axes, Blocked, lead_and_tilt, posed
 from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.steering import Limits, Steered, steered
-from toolpath.strategies.isoparametric import Course, Faces, Stretch, course
+from toolpath.strategies.isoparametric import Faces, Stretch, course
 from zones.machinable import Form
 from zones.reach import TipField
 
@@ -39,7 +39,7 @@ APART, ACROSS = 2.0, 0.5  # of the distance between passes, and of the radius: t
 LAYER = 0.6  # of what an end may take at once, a layer: cusps and lattice of the stock that one leaves take their share
 DIVIDED = 8.0  # of the radius: what is longer and cannot be walked as a whole is walked in halves
 MOST_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
-TRIED = 24  # stretches of a course on which both sides of a tilt are tried
+TRIED = 12  # stretches of a group on which both sides of a tilt are tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +127,10 @@ def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, s
                  CHORD_SHARE * settings.chordal_tolerance)
     planned = course(faces, target, field, nose.scallop, nose.chord, None)
     refused = list(planned.refused)
-    side = _freer(planned, nose, leaned, refused)
     passes: list[list[Piece]] = []
     for group in planned.groups:
         passes.append([])
+        side = _freer(group, nose, leaned, refused)  # which side that is goes by how the parameters of a face run
         before: dict[bool, Steered] = {}  # with a lead the axes of passes to and fro are not near each other
         for s in group:
             way = s.turned and leaned.lead > 0.0
@@ -152,13 +152,12 @@ def _wanted(s: Stretch, leaned: Leaned, side: float) -> Axes:
     return lead_and_tilt(-leaned.lead if s.turned else leaned.lead, side * leaned.tilt)
 
 
-def _freer(planned: Course, nose: _Nose, leaned: Leaned, refused: list[str]) -> float:
+def _freer(group: Sequence[Stretch], nose: _Nose, leaned: Leaned, refused: list[str]) -> float:
     """To which side, 1 or -1, a tilt leaves more of the passes free; what cannot be tried is told in ``refused``."""
     if leaned.tilt == 0.0:
         return 1.0
-    every = [s for group in planned.groups for s in group]
     free = np.zeros(2)
-    for s in every[::max(len(every) // TRIED, 1)]:
+    for s in group[::math.ceil(len(group) / TRIED)]:
         for k, side in enumerate((1.0, -1.0)):
             try:
                 free[k] += nose.free(s, _wanted(s, leaned, side))
