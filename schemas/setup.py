@@ -160,9 +160,14 @@ class Lean(WireModel):
     lead_deg: Annotated[Number, Field(ge=0, le=60, description="Forwards along the pass, degrees. Over 7 the tool goes "
                                                                "up between passes one way and back.")] = 0.0
     tilt_deg: Annotated[Number, Field(ge=0, le=60, description="Aside of the pass, degrees, to the side where more of "
-                                                               "the passes is free.")] = 15.0
+                                                               "the passes is free.")] = 0.0
     walls_tilt_deg: Annotated[Number | None, Field(
         ge=0, le=89, description="The same on walls, without a lead; null: they are cut upright, or by flanks.")] = None
+
+    @property
+    def asked(self) -> bool:
+        """Whether anything is to lean."""
+        return self.lead_deg > 0 or self.tilt_deg > 0 or self.walls_tilt_deg is not None
 
 
 class Operations(WireModel):
@@ -179,12 +184,12 @@ class Operations(WireModel):
         description="Direction of cut on walls.")] = "climb"
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Passes over shallow area. auto: zigzag or spiral, whichever is less way.")] = "auto"
-    lean: Annotated[Lean | None, Field(
+    lean: Annotated[Lean, Field(
         description="On a 5-axis machine: balls and bull noses lean that far off the normal of faces that are not "
                     "level, so that their centre does not rub; where they would meet something so, by the nearest axis "
                     "that is free, up to 45 degrees off, turning evenly. Flanks and matched ends go first where they "
                     "leave as little upright and are faster. Where no axis is free, and on level faces, the tool "
-                    "stays upright. null: tools lean where that is faster.")] = None
+                    "stays upright. Without lead and tilt tools lean where that is faster.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
         description="Both sides of a wall more than 10 times as high as thick go down in turn, so that it is never "
                     "free for more than 10 times its thickness where it is finished; a program of one access on a "
@@ -247,7 +252,7 @@ class Setup(WireModel):
         if self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
             raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
                              f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")
-        if self.operations.lean is not None and not (self.machine.kind == "5-axis" and self.machine.simultaneous):
+        if self.operations.lean.asked and not (self.machine.kind == "5-axis" and self.machine.simultaneous):
             raise ValueError("operations.lean wants tools to lean while they cut, and the rotary axes of this machine "
                              "do not move then; give machine.kind '5-axis' with machine.simultaneous true, or leave "
                              "operations.lean out")

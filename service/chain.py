@@ -369,9 +369,9 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
                         leaned=_leaned(ops.lean))
 
 
-def _leaned(lean: Lean | None) -> Leaned | None:
+def _leaned(lean: Lean) -> Leaned | None:
     """How noses are asked to lean, in the words of the plan."""
-    if lean is None:
+    if not lean.asked:
         return None
     walls = lean.walls_tilt_deg
     return Leaned(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),

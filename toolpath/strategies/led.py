@@ -106,7 +106,7 @@ def asked(leaned: Leaned | None, form: Form, tool: ToolBody) -> Leaned | None:
     if leaned is None or form is Form.LEVEL or tool.corner_radius <= 0.0:
         return None
     if form is not Form.STEEP:
-        return leaned
+        return leaned if leaned.lead > 0.0 or leaned.tilt > 0.0 else None
     return None if leaned.walls is None else replace(leaned, lead=0.0, tilt=leaned.walls)
 
 
