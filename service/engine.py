@@ -249,15 +249,22 @@ class Engine:
                 self._loop.start()
             self._client = Client(self.settings.scheduler, set_as_default=False, timeout=SCHEDULER_WAIT_S,
                                   loop=self._loop.loop)
-            from service.orderly import OrderlyEnd
-
-            self._client.register_plugin(OrderlyEnd())
+            self._tell_workers()
             return
         # Both dashboard addresses: without them Dask listens on 0.0.0.0.
         self._cluster = LocalCluster(processes=False, n_workers=1, threads_per_worker=self.settings.workers,
                                      memory_limit=0, dashboard_address="127.0.0.1:0",
                                      worker_dashboard_address="127.0.0.1:0")
         self._client = Client(self._cluster, set_as_default=False)
+
+    def _tell_workers(self) -> None:
+        """Tell workers what to do with their jobs when they end; one of an older release may not know how."""
+        from service.orderly import OrderlyEnd
+
+        try:
+            self._client.register_plugin(OrderlyEnd())
+        except Exception as error:  # jobs run all the same
+            log.warning("workers were not told how to end in order", error=f"{type(error).__name__}: {error}")
 
     def _look(self) -> int:
         """Ask the scheduler how many jobs can run at a time.
