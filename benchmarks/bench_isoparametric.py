@@ -45,7 +45,8 @@ from toolpath.locations import FREE, lifted, tips  # noqa: E402
 from toolpath.posed import enters, leaned, posed  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
 from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
-from verify.removal import Moves, residual_on_normals  # noqa: E402
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402
 
 RADIUS, SCALLOP = 5.0, 0.5

@@ -40,8 +40,8 @@ from verify.blank import stock_bounds  # noqa: E402
 from verify.field import Field  # noqa: E402
 from verify.material import machined  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402
+from verify.moves import Moves
 from verify.reader import FEED, read_program  # noqa: E402
-from verify.removal import Moves  # noqa: E402
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,10 @@ from toolpath.direction import best_direction  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
 from toolpath.sidestep import lay_out  # noqa: E402
-from verify.removal import Moves, residual_on_normals  # noqa: E402
-from zones.reach import Clearances, TipField  # noqa: E402
+from verify.moves import Moves
+from verify.removal import residual_on_normals
+from zones.assembly import Clearances
+from zones.reach import TipField
 
 # Table A.1, uv 0.025: radius, scallop, then passes, tool positions and seconds on each surface
 PAPER = {

@@ -36,7 +36,8 @@ from service.convert import parse_setup  # noqa: E402
 from service.prepare import Prepared, placement_of  # noqa: E402
 from toolpath.motion import Motion, Workingstep  # noqa: E402
 from toolpath.strategies.zigzag import Pattern  # noqa: E402
-from verify.removal import Moves, residual_on_normals  # noqa: E402
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from zones.machinable import Form  # noqa: E402
 
 PARALLEL_S = 120

@@ -41,9 +41,10 @@ from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
 from toolpath.posed import enters, lead_and_tilt, posed  # noqa: E402
 from toolpath.steering import Limits, steered  # noqa: E402
-from verify.removal import Moves, residual_on_normals  # noqa: E402
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402
-from zones.reach import Clearances  # noqa: E402
+from zones.assembly import Clearances
 
 LENGTH, HIGH, THICK, WAVE, LESS, SHIFT = 160.0, 30.0, 3.0, 25.0, 4.0, 7.0  # mm
 SCALLOP, CHORD, DEPTH, OFF = 0.02, 0.0025, 0.0025, 0.004  # mm

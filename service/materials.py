@@ -16,7 +16,7 @@ from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup
 from schemas.tools import Tool
 from toolpath.deflection import LAYER_LIMIT, LEAST_FEED, Bending, compliance, effective_diameter, left_by_layers
-from zones.reach import lattice_step
+from zones.lattice import lattice_step
 
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0

@@ -27,7 +27,7 @@ from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
 from toolpath.underway import FinishNow, LayersNow, PlanNow, StockNow, ToolNow, Ways
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
-from zones.reach import Lattice
+from zones.lattice import Lattice
 
 ALIGNED = 64
 CLASSES: dict[str, Any] = {c.__name__: c for c in (

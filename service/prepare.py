@@ -24,15 +24,17 @@ from service.blank import check_against_part
 from service.convert import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
 from service.stock import Blank, blank_of
 from zones.approach import directions_over_hemisphere
+from zones.assembly import Clearances
 from zones.categories import Categories
 from zones.decompose import decompose
 from zones.fixtures import AIR
+from zones.lattice import lattice_step
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
 from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches
 from zones.planview import ChannelPlan
-from zones.reach import Clearances, DiscHeights, TipField, lattice_step
+from zones.reach import DiscHeights, TipField
 from zones.regions import Regioner
 from zones.sight import Reach
 from zones.view import View, access_rotation, turned, turned_samples

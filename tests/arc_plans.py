@@ -9,7 +9,7 @@ import numpy as np
 from output.arcs import fitted
 from output.model import Frame, Workplan
 from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
-from toolpath.levels import thinned
+from toolpath.lines import thinned
 from toolpath.motion import Motion, Trajectory
 
 HALF = 0.0025

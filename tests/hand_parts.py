@@ -22,10 +22,12 @@ from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.isoparametric import TrimmedFace
 from toolpath.strategies.zigzag import Pattern
+from zones.assembly import Clearances
+from zones.lattice import lattice_step
 from zones.machinable import machinable_faces
 from zones.model import Decomposition
 from zones.planview import ChannelPlan
-from zones.reach import Clearances, TipField, lattice_step
+from zones.reach import TipField
 from zones.regions import Labels, Regioner
 from zones.view import View
 from zones.zoning import ZoneArea, build_zones

@@ -19,7 +19,7 @@ from geometry.toolbody import ToolBody
 from verify.field import Field
 from verify.material import machined
 from verify.model import ProofSetup
-from verify.removal import BOW, Moves
+from verify.moves import BOW, Moves
 from verify.toolaxes import ToolAxes
 
 from .hand_parts import box_mesh

@@ -22,7 +22,8 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.engaged import LOOK, SKIN_SHARE, SURE, over_limit
 from toolpath.inwards import NARROW, Inwards
-from toolpath.levels import Line, dense, moves_free, pieces_where, thinned
+from toolpath.levels import moves_free
+from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.linking import Linker
 from toolpath.ramps import RAMP_SHARE
 

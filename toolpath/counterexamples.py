@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.bands import HighWall
-from toolpath.levels import dense
+from toolpath.lines import dense
 
 CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much
 CAREFUL = 1.0  # of the radius round a place, in plan, within which a line is one that goes there

@@ -16,7 +16,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.engaged import engaged
-from toolpath.levels import Line, dense, pieces_where
+from toolpath.lines import Line, dense, pieces_where
 from toolpath.stock import StockMap
 
 UNBOUNDED = math.pi  # rad: the whole front half may be in stock

@@ -26,11 +26,13 @@ from toolpath.engaged import UNBOUNDED
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
 from toolpath.leaning import TURN_S, Runs, Surroundings
-from toolpath.levels import Line, serving, thinned, true_runs
+from toolpath.levels import serving
+from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking import Linker
 from toolpath.motion import Motion, Trajectory, Workingstep
 from toolpath.order import nearest_order
-from toolpath.posed import Blocked, enters
+from toolpath.posed import enters
+from toolpath.poses import Blocked
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings

@@ -34,9 +34,9 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.isoparametric import Laid
-from toolpath.levels import true_runs
+from toolpath.lines import true_runs
 from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
-from toolpath.posed import Blocked
+from toolpath.poses import Blocked
 from toolpath.residual import leaning_depths
 
 STATIONS = 65  # along a wall, at which s is looked for

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.levels import thinned, true_runs
+from toolpath.lines import thinned, true_runs
 
 SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
 STEEPEST = 4.0

@@ -19,15 +19,15 @@ from scipy.ndimage import binary_dilation
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.leads import arc_onto, radii
-from toolpath.levels import dense, true_runs
+from toolpath.lines import dense, true_runs
 from toolpath.motion import Motion, Trajectory
-from toolpath.piece import LEAST_PIECE, Piece, places_along, raised_poses, thinned_poses
-from toolpath.posed import Blocked
+from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.poses import Blocked, places_along
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.shell import shells
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
-from zones.reach import Clearances, Disc
+from zones.assembly import Clearances, Disc
 
 TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most

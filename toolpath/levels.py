@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,59 +23,13 @@ from toolpath.kernels.contour import (
     linear_crossings,
     place_crossings,
     refine,
-    thin,
     trace,
 )
+from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 LEAST_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
 BISECTIONS = 9  # a crossing is placed to step / 2**9
-SAME_PLACE = 1e-6  # mm
-BESIDE = 0.1234  # of that
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A line of tip positions, in climb order (free side on the left where it follows a wall).
-
-    points : (n, 3) float64, mm; a closed line repeats its first point
-    closed : bool
-    """
-
-    points: F64
-    closed: bool
-
-    @property
-    def length(self) -> float:
-        """Length, mm."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
-
-    def reversed(self) -> Line:
-        """The same line walked the other way."""
-        return Line(np.ascontiguousarray(self.points[::-1]), self.closed)
-
-
-def thinned(points: F64, tolerance: float) -> F64:
-    """A polyline (n, 3) with points left out while the rest stays within ``tolerance`` mm of it."""
-    points = np.ascontiguousarray(points)
-    keep = np.zeros(len(points), np.bool_)
-    thin(points, tolerance, keep)
-    return np.ascontiguousarray(points[keep])
-
-
-def place_keys(points: F64) -> list[bytes]:
-    """A key for each of points (n, k), mm, that is the same for places rounded differently.
-
-    Lines cut from a lattice lie on its nice fractions: the borders of what is one place are put beside them.
-    """
-    return [row.tobytes() for row in np.floor(points / SAME_PLACE + BESIDE).astype(np.int64)]
-
-
-def dense(points: F64, spacing: float) -> F64:
-    """A polyline (n, 3) with points put in between, at most ``spacing`` mm apart along it."""
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
-    return np.column_stack([np.interp(more, s, points[:, c]) for c in range(3)])
 
 
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
@@ -285,12 +238,6 @@ def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
     return [Line(points[a:b + 1], False) for a, b in true_runs(ok)]
 
 
-def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Half-open ranges [a, b) of indices with consecutive True values of flags (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def serving(lines: Sequence[Line], tips: F64, reach: float, spacing: float, overrun: float, link: float) -> list[Line]:
     """Lines as far as they come within ``reach`` mm of some tips, and ``overrun`` mm more.
 
@@ -303,44 +250,3 @@ def serving(lines: Sequence[Line], tips: F64, reach: float, spacing: float, over
         way = Line(dense(line.points, spacing), line.closed)
         out.extend(pieces_where(way, tree.query(way.points[:, :k])[0] <= reach, overrun, link))
     return out
-
-
-def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: float) -> list[Line]:
-    """Cut a line to the points that are wanted, each piece made longer and near pieces joined.
-
-    wanted : (n,) bool for the points of the line
-    extend : mm added along the line at both ends of a piece
-    join   : mm, pieces nearer than this along the line become one
-    """
-    if not wanted.any():
-        return []
-    points = line.points
-    if line.closed:
-        n = len(points) - 1
-        if wanted[:-1].all():
-            return [line]
-        # begin in the middle of the longest unwanted stretch, so that no piece is cut at the arbitrary start
-        order = (np.arange(n) + int(np.argmax(wanted[:-1]))) % n
-        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[[*order, order[0]]], axis=0), axis=1))])
-        a, b = max(true_runs(~wanted[order]), key=lambda run: float(at[run[1]] - at[run[0]]))
-        shift = int(order[(a + b) // 2])
-        order = np.concatenate([np.arange(shift, n), np.arange(0, shift + 1)])
-        points, wanted = points[order], wanted[order]
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    spans: list[list[float]] = []
-    for a, b in true_runs(wanted):
-        lo, hi = s[a] - extend, s[b - 1] + extend
-        if spans and lo - spans[-1][1] < join:
-            spans[-1][1] = hi
-        else:
-            spans.append([lo, hi])
-    if line.closed and len(spans) == 1 and spans[0][1] - spans[0][0] >= s[-1] - join:
-        return [line]
-    return [Line(stretch(points, s, max(lo, 0.0), min(hi, s[-1])), False) for lo, hi in spans]
-
-
-def stretch(points: F64, s: F64, low: float, high: float) -> F64:
-    """A polyline (n, 3), mm, from ``low`` to ``high`` mm along it; s : (n,) mm, how far along its points are."""
-    inner = points[(s > low) & (s < high)]
-    ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (low, high)])
-    return np.vstack([ends[:1], inner, ends[1:]])

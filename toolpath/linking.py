@@ -30,7 +30,7 @@ from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
 from toolpath.leads import arcs_along
-from toolpath.levels import Line, dense, pieces_where, thinned
+from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down

@@ -18,7 +18,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.follow import STEEPEST, Limit
 from toolpath.forward import Profile
-from toolpath.levels import thinned, true_runs
+from toolpath.lines import thinned, true_runs
 
 FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
 LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.levels import Line
+from toolpath.lines import Line
 
 
 def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:

@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.engaged import SKIN_SHARE, angles
-from toolpath.levels import stretch
+from toolpath.lines import stretch
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
 
 GUARD = 0.1  # of the diameter, and two lattice steps at least, before and after stock: as slow as in it

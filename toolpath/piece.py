@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
-from toolpath.levels import true_runs
-from toolpath.posed import Blocked
+from toolpath.lines import true_runs
+from toolpath.poses import Blocked, between
 
 RAISES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the radius, along the axis, where the end of the tool is in the way
 RISE = 0.3  # mm a mm: how fast a pass is raised and lowered again
@@ -70,32 +70,6 @@ class Piece:
     def top(self) -> float:
         """mm, the highest place of the flank at work."""
         return float((self.tips[:, 2] + self.reach * self.axes[:, 2]).max())
-
-
-def places_along(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
-    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up.
-
-    tips, axes : (n, 3) float64, mm and unit
-    """
-    gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
-    counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
-    return np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
-
-
-def between(tips: F64, axes: F64, places: F64) -> tuple[F64, F64]:
-    """Tips and axes (m, 3) at ``places_along``: tips straight between poses, axes evenly on the great circle.
-
-    tips, axes : (n, 3) float64, mm and unit; places : (m,) numbers of poses with fractions
-    """
-    k = np.clip(places.astype(np.int64), 0, max(len(tips) - 2, 0))
-    share = (places - k)[:, None]
-    after = np.minimum(k + 1, len(tips) - 1)
-    a, b = axes[k], axes[after]
-    turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        before, beyond = (np.where(turn > 1e-6, np.sin(s * turn) / np.sin(turn), s) for s in (1.0 - share, share))
-    axis = before * a + beyond * b
-    return (1.0 - share) * tips[k] + share * tips[after], axis / np.linalg.norm(axis, axis=1, keepdims=True)
 
 
 def thinned_poses(tips: F64, axes: F64, reach: float, tolerance: float) -> NDArray[np.int64]:

@@ -12,7 +12,6 @@ keeps what ``toolpath.forward`` gave it. Where a field jumps, no number of locat
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,20 +23,20 @@ from geometry.mesh import F64
 from geometry.tilted import axis_frames, blocked_along
 from geometry.toolbody import ToolBody
 from toolpath.forward import Profile
-from toolpath.levels import true_runs
+from toolpath.lines import true_runs
 from toolpath.locations import LOOK, OFFS, chorded, contacts, sides, tips
+from toolpath.poses import Axes, Blocked, angles_between
 from zones.approach import assembly
-from zones.reach import LEVEL_TOLERANCE, Clearances
+from zones.assembly import Clearances
+from zones.reach import LEVEL_TOLERANCE
 
 SWING_SHARE = 0.1  # of the chordal tolerance: what turning between two locations may add
 ROUNDS = 16  # of halving ways between which the axis turns too much
 MOST_PARTS = 1000  # a step is divided into at most so many
 FADES = 0.2  # of a normal across Z: where it is less a leaning tool leans less
 
-Axes = Callable[[F64, F64, F64], F64]
 """Tool axes (k, 3), unit, at contacts (k, 3) mm with normals and ways along the pass (k, 3), both unit."""
 
-Blocked = Callable[[F64, F64], NDArray[np.bool_]]
 """(k,) bool: whether the tool enters something, with its tip at (k, 3) mm and axes (k, 3)."""
 
 
@@ -168,12 +167,6 @@ def wanted_axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
         raise GeometryError(f"there is no tool axis at ({at})", code="bad_axis", subjects=(f"({at})",),
                             measured=None, limit="finite", remedy="give an axis of any length but zero everywhere")
     return contact, normal, axis
-
-
-def angles_between(axis: F64) -> F64:
-    """(k - 1,) rad between neighbouring axes (k, 3)."""
-    cross = np.linalg.norm(np.cross(axis[1:], axis[:-1]), axis=1)
-    return np.asarray(np.arctan2(cross, (axis[1:] * axis[:-1]).sum(axis=1)))
 
 
 def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first: F64 | None = None) -> F64:

@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.kernels.skins import near
 from toolpath.residual import ResidualMap
-from zones.reach import Clearances, Disc
+from zones.assembly import Clearances, Disc
 
 
 class Skins:

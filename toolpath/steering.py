@@ -32,9 +32,10 @@ from geometry.mesh import F64
 from geometry.tilted import axis_frames
 from geometry.toolbody import ToolBody
 from toolpath.forward import Profile
-from toolpath.levels import true_runs
+from toolpath.lines import true_runs
 from toolpath.locations import sides, tips
-from toolpath.posed import Axes, Blocked, angles_between, wanted_axes
+from toolpath.posed import wanted_axes
+from toolpath.poses import Axes, Blocked, angles_between
 
 SPACING = 0.5  # mm between stations, at most
 FAN = np.radians(4.0)  # between neighbouring axes of a fan
@@ -67,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Steered:
-    """The field of axes of one pass; it can be asked for axes as any other (``toolpath.posed.Axes``).
+    """The field of axes of one pass; it can be asked for axes as any other (``toolpath.poses.Axes``).
 
     contact : (m, 3) float64, mm, its stations, evenly spaced
     axis    : (m, 3) float64, unit, tip to spindle

@@ -19,10 +19,11 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
-from toolpath.piece import between, places_along
+from toolpath.poses import between, places_along
 from toolpath.shell import Shell
 from toolpath.underway import StockNow
-from zones.reach import Disc, Lattice
+from zones.assembly import Disc
+from zones.lattice import Lattice
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
 POOLED = 12  # nodes a side of the squares whose highest stock is kept

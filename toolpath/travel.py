@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
-from toolpath.levels import dense, stretch
+from toolpath.lines import dense, stretch
 from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import GUARD
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from toolpath.levels import Line, dense, pieces_where, place_keys
-from zones.reach import Lattice
+from toolpath.lines import Line, dense, pieces_where, place_keys
+from zones.lattice import Lattice
 
 WRITTEN = 1e-4  # mm, to which programs are rounded: what is the same there is the same
 OVERLAP = 3  # known moves of a line walked once more on each side, less than the proof takes for a stretch run twice

@@ -12,9 +12,10 @@ from geometry.toolbody import ToolBody
 from verify.bodies import Bodies
 from verify.kernels.clash import clash_chunk
 from verify.model import ProofSetup
+from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.pointtree import PointTree
-from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
 from verify.stockpass import event_table, free_rapids, gather, noted
+from verify.tiles import run_tiles
 from verify.toolaxes import ToolAxes
 
 FIXTURE_SPACING = 0.25

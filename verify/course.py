@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64, I32
-from verify.cycles import FEED, RAPID
 from verify.dividing import MOST_TURN
 from verify.kinematics import Kinematics
 from verify.log import MOST_MOVES
+from verify.move_kinds import FEED, RAPID
 from verify.program import Poses, Program, Remark, Stop
 
 SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended

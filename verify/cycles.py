@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-RAPID, FEED = 0, 1
+from verify.move_kinds import FEED, RAPID
+
 PECK_LIFT = 0.254
 MOVES_A_PECK = 3
 MOVES_A_HOLE = 5

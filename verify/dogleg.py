@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from verify.findings import Source
 from verify.model import Finding, FindingKind
-from verify.removal import Moves
+from verify.moves import Moves
 from verify.toolaxes import ToolAxes
 
 STILL = 1e-9

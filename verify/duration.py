@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.timing import Rates, move_seconds
-from verify.cycles import RAPID
 from verify.model import ProofSetup, Spent
+from verify.move_kinds import RAPID
 from verify.program import Program
 
 RAPID_TURN = float(np.radians(7200.0))

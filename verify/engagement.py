@@ -13,7 +13,7 @@ from geometry.toolbody import ToolBody
 from verify.findings import Source, chains, worst_of
 from verify.kernels.engaged import FRONT, window_angles
 from verify.model import Engagement, Finding, FindingKind
-from verify.removal import Moves
+from verify.moves import Moves
 from verify.stockpass import parts
 from verify.toolaxes import sector_frames
 

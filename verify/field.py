@@ -24,7 +24,7 @@ from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
 from verify.model import ProofSetup, StockKind
-from verify.removal import BOW, Moves, Progress, cutter_table, run_tiles
+from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.stockpass import (
     StockPass,
     descents,
@@ -36,6 +36,7 @@ from verify.stockpass import (
     parts,
     tables_for,
 )
+from verify.tiles import run_tiles
 from verify.toolaxes import ToolAxes, sector_frames
 
 F32 = NDArray[np.float32]

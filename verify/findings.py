@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
-from verify.removal import Moves
+from verify.moves import Moves
 
 MOST = 200
 OF_A_KIND = MOST // len(FindingKind)

@@ -4,51 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from verify.blank import stock_bounds
-from verify.cycles import FEED
+from verify.clear_height import UP, Z_AXIS, _top_along, top_of_all
 from verify.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
+from verify.move_kinds import FEED
 from verify.program import Program
 from verify.table import UPRIGHT, lowest_places
 
-UP = np.array([0.0, 0.0, 1.0])
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
-Z_AXIS = 4
 HALF_A_TURN = 180.0 + 1e-6  # deg, and rounding
 LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
 RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from decimals
-
-
-def top_of_all(bounds: F64, setup: ProofSetup) -> float:
-    """Height that neither part (bounds (2, 3), mm), stock nor fixtures exceed before the first cut, mm."""
-    return _top_along(UP, bounds, setup)
-
-
-def _top_along(axis: F64, bounds: F64, setup: ProofSetup) -> float:
-    """How far along a direction (3,) the boxes round part, blank and fixtures reach, mm."""
-    boxes = [bounds, stock_bounds(bounds, setup), *(np.asarray(f, dtype=np.float64) for f in setup.fixtures)]
-    return max(float(np.where(axis > 0, b[1] * axis, b[0] * axis).sum()) for b in boxes)
-
-
-def from_above(program: Program, height: float) -> Program:
-    """The program with every descent that only lacks the height it starts from begun at ``height`` mm, or higher.
-
-    Start, home and tool change are above everything, so that is where the tool comes from, and the way down is
-    simulated like any other. Other unknown starts are left to ``way_findings``.
-    """
-    start, minutes = program.start.copy(), program.minutes.copy()
-    for move, axes in program.unknown.tolist():
-        if axes == Z_AXIS and (start[move, :2] == program.end[move, :2]).all():
-            start[move, 2] = max(height, program.end[move, 2])
-            minutes[move] = (start[move, 2] - program.end[move, 2]) / program.feed[move]
-    return replace(program, start=start, minutes=minutes)
 
 
 def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: ProofSetup) -> list[Finding]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
-from verify.cycles import FEED
+from verify.move_kinds import FEED
 from verify.posing import TurnLog
 from verify.program import Pause, Remark, Stop
 

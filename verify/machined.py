@@ -21,8 +21,8 @@ from verify.duration import minutes_of
 from verify.field import Field, run_field, stock_field
 from verify.material import machined
 from verify.model import ProofSetup, StockKind
+from verify.moves import BOW
 from verify.progress import Stages
-from verify.removal import BOW
 from verify.sequence import Given, Reading, check_numbers, moves_of, read_all
 
 LEAST_STEP = 0.002

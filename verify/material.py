@@ -12,13 +12,13 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.toolbody import ToolBody
 from verify.blank import stands_over_air
 from verify.clash import fixture_points, run_clashes
+from verify.clear_height import top_of_all
 from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
-from verify.fitness import top_of_all
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import ProofSetup
+from verify.moves import Moves
 from verify.progress import Report, Stages
-from verify.removal import Moves
 from verify.stock import blank, run_bodies, run_stock
 from verify.stockpass import StockPass, end_radii, free_rapids, parts
 from verify.toolaxes import ToolAxes

@@ -8,9 +8,10 @@ import math
 import numpy as np
 
 from verify.arcs import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
-from verify.cycles import FEED, RAPID, Hole, Out, hole_moves
+from verify.cycles import Hole, Out, hole_moves
 from verify.dividing import TIP
 from verify.log import MOST_MOVES_A_BLOCK
+from verify.move_kinds import FEED, RAPID
 from verify.origins import Origins
 from verify.program import NAN
 from verify.rotary import between

@@ -47,9 +47,10 @@ from verify.model import (
     Support,
     ZoneProof,
 )
+from verify.moves import BOW, Moves
 from verify.progress import Report, Stages
 from verify.reader import Program
-from verify.removal import BOW, Moves, residual_on_normals
+from verify.removal import residual_on_normals
 from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of

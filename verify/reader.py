@@ -21,12 +21,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
-from verify.cycles import FEED, RAPID
 from verify.dialects import DIALECTS, LINUXCNC, spelt
 from verify.flow import Flow, has_flow
 from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
 from verify.motion import Motion
+from verify.move_kinds import FEED, RAPID
 from verify.program import NAN, Program, Remark
 from verify.progress import Report, silent
 from verify.served import served

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from verify.findings import Source
 from verify.model import Finding, FindingKind
-from verify.removal import Moves
+from verify.moves import Moves
 
 LEAST_LINES = 4
 WINDOW = 8

@@ -13,10 +13,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from verify.cycles import FEED, RAPID
 from verify.dividing import axis_pieces, tip_pieces
 from verify.kinematics import Kinematics
 from verify.log import Log
+from verify.move_kinds import FEED, RAPID
 from verify.program import NAN, State
 
 TURNED = 8

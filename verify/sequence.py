@@ -13,12 +13,13 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.toolbody import ToolBody
 from verify.blank import stock_bounds
+from verify.clear_height import from_above, top_of_all
 from verify.findings import Source
-from verify.fitness import from_above, limit_findings, notes_on, top_of_all, way_findings
+from verify.fitness import limit_findings, notes_on, way_findings
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
+from verify.moves import Moves
 from verify.progress import Report, Stages
 from verify.reader import FEED, Program, read_program
-from verify.removal import Moves
 from verify.stepnc import is_stepnc, read_stepnc
 from verify.toolaxes import ToolAxes
 

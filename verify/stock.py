@@ -35,8 +35,8 @@ from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import stock_tile
 from verify.model import ProofSetup, StockKind
+from verify.moves import Moves, Progress, cutter_table
 from verify.progress import Stages
-from verify.removal import CellGrid, Moves, Progress, cutter_table, run_tiles
 from verify.stockpass import (
     StockPass,
     descents,
@@ -49,6 +49,7 @@ from verify.stockpass import (
     tables_for,
     ways_before,
 )
+from verify.tiles import CellGrid, run_tiles
 
 MAX_LINES = 6_000_000
 BLOCK = 32

@@ -14,7 +14,7 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from verify.kernels.clash import ASIDE
 from verify.kernels.engaged import WINDOW
-from verify.removal import Moves
+from verify.moves import Moves
 
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm

@@ -22,8 +22,9 @@ from geometry.toolbody import ToolBody
 from verify.blank import stock_on_normals
 from verify.findings import Source
 from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support
+from verify.moves import Moves
 from verify.progress import Report, silent
-from verify.removal import Moves, residual_on_normals
+from verify.removal import residual_on_normals
 from verify.scoring import RAY_ERROR
 from verify.slender import ThinWalls, thin_walls
 

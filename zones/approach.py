@@ -19,8 +19,9 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64
 from geometry.tilted import axis_frames, blocked_along
 from geometry.toolbody import ToolBody
+from zones.assembly import Clearances, discs_of
 from zones.machinable import LEVEL, SEEN
-from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, Clearances, contact_tips, discs_of
+from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 AT_ONCE = 400_000  # pairs of sample and direction asked in one go

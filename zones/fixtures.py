@@ -11,8 +11,10 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
+from zones.assembly import Clearances
+from zones.lattice import lattice_step
 from zones.machinable import SEEN
-from zones.reach import Clearances, DiscHeights, TipField, lattice_step
+from zones.reach import DiscHeights, TipField
 
 SKIN = 0.02  # mm off the surface where a ray upward starts
 AIR = 4.0  # mm beside the part, beyond the cutter's radius

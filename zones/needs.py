@@ -17,9 +17,11 @@ from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.toolbody import ToolBody
+from zones.assembly import Clearances
 from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
 from zones.fixtures import over_the_part
-from zones.reach import LEVEL_TOLERANCE, Clearances, TipField, lattice_step, touchable
+from zones.lattice import lattice_step
+from zones.reach import LEVEL_TOLERANCE, TipField, touchable
 from zones.sight import able
 from zones.view import View
 

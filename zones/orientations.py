@@ -22,7 +22,7 @@ from geometry.sampling import SurfaceSamples
 from geometry.tilted import axis_frames
 from geometry.toolbody import ToolBody
 from zones.approach import approach, directions_over_hemisphere, resolution_of
-from zones.reach import Clearances
+from zones.assembly import Clearances
 from zones.sight import able
 
 DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most

@@ -110,7 +110,6 @@ class Pieces:
         return out
 
 
-
 def turn_between(a: F64, b: F64) -> F64:
     """Signed angle between unit directions, positive to the left.
 

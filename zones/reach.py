@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,120 +27,19 @@ from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
+from zones.assembly import Clearances, Disc, discs_of
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
+from zones.lattice import Lattice
 from zones.machinable import LEVEL, SEEN
 
 LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
-FRUSTUM_SLICES = 6
 EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
 BELOW = 1.0  # mm: a tip is never asked about farther under the obstacles than this and its own radius
 AIMED = 12  # free nodes a flat bottom is tried towards over a level place
 BEYOND = 3.0  # lattice steps outside the flat: how far these may be
 INSIDE = 1.5e-3  # mm: a flat bottom is not asked to reach nearer than this to its own rim: lines are off by so much
 PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
-
-
-def lattice_step(tool: ToolBody) -> float:
-    """Spacing of the planning lattice of a tool, mm.
-
-    A free strip as wide as ``PLAY_STEPS`` of these is connected on the lattice whatever its direction: the
-    diagonal of a cell. Narrower strips are not planned; ``touchable`` says so.
-    """
-    return float(np.clip(tool.radius / 10.0, 0.05, 0.15))
-
-
-@dataclass(frozen=True)
-class Clearances:
-    """Radial distances kept around the assembly, mm."""
-
-    neck: float = 0.05
-    shank: float = 0.2
-    holder: float = 1.0
-    rapid: float = 1.0
-
-
-@dataclass(frozen=True)
-class Lattice:
-    """A square grid over the plan view; node (i, j) is at (x0 + j*step, y0 + i*step), mm."""
-
-    x0: float
-    y0: float
-    step: float
-    nx: int
-    ny: int
-
-    @classmethod
-    def over(cls, bounds: F64, margin: float, step: float) -> Lattice:
-        """A lattice that covers ``bounds`` (2, >=2) mm and ``margin`` mm around it."""
-        x0, y0 = bounds[0, 0] - margin, bounds[0, 1] - margin
-        nx = int(math.ceil((bounds[1, 0] + margin - x0) / step)) + 1
-        ny = int(math.ceil((bounds[1, 1] + margin - y0) / step)) + 1
-        return cls(float(x0), float(y0), float(step), nx, ny)
-
-    @classmethod
-    def on_multiples(cls, bounds: F64, margin: float, step: float) -> Lattice:
-        """``over``, with nodes at whole multiples of the step: two of these share the nodes of their overlap."""
-        lower = np.floor((bounds[0, :2] - margin) / step)
-        nx, ny = (np.ceil((bounds[1, :2] + margin) / step) - lower + 1).astype(int).tolist()
-        return cls(float(lower[0] * step), float(lower[1] * step), float(step), nx, ny)
-
-    def within(self, other: Lattice) -> tuple[slice, slice] | None:
-        """Rows and columns of this lattice in another one of the same multiples; None where they are not all there."""
-        j, i = (round((a - b) / self.step) for a, b in ((self.x0, other.x0), (self.y0, other.y0)))
-        if i < 0 or j < 0 or i + self.ny > other.ny or j + self.nx > other.nx:
-            return None
-        return slice(i, i + self.ny), slice(j, j + self.nx)
-
-    def cells(self, xy: F64) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Row and column of the node nearest to each of xy (n, 2) mm, clipped to the lattice."""
-        j = np.clip(np.rint((xy[:, 0] - self.x0) / self.step).astype(np.int64), 0, self.nx - 1)
-        i = np.clip(np.rint((xy[:, 1] - self.y0) / self.step).astype(np.int64), 0, self.ny - 1)
-        return i, j
-
-    def inside(self, xy: F64) -> NDArray[np.bool_]:
-        """(n,) bool: which of (n, 2) mm lie within half a step of the lattice."""
-        j, i = (xy[:, 0] - self.x0) / self.step, (xy[:, 1] - self.y0) / self.step
-        return np.asarray((j >= -0.5) & (j <= self.nx - 0.5) & (i >= -0.5) & (i <= self.ny - 0.5))
-
-    def nodes(self, i: NDArray[np.int64], j: NDArray[np.int64], z: float) -> F64:
-        """(n, 3) mm: nodes in rows i and columns j (n,), at height z, mm."""
-        return np.column_stack([self.x0 + self.step * j, self.y0 + self.step * i, np.full(len(i), z)])
-
-    def mask(self, xy: F64) -> NDArray[np.bool_]:
-        """(ny, nx) bool: nodes that are nearest to one of xy (n, 2) mm."""
-        out = np.zeros((self.ny, self.nx), dtype=np.bool_)
-        if len(xy):
-            out[self.cells(xy)] = True
-        return out
-
-
-@dataclass(frozen=True)
-class Disc:
-    """A flat-bottomed cylinder of the assembly that is wider than the cutter: radius with clearance, height, mm."""
-
-    name: str
-    radius: float
-    height: float
-
-
-def discs_of(tool: ToolBody, clear: Clearances) -> tuple[Disc, ...]:
-    """Shank and holder as stacked cylinders that enclose them, clearance included.
-
-    Frusta are cut into slices, each as wide as its widest end. Bodies no wider than the cutter are left out.
-    """
-    out: list[Disc] = []
-    if tool.shank_diameter > tool.diameter + 1e-9:
-        out.append(Disc("shank", tool.shank_diameter / 2 + clear.shank, tool.neck_length))
-    z = tool.stickout
-    for seg in tool.holder:
-        n = 1 if abs(seg.diameter - seg.diameter_top) < 1e-9 else FRUSTUM_SLICES
-        for k in range(n):
-            a = seg.diameter + (seg.diameter_top - seg.diameter) * k / n
-            b = seg.diameter + (seg.diameter_top - seg.diameter) * (k + 1) / n
-            out.append(Disc("holder", max(a, b) / 2 + clear.holder, z + seg.length * k / n))
-        z += seg.length
-    return tuple(d for d in out if d.radius > tool.radius + 1e-9)
 
 
 class DiscHeights:

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
+from zones.assembly import Clearances
 from zones.catalogue import MOST_SLENDER
 from zones.faces import connection_of
 from zones.fixtures import above, covered
 from zones.machinable import SEEN
 from zones.model import Decomposition
 from zones.needs import DOES, Buyer, Cutter
-from zones.reach import Clearances, TipField
+from zones.reach import TipField
 from zones.regions import Labels
 from zones.view import View
 from zones.zoning import LEAST_ZONE_MM2

@@ -15,7 +15,8 @@ from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense
 from toolpath.cutter import Cutter
 from toolpath.family import Dragged, Promise, Swath, Target
-from toolpath.levels import contours, thinned
+from toolpath.levels import contours
+from toolpath.lines import thinned
 
 RADIUS = 12.0
 SHAPES = {

@@ -9,8 +9,8 @@ from geometry.toolbody import HolderSegment, ToolBody
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
 from verify.clash import run_clashes
 from verify.model import NcProgram, ProofSetup, ScoredSamples
+from verify.moves import Moves
 from verify.prove import prove
-from verify.removal import Moves
 from verify.stock import run_bodies
 
 PART = block()

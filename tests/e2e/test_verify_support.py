@@ -26,8 +26,8 @@ from tests.thin_wall_case import (
 )
 from verify.findings import Source
 from verify.model import FindingKind, ScoredSamples
+from verify.moves import Moves
 from verify.prove import Proof, prove
-from verify.removal import Moves
 from verify.support import supported
 from verify.toolaxes import ToolAxes
 

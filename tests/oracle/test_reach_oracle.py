@@ -9,7 +9,8 @@ from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, tool
 from tests.oracle.naive_drop import lift_of_points
-from zones.reach import LOOKUP_STEP, Clearances, touchable
+from zones.assembly import Clearances
+from zones.reach import LOOKUP_STEP, touchable
 
 CLEAR = Clearances(shank=0.2, holder=1.0)
 BODIES = {

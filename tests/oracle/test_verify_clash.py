@@ -13,7 +13,7 @@ from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.model import ProofSetup
-from verify.removal import BOW, Moves
+from verify.moves import BOW, Moves
 from verify.toolaxes import ToolAxes
 
 TOOL = ToolBody("T1", 1, 4.0, 2.0, 5.0, 3.6, 9.0, 5.0, 14.0, (HolderSegment(10.0, 14.0, 5.0),))

@@ -18,7 +18,7 @@ from verify.kernels.field import brick_tops
 from verify.kernels.grid import cross_columns
 from verify.kernels.stock import CUTTER, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import ProofSetup
-from verify.removal import BOW, Moves
+from verify.moves import BOW, Moves
 
 MESH = box_mesh(*BOX)
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}

@@ -11,8 +11,8 @@ from verify.dogleg import box_findings, spread
 from verify.findings import Source
 from verify.kinematics import Kinematics
 from verify.model import FindingKind, NcProgram, ScoredSamples
+from verify.moves import Moves
 from verify.prove import prove
-from verify.removal import Moves
 from verify.repeats import _runs
 from verify.toolaxes import ToolAxes
 

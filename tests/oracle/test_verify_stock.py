@@ -13,7 +13,7 @@ from verify.blank import stock_on_normals
 from verify.guard import convex_edges, gouge_depths
 from verify.kernels.heights import lowest
 from verify.model import ProofSetup, StockKind
-from verify.removal import Moves
+from verify.moves import Moves
 from verify.stock import blank, run_stock
 from verify.stockpass import descents, end_radii
 

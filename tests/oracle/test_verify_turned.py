@@ -9,8 +9,9 @@ from tests.machined_cases import mill
 from tests.oracle.turning_twin import least_left, random_moves, random_rays, seen, signed
 from verify.kernels.pose import MOST_ANGLE, PIECE, fill_piece, near_segment2, pieces, turned, view
 from verify.kernels.profile import FINE, carried, standing
+from verify.moves import BOW, Moves
 from verify.pointtree import CHUNK, PointTree, curve_keys
-from verify.removal import BOW, Moves, residual_on_normals
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes, square_to
 
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}

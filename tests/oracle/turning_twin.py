@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from verify.removal import Moves
+from verify.moves import Moves
 from verify.toolaxes import ToolAxes
 
 FAR = 12.0

@@ -21,7 +21,7 @@ from tests.hand_parts import (
     slope_field,
 )
 from zones.approach import approach, directions_over_hemisphere
-from zones.reach import Clearances
+from zones.assembly import Clearances
 
 LIFT = 0.005
 CLEAR = Clearances()

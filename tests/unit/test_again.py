@@ -16,7 +16,7 @@ from service.again import MOST, MOST_PACKED, Attempt, Learned, learned
 from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
-from toolpath.levels import Line
+from toolpath.lines import Line
 from toolpath.plan import plan_job
 from verify.model import Finding, FindingKind
 

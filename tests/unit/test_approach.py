@@ -12,7 +12,8 @@ from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool
 from zones.approach import approach, directions_over_hemisphere, resolution_of, zone_cone
-from zones.reach import Clearances, touchable
+from zones.assembly import Clearances
+from zones.reach import touchable
 
 LIFT = 0.001
 CLEAR = Clearances(shank=0.2, holder=1.0)

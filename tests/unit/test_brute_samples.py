@@ -18,7 +18,7 @@ from geometry.sampling import sample_surface
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import as_part, ball, bent_strip, low_walls, slope_field, tool
 from tests.step_files import write_step
-from zones.reach import Clearances
+from zones.assembly import Clearances
 
 CLEAR = Clearances()
 LIFT = 0.004

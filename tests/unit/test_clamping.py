@@ -14,8 +14,8 @@ from output.linuxcnc import write_linuxcnc
 from output.stepnc_words import _curves
 from tests.synthetic_plan import clamped
 from toolpath.motion import Motion, Trajectory
-from verify.cycles import FEED
 from verify.kinematics import KINDS, Kinematics
+from verify.move_kinds import FEED
 from verify.reader import read_program
 
 

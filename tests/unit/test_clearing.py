@@ -11,7 +11,7 @@ from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, box_mesh, field_of, joined, tool
 from toolpath.clearing import Clearing
 from toolpath.engaged import CLOSE, LOOK, angles
-from toolpath.levels import dense
+from toolpath.lines import dense
 from toolpath.linking import Linker
 from toolpath.motion import Motion
 from toolpath.stock import StockMap

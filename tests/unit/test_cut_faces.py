@@ -12,7 +12,8 @@ from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.locations import lifted
 from toolpath.strategies.isoparametric import TrimmedFace
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 
 PLANES = (6.5, 10.0)  # of z + 0.15 x, mm
 SCALLOP, CHORD = 0.02, 0.004

@@ -12,7 +12,7 @@ from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
 from toolpath.engaged import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within
 from toolpath.kernels.engaged import SECTORS, engaged
-from toolpath.levels import Line, dense
+from toolpath.lines import Line, dense
 from toolpath.stock import StockMap
 
 SECTOR = math.pi / SECTORS

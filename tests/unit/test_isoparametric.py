@@ -17,7 +17,8 @@ from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
 from toolpath.kernels.beside import left_beside
 from toolpath.locations import lifted, tips
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 
 RADIUS, SCALLOP = 5.0, 0.5
 

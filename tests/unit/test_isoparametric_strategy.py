@@ -12,13 +12,14 @@ from toolpath.counterexamples import NONE
 from toolpath.family import Target
 from toolpath.finish import Finish, _Strategy
 from toolpath.isoparametric import Flank
-from toolpath.levels import Line
+from toolpath.lines import Line
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import TrimmedFace, course, laid
 from toolpath.strategies.zigzag import Pattern
 from toolpath.walked import Depths, Walked
-from verify.removal import Moves, residual_on_normals
-from zones.reach import Lattice
+from verify.moves import Moves
+from verify.removal import residual_on_normals
+from zones.lattice import Lattice
 
 SCALLOP, CHORD = 0.02, 0.004
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])

@@ -12,7 +12,8 @@ from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import JoinedSurface, lay_out
 from toolpath.locations import lifted
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 
 LINE = np.array([0.0, 0, 1, 1])
 ARC = np.array([0.0, 0, 0, 1, 1, 1])

@@ -12,7 +12,7 @@ from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
 from toolpath.leads import SIZES, arc_onto, radii
 from toolpath.leaning import Surroundings, with_ways
-from toolpath.levels import Line, dense
+from toolpath.lines import Line, dense
 from toolpath.linking import Linker
 from toolpath.motion import Motion
 from toolpath.piece import Piece
@@ -20,7 +20,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
 from toolpath.travel import Motions
 from toolpath.walked import Depths
-from zones.reach import Clearances
+from zones.assembly import Clearances
 
 
 @pytest.mark.parametrize("radius", [0.06, 0.5, 3.0, 20.0])

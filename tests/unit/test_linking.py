@@ -11,7 +11,7 @@ import pytest
 from geometry.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
-from toolpath.levels import Line, dense
+from toolpath.lines import Line, dense
 from toolpath.linking import Linker
 from toolpath.motion import Motion
 from toolpath.order import nearest_order

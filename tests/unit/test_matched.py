@@ -14,7 +14,8 @@ from toolpath.isoparametric import IsoSurface
 from toolpath.matched import Matched, Wanted
 from toolpath.matching import matching_tilt, strip_width
 from toolpath.nose import Contacts, Nose, strip_edges
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes
 
 HALF = 20.0

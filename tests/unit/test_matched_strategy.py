@@ -19,7 +19,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.isoparametric import TrimmedFace
 from toolpath.strategies.matched import matched, suits
-from zones.reach import Clearances
+from zones.assembly import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0
 LOOP = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float)

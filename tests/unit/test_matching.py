@@ -8,7 +8,8 @@ import pytest
 from tests.hand_parts import ball, tool
 from toolpath.locations import tips
 from toolpath.matching import clear_tilt, gouge_depth, matching_tilt, mean_direction, strip_width
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes
 
 H = 0.005

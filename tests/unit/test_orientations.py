@@ -16,8 +16,8 @@ from verify.model import ProofSetup
 from verify.reader import read_program
 from verify.table import table_findings
 from zones.approach import directions_over_hemisphere
+from zones.assembly import Clearances
 from zones.orientations import Gatherer, _chosen, orientations
-from zones.reach import Clearances
 
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 24.0, 6.0, 36.0, (HolderSegment(20.0, 20.0, 30.0),))
 

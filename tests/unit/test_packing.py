@@ -17,7 +17,7 @@ from toolpath.counterexamples import Counterexamples
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
 from verify.model import Finding, FindingKind
-from zones.reach import Lattice
+from zones.lattice import Lattice
 
 FINDING = Finding(FindingKind.PLUNGE, "program.linuxcnc.ngc", 7, "Z1", None, (1.0, 2.0, 3.0), 0.1, 0.05, "too deep")
 

@@ -13,7 +13,7 @@ from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slo
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.family import Target
 from toolpath.finish import Finish
-from toolpath.levels import Line
+from toolpath.lines import Line
 from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.settings import CutData, PlanSettings

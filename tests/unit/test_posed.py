@@ -14,9 +14,11 @@ from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out
 from toolpath.posed import enters, lead_and_tilt, leaned, posed
 from toolpath.strategies.isoparametric import TrimmedFace, course
-from verify.removal import Moves, residual_on_normals
+from verify.moves import Moves
+from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes
-from zones.reach import Clearances, TipField
+from zones.assembly import Clearances
+from zones.reach import TipField
 
 SCALLOP, CHORD, RADIUS = 0.02, 0.004, 3.0
 KNOTS = np.array([0.0, 0, 0, 1, 1, 1])

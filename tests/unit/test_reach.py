@@ -10,7 +10,9 @@ import pytest
 from geometry.bvh import TriangleTree
 from geometry.toolbody import HolderSegment
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
-from zones.reach import Clearances, DiscHeights, Lattice, contact_tips, discs_of, lattice_step, touchable
+from zones.assembly import Clearances, discs_of
+from zones.lattice import Lattice, lattice_step
+from zones.reach import DiscHeights, contact_tips, touchable
 
 
 def test_a_lattice_covers_its_bounds_and_finds_its_nodes():

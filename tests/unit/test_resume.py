@@ -25,7 +25,7 @@ from toolpath.plan import Plan, plan_job
 from toolpath.stock import StockMap
 from toolpath.underway import NOTHING, Keeper, PlanNow, StockNow
 from verify.model import NcProgram, Proof, Spent
-from zones.reach import Lattice
+from zones.lattice import Lattice
 
 TWO_WAYS = {"access": [{"id": "A1"}, {"id": "A2", "direction": [1.0, 0.0, 0.0], "work_offset": "G55"}]}
 TURNED = {"machine": {"kind": "5-axis", "kinematics": "table-table-AC", "orientations": "given"},

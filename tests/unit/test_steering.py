@@ -9,9 +9,10 @@ from tests.unit.test_posed import CHORD, SCALLOP, opposite, tree_of, wall
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import IsoSurface
 from toolpath.locations import tips
-from toolpath.posed import angles_between, enters, lead_and_tilt, leaned, posed
+from toolpath.posed import enters, lead_and_tilt, leaned, posed
+from toolpath.poses import angles_between
 from toolpath.steering import FAN, SPACING, Limits, fan, steered
-from zones.reach import Clearances
+from zones.assembly import Clearances
 
 WIDE = Limits(np.radians(40.0), np.radians(6.0))
 R = 2.0

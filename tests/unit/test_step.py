@@ -108,7 +108,6 @@ def test_hollow_sphere_bends_out_and_in(tmp_path):
     assert kinds(part) == {"smooth": 2}  # the seams
 
 
-
 @pytest.mark.parametrize("shape", ["wall", "torus", "cone", "loft"])
 @pytest.mark.parametrize("chord", [0.02, 0.005])
 def test_mesh_keeps_its_chord_and_is_watertight(tmp_path, shape, chord):

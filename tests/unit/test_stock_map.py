@@ -13,7 +13,7 @@ from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL
 from toolpath.stock import SKIN, StockMap
-from zones.reach import Disc
+from zones.assembly import Disc
 from zones.view import access_rotation
 
 STEP = 0.2

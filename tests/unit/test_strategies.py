@@ -13,7 +13,7 @@ from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
 from tests.hand_parts import SURFACES, ball, box_mesh, corner, field_of, samples_of, slope_field, terraces, tool, walls
 from tests.plan_checks import dense
-from toolpath.levels import Line
+from toolpath.lines import Line
 from toolpath.stock import StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach import LEVEL_TOLERANCE, touchable

@@ -11,8 +11,8 @@ from verify.engagement import RESOLUTION, engaged_angles, engagements, in_parts
 from verify.field import run_field, stock_field
 from verify.kernels.engaged import SECTORS, sector_bits
 from verify.model import FindingKind, ProofSetup, StockKind
+from verify.moves import Moves
 from verify.prove import prove
-from verify.removal import Moves
 from verify.stock import blank, run_stock
 from verify.toolaxes import ToolAxes
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from verify.kernels.clash import is_lift
-from verify.removal import Moves
+from verify.moves import Moves
 from verify.stockpass import free_rapids
 
 AXIS = np.array([np.sin(0.7) * np.cos(0.3), np.sin(0.7) * np.sin(0.3), np.cos(0.7)])

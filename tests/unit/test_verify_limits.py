@@ -59,7 +59,6 @@ def test_without_pivots_it_is_said_that_joints_were_not_checked():
     assert not [n for n in found("G0 Z100\nA90\n")[1] if "pivots" in n]
 
 
-
 def test_of_more_than_half_a_turn_it_is_said_that_the_way_is_the_machines():
     """From C350 to C10 the proof turns back by 340 deg; a table that rolls over goes 20 on."""
     def notes(dialect, *lines):

@@ -11,12 +11,12 @@ from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
 from toolpath import finish
 from toolpath.counterexamples import NONE
 from toolpath.finish import Finish, _Strategy
-from toolpath.levels import Line, true_runs
+from toolpath.lines import Line, true_runs
 from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
 from toolpath.walked import OVERLAP, Depths, Walked, still_to_walk
 from verify.repeats import WINDOW
-from zones.reach import Lattice
+from zones.lattice import Lattice
 
 
 def line(*x, z=1.0, closed=False):

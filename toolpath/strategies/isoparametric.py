@@ -25,7 +25,7 @@ from geometry.toolbody import ToolBody
 from toolpath.family import Target
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
-from toolpath.levels import Line, true_runs
+from toolpath.lines import Line, true_runs
 from toolpath.locations import lifted
 from zones.reach import TipField
 

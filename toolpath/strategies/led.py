@@ -21,8 +21,9 @@ from geometry.mesh import F64
 from geometry.toolbody import ToolBody
 from toolpath.family import Target
 from toolpath.leaning import LOOK, Runs, Surroundings, in_turn, layers_over
-from toolpath.piece import LEAST_PIECE, Piece, places_along
-from toolpath.posed import Axes, Blocked, lead_and_tilt, posed
+from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.posed import lead_and_tilt, posed
+from toolpath.poses import Axes, Blocked, places_along
 from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.steering import Limits, Steered, steered
 from toolpath.strategies.isoparametric import Faces, Stretch, course

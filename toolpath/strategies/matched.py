@@ -25,7 +25,8 @@ from toolpath.isoparametric import IsoSurface, Laid
 from toolpath.leaning import LOOK, TURN_S, Runs, Surroundings, in_turn
 from toolpath.matched import Matched, Strip, Wanted
 from toolpath.parted import parted
-from toolpath.piece import LEAST_PIECE, Piece, places_along
+from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.poses import places_along
 from toolpath.settings import CutData, PlanSettings
 from toolpath.strategies.isoparametric import Faces
 

@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from toolpath.family import Dragged, Family, Pass, Promise, Target, strip_width
 from toolpath.follow import pieces
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
-from zones.reach import Lattice
+from zones.lattice import Lattice
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
 SMOOTH = 1.0  # lattice steps, of the distance field

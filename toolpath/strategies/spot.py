@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.levels import Line, moves_free
+from toolpath.levels import moves_free
+from toolpath.lines import Line
 from zones.reach import LEVEL_TOLERANCE, TipField
 
 MOST = 400  # places; a zone with more has another problem than a missed spot

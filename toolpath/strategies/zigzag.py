@@ -14,7 +14,8 @@ from geometry.toolbody import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target
-from toolpath.levels import Line, dense, pieces_where, serving
+from toolpath.levels import serving
+from toolpath.lines import Line, dense, pieces_where
 from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled

@@ -8,7 +8,8 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.levels import Line, contour_pieces, dilated
+from toolpath.levels import contour_pieces, dilated
+from toolpath.lines import Line
 from zones.reach import TipField
 
 LEAST_STEP = 0.02  # mm, levels are never closer

@@ -1,0 +1,57 @@
+"""Moves: the straight steps of a program as arrays, as every check of the proof takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import VerificationError
+from geometry.mesh import F64, I32
+from geometry.toolbody import ToolBody
+from verify.toolaxes import ToolAxes
+
+Progress = Callable[[float], None]
+BOW = 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """Straight moves of the tool tip in the setup frame, in program order.
+
+    start, end : (m, 3) float64, mm
+    feed       : (m,) bool, False for a rapid
+    tool       : (m,) int32, row in the sequence of tools the moves belong to
+    axes       : of the tool, None where all are +Z
+    """
+
+    start: F64
+    end: F64
+    feed: NDArray[np.bool_]
+    tool: I32
+    axes: ToolAxes | None = None
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def only(self, chosen: NDArray[np.bool_]) -> Moves:
+        """The moves where ``chosen`` (m,) bool is true."""
+        axes = None if self.axes is None else self.axes.only(chosen)
+        return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes)
+
+
+def cutter_table(tools: Sequence[ToolBody]) -> F64:
+    """(k, 3) float64, mm: radius, corner radius and flute length of each tool.
+
+    Raises VerificationError where the flutes end below the corner of the cutting part.
+    """
+    for tool in tools:
+        least = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
+        if tool.flute_length < least:
+            raise VerificationError(
+                f"{tool.id}: flute length {tool.flute_length} mm ends inside the corner of the cutting part",
+                code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=least,
+                remedy="give the flute length from the tip")
+    return np.array([[t.radius, min(t.corner_radius, t.radius), t.flute_length] for t in tools]).reshape(-1, 3)
