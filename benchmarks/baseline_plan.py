@@ -21,11 +21,10 @@ from toolpath.linking import Linker
 from toolpath.motion import Workingstep
 from toolpath.order import nearest_order
 from toolpath.plan import Plan
-from toolpath.settings import CutData, PlanSettings
+from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
-from toolpath.strategies.isoparametric import Faces
-from toolpath.strategies.zigzag import Pattern
+from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
 from zones.reach import TipField
 from zones.zoning import ZoneArea

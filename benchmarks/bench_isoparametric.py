@@ -44,7 +44,7 @@ from toolpath.isoparametric import Flank, IsoSurface, lay_out  # noqa: E402
 from toolpath.locations import FREE, lifted, tips  # noqa: E402
 from toolpath.posed import enters, leaned, posed  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
-from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
+from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402

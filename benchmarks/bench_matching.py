@@ -45,7 +45,7 @@ from toolpath.locations import tips  # noqa: E402
 from toolpath.matched import Matched, Wanted  # noqa: E402
 from toolpath.matching import matching_tilt, strip_width  # noqa: E402
 from toolpath.parted import Part, parted  # noqa: E402
-from toolpath.strategies.isoparametric import TrimmedFace  # noqa: E402
+from toolpath.trimmed_faces import TrimmedFace  # noqa: E402
 from verify.moves import Moves  # noqa: E402
 from verify.removal import residual_on_normals  # noqa: E402
 from verify.toolaxes import ToolAxes  # noqa: E402

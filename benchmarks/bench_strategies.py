@@ -35,7 +35,7 @@ from geometry.sampling import sample_surface  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import Prepared, placement_of  # noqa: E402
 from toolpath.motion import Motion, Workingstep  # noqa: E402
-from toolpath.strategies.zigzag import Pattern  # noqa: E402
+from toolpath.settings import Pattern
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from zones.machinable import Form  # noqa: E402

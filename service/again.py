@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from service.sides import Look, Program, Side
-from toolpath.bands import HighWall
-from toolpath.counterexamples import CLOSER, NONE, Counterexamples
+from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
 from toolpath.motion import Workingstep
 from verify.model import Finding, FindingKind, Proof
 from zones.zoning import ZoneArea

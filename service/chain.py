@@ -60,10 +60,9 @@ from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.life import with_fresh_cutters, worn
 from toolpath.plan import Plan, plan_job
-from toolpath.settings import CutData, Leaned, PlanSettings
+from toolpath.settings import CutData, Leaned, Pattern, PlanSettings
 from toolpath.stock import StockMap
-from toolpath.strategies.isoparametric import Faces
-from toolpath.strategies.zigzag import Pattern
+from toolpath.trimmed_faces import Faces
 from toolpath.underway import Keeper
 from verify.dialects import dialect_of
 from verify.likeness import carried

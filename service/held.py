@@ -9,7 +9,8 @@ import numpy as np
 from service.cautions import MOST_RATIO, walls_to_cut
 from service.convert import rotary_machine
 from service.prepare import Prepared
-from toolpath.bands import HighWall, largest_corner, planes
+from toolpath.bands import largest_corner, planes
+from toolpath.counterexamples import HighWall
 from verify.slender import thin_walls
 from zones.model import Wall
 from zones.thinness import slender_walls

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from geometry.timing import Rates
-from toolpath.bands import HighWall
-from toolpath.counterexamples import Counterexamples
+from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
-from toolpath.underway import FinishNow, LayersNow, PlanNow, StockNow, ToolNow, Ways
+from toolpath.stock import StockNow
+from toolpath.underway import FinishNow, LayersNow, PlanNow, ToolNow, Ways
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
 from zones.lattice import Lattice
 

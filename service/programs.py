@@ -32,7 +32,7 @@ from service.trimmed import exact_faces
 from service.version import VERSION
 from toolpath.motion import Workingstep
 from toolpath.settings import Turning
-from toolpath.strategies.isoparametric import Faces
+from toolpath.trimmed_faces import Faces
 from zones.view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding

@@ -13,7 +13,8 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.trim import trim_faces
 from service.prepare import Prepared, placement_of
-from toolpath.strategies.isoparametric import Faces, SmoothFaces, TrimmedFace, suits
+from toolpath.strategies.isoparametric import suits
+from toolpath.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from zones.machinable import Form
 
 TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one

@@ -18,10 +18,9 @@ from geometry.toolbody import HolderSegment, ToolBody
 from toolpath.family import Target
 from toolpath.motion import Motion
 from toolpath.plan import Plan, plan_job
-from toolpath.settings import CutData, PlanSettings
+from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
-from toolpath.strategies.isoparametric import TrimmedFace
-from toolpath.strategies.zigzag import Pattern
+from toolpath.trimmed_faces import TrimmedFace
 from zones.assembly import Clearances
 from zones.lattice import lattice_step
 from zones.machinable import machinable_faces

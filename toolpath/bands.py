@@ -8,25 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from toolpath.counterexamples import HighWall
 from zones.machinable import Form
 from zones.zoning import ZoneArea
 
 LEAST_DEPTH = 2.0
 """Times the thickness: no band is lower, however large the corner of a tool is that goes below it."""
-
-
-@dataclass(frozen=True)
-class HighWall:
-    """A wall that is to keep its support.
-
-    top, bottom : mm, heights between which it stands, in the frame of the access; thickness : mm
-    """
-
-    top: float
-    bottom: float
-    thickness: float
 
 
 def largest_corner(zones: Iterable[ZoneArea]) -> float:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.toolbody import ToolBody
-from toolpath.bands import HighWall
 from toolpath.lines import dense
 
 CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much
@@ -86,3 +85,15 @@ def _near(places: F64 | None, points: F64, radius: float, plan: bool = False) ->
 
 
 __all__ = ["NONE", "Counterexamples"]
+
+
+@dataclass(frozen=True)
+class HighWall:
+    """A wall that is to keep its support.
+
+    top, bottom : mm, heights between which it stands, in the frame of the access; thickness : mm
+    """
+
+    top: float
+    bottom: float
+    thickness: float

@@ -35,13 +35,12 @@ from toolpath.posed import enters
 from toolpath.poses import Blocked
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
-from toolpath.settings import CutData, PlanSettings
+from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
-from toolpath.strategies.isoparametric import Faces
-from toolpath.strategies.zigzag import Pattern
 from toolpath.travel import Motions
+from toolpath.trimmed_faces import Faces
 from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable import Form

@@ -29,7 +29,7 @@ from toolpath.pacing import Pace
 from toolpath.settings import CutData, PlanSettings
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
-from toolpath.strategies.isoparametric import Faces
+from toolpath.trimmed_faces import Faces
 from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.walked import Depths, Walked
 from zones.machinable import Form

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,19 @@ from geometry.timing import RATES, Rates
 from geometry.toolbody import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.deflection import LEAST_FEED, Bend, Bending, effective_diameter
-from toolpath.strategies.zigzag import Pattern
+
+
+class Pattern(StrEnum):
+    """How passes over shallow area follow each other."""
+
+    AUTO = "auto"
+    """Zigzag or spiral, whichever is less way."""
+    ZIGZAG = "zigzag"
+    """Straight passes, to and fro."""
+    ONE_WAY = "one_way"
+    """Straight passes, all walked the same way."""
+    SPIRAL = "spiral"
+    """Rings from the border inwards, joined turn by turn."""
 
 
 @dataclass(frozen=True)

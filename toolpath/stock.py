@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,6 @@ from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.poses import between, places_along
 from toolpath.shell import Shell
-from toolpath.underway import StockNow
 from zones.assembly import Disc
 from zones.lattice import Lattice
 
@@ -401,3 +401,17 @@ def _pooled(top: F64) -> F64:
     padded = np.full((ny, nx), -np.inf)
     padded[:top.shape[0], :top.shape[1]] = top
     return np.ascontiguousarray(padded.reshape(ny // POOLED, POOLED, nx // POOLED, POOLED).max(axis=(1, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class StockNow:
+    """Heights of a ``StockMap``, (ny, nx) mm each.
+
+    cut, settled : (k,) int64, where ``cover`` and then ``top``, row by row, are not what they were when they were last
+                   settled, and (k,) mm, what that was; None where there are no hollows to settle into
+    """
+
+    top: F64
+    cover: F64
+    cut: NDArray[np.int64] | None
+    settled: F64 | None

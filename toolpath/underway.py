@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.motion import Workingstep
+from toolpath.stock import StockNow
 
 T = TypeVar("T")
 
@@ -35,20 +36,6 @@ class Ways:
     def lines(self) -> list[F64]:
         """The lines that were joined."""
         return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
-
-
-@dataclass(frozen=True, eq=False)
-class StockNow:
-    """Heights of a ``StockMap``, (ny, nx) mm each.
-
-    cut, settled : (k,) int64, where ``cover`` and then ``top``, row by row, are not what they were when they were last
-                   settled, and (k,) mm, what that was; None where there are no hollows to settle into
-    """
-
-    top: F64
-    cover: F64
-    cut: NDArray[np.int64] | None
-    settled: F64 | None
 
 
 @dataclass(frozen=True, eq=False)

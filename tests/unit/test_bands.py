@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolpath.bands import LEAST_DEPTH, HighWall, planes
+from toolpath.bands import LEAST_DEPTH, planes
+from toolpath.counterexamples import HighWall
 
 
 def test_without_high_walls_there_is_no_plane():

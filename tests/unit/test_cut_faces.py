@@ -11,7 +11,7 @@ from geometry.trim import trim_faces
 from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.locations import lifted
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 

@@ -13,9 +13,10 @@ from toolpath.family import Target
 from toolpath.finish import Finish, _Strategy
 from toolpath.isoparametric import Flank
 from toolpath.lines import Line
+from toolpath.settings import Pattern
 from toolpath.strategies import isoparametric
-from toolpath.strategies.isoparametric import TrimmedFace, course, laid
-from toolpath.strategies.zigzag import Pattern
+from toolpath.strategies.isoparametric import course, laid
+from toolpath.trimmed_faces import TrimmedFace
 from toolpath.walked import Depths, Walked
 from verify.moves import Moves
 from verify.removal import residual_on_normals

@@ -23,7 +23,7 @@ from toolpath.settings import CutData, Leaned
 from toolpath.steering import Limits
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
-from toolpath.strategies.isoparametric import TrimmedFace
+from toolpath.trimmed_faces import TrimmedFace
 from zones.assembly import Clearances
 from zones.machinable import Form
 

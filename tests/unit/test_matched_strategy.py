@@ -17,8 +17,8 @@ from toolpath.piece import Piece
 from toolpath.posed import enters
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
-from toolpath.strategies.isoparametric import TrimmedFace
 from toolpath.strategies.matched import matched, suits
+from toolpath.trimmed_faces import TrimmedFace
 from zones.assembly import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0

@@ -12,8 +12,7 @@ from geometry.errors import CamError
 from geometry.timing import Rates
 from service.packing import Known, pack, unpack
 from tests.synthetic_plan import BALL
-from toolpath.bands import HighWall
-from toolpath.counterexamples import Counterexamples
+from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
 from verify.model import Finding, FindingKind

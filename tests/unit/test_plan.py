@@ -16,10 +16,9 @@ from toolpath.finish import Finish
 from toolpath.lines import Line
 from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
-from toolpath.settings import CutData, PlanSettings
+from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.layers import EVEN
-from toolpath.strategies.zigzag import Pattern
 from toolpath.walked import OVERLAP, Depths, Walked
 from zones.machinable import Form
 

@@ -13,7 +13,8 @@ from toolpath.family import Target
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out
 from toolpath.posed import enters, lead_and_tilt, leaned, posed
-from toolpath.strategies.isoparametric import TrimmedFace, course
+from toolpath.strategies.isoparametric import course
+from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes

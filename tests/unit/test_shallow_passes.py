@@ -12,8 +12,8 @@ from tests.plan_checks import dense
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.family import Promise, Target
+from toolpath.settings import Pattern
 from toolpath.strategies import zigzag
-from toolpath.strategies.zigzag import Pattern
 from zones.reach import touchable
 
 

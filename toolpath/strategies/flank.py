@@ -19,7 +19,7 @@ from toolpath.flank import ALONG, UP, Wall, Wanted, bands
 from toolpath.leaning import UP_Z, Runs, Surroundings, in_turn
 from toolpath.piece import Piece
 from toolpath.settings import CutData, PlanSettings
-from toolpath.strategies.isoparametric import Faces, leveller
+from toolpath.trimmed_faces import Faces, leveller
 
 NAME = "flank"
 LEAST_SERVED = 0.5  # of a wall's lattice: a wall of which less is wanted is left to others

@@ -26,7 +26,8 @@ from toolpath.posed import lead_and_tilt, posed
 from toolpath.poses import Axes, Blocked, places_along
 from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.steering import Limits, Steered, steered
-from toolpath.strategies.isoparametric import Faces, Stretch, course
+from toolpath.strategies.isoparametric import Stretch, course
+from toolpath.trimmed_faces import Faces
 from zones.machinable import Form
 from zones.reach import TipField
 

@@ -28,7 +28,7 @@ from toolpath.parted import parted
 from toolpath.piece import LEAST_PIECE, Piece
 from toolpath.poses import places_along
 from toolpath.settings import CutData, PlanSettings
-from toolpath.strategies.isoparametric import Faces
+from toolpath.trimmed_faces import Faces
 
 NAME = "matched"
 LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target
 from toolpath.levels import serving
 from toolpath.lines import Line, dense, pieces_where
+from toolpath.settings import Pattern
 from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
@@ -23,19 +23,6 @@ from zones.reach import TipField
 
 LEAST_STEP = 0.02  # mm between passes of a round
 WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried
-
-
-class Pattern(StrEnum):
-    """How passes over shallow area follow each other."""
-
-    AUTO = "auto"
-    """Zigzag or spiral, whichever is less way."""
-    ZIGZAG = "zigzag"
-    """Straight passes, to and fro."""
-    ONE_WAY = "one_way"
-    """Straight passes, all walked the same way."""
-    SPIRAL = "spiral"
-    """Rings from the border inwards, joined turn by turn."""
 
 
 @dataclass(frozen=True, eq=False)
