@@ -35,7 +35,7 @@ from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step import read_part  # noqa: E402
-from geometry.toolbody import ToolBody  # noqa: E402
+from geometry.tool_body import ToolBody  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import placement_of  # noqa: E402

@@ -33,7 +33,7 @@ from examples.demo import write_small  # noqa: E402
 from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.step import read_part  # noqa: E402
-from geometry.toolbody import ToolBody  # noqa: E402
+from geometry.tool_body import ToolBody  # noqa: E402
 from service.convert import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402
 from verify.blank import stock_bounds  # noqa: E402

@@ -25,7 +25,7 @@ from geometry.facepatches import read_patches  # noqa: E402
 from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
-from geometry.toolbody import ToolBody  # noqa: E402
+from geometry.tool_body import ToolBody  # noqa: E402
 from toolpath.border import beyond  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.direction import best_direction  # noqa: E402

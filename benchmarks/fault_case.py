@@ -18,7 +18,7 @@ from benchmarks.fault_solids import Solid
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_surface
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.model import ProofSetup, ScoredSamples
 
 PIVOTS = ((0.0, -3.0, -25.0), (1.0, 2.0, -10.0))  # mm: a point on the tilting axis A, one on the turning axis C

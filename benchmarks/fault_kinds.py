@@ -17,7 +17,7 @@ from benchmarks.fault_case import Case, Mode, Step, place_words, to_joints, tool
 from benchmarks.fault_reading import Way, read_way
 from benchmarks.fault_twin import Found, Twin, in_blank
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 
 LEAST = 0.006  # mm, a gouge that must be found; the tolerance of the cases is 0.004
 LEAST_LEFT = 0.012  # mm, the same for what is left; 0.008 is allowed

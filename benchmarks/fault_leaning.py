@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.fault_case import PIVOTS, Case, Mode, Script, angles
 from benchmarks.fault_parts import HOLDER, UP, made, setup_of
 from benchmarks.fault_solids import House, Piece, Profile, Turned, chain
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
 

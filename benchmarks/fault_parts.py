@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.fault_case import Case, Mode, Script, as_part, samples_on
 from benchmarks.fault_solids import Piece, Pocket, Profile, Pulled, Solid, chain
 from geometry.mesh import F64
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from verify.model import ProofSetup, ScoredSamples, StockKind
 
 HOLDER = (HolderSegment(16.0, 24.0, 12.0), HolderSegment(24.0, 24.0, 15.0))

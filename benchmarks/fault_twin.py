@@ -23,7 +23,7 @@ from benchmarks.fault_reading import Poses, Way
 from benchmarks.fault_solids import box_mesh
 from benchmarks.fault_touch import REACH, remain, swept, taken_at, taken_in, touch, touch_standing
 from geometry.mesh import F64, TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.model import ProofSetup, StockKind
 
 CLOSE = 0.45  # mm within which the coarse look may be wrong

@@ -20,7 +20,7 @@ from benchmarks.fault_case import as_part
 from benchmarks.foreign_twin import SPACING, envelope
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
 from verify.program import Program

@@ -35,7 +35,7 @@ from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.gridmap import GridMap  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
-from geometry.toolbody import HolderSegment, ToolBody  # noqa: E402
+from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
 from output.kinematics import RotaryMachine  # noqa: E402
 from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import uvicorn
 
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from service.viewdata import tool_shape
 from service.viewer import folder_app
 from service.viewfile import Chunk, Column, write_view

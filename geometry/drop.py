@@ -18,7 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from geometry.errors import GeometryError
-from geometry.frames import Placement
 from geometry.mesh import F64, I32
+from geometry.setup_frame import Placement
 
 
 @dataclass(frozen=True, eq=False)

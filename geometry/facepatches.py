@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
-from geometry.frames import Placement
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
+from geometry.setup_frame import Placement
 from geometry.step import ask_reader
 
 

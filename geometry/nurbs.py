@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.kernels.nurbs import heights_along, surface_values
 from geometry.mesh import F64, I32, TriangleMesh

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.bvh import TriangleTree
 from geometry.drop import one_thread
 from geometry.errors import GeometryError

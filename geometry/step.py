@@ -13,10 +13,10 @@ import os
 import sys
 from typing import Any
 
-from geometry.child import run_limited
+from geometry.child_process import run_limited
 from geometry.errors import PartError, ResourceError, SetupError
-from geometry.frames import Placement
 from geometry.part import Part
+from geometry.setup_frame import Placement
 
 
 def read_part(path: str | os.PathLike[str], *, placement: Placement | None = None, solid: int | None = None,

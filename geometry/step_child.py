@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 
-from geometry.child import TYPED_ERROR, guard_child
+from geometry.child_process import TYPED_ERROR, guard_child
 from geometry.errors import CamError, GeometryError, ResourceError
 
 
@@ -29,7 +29,7 @@ def main() -> int:
 
 
 def _load(request: dict) -> bytes:
-    from geometry.frames import Placement
+    from geometry.setup_frame import Placement
 
     placement = request.pop("placement")
     where = Placement(**placement) if placement else None

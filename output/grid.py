@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.model import Workplan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 

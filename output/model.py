@@ -8,7 +8,7 @@ from enum import StrEnum
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.nurbs import NurbsSurface
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.kinematics import RotaryMachine
 from toolpath.motion import Motion, Trajectory, Workingstep
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from geometry.errors import OutputError
 from geometry.mesh import F64, TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.grid import I64, GridArc, check_plan
 from output.model import Ap238, Workplan
 from output.part21 import Part21, Write, quoted, real, reals, refs

@@ -21,7 +21,7 @@ import numpy as np
 
 from geometry.errors import OutputError
 from geometry.nurbs import NurbsSurface
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.grid import GRID, GridArc, check_plan, to_grid
 from output.model import Workplan
 from output.part21 import Part21, Write, quoted, real, reals, refs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.motion import Workingstep
 
 _PLAIN = str.maketrans({

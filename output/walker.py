@@ -28,7 +28,7 @@ from functools import reduce
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.clamping import Leg, Section, home_of, sections
 from output.dialects.base import Dialect
 from output.grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid

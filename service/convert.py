@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine, said_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from geometry.timing import RATES, Rates
-from geometry.toolbody import ToolBody
+from geometry.move_timing import RATES, Rates
+from geometry.tool_body import ToolBody
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from schemas.setup import Setup
 from schemas.tools import Tool
 from service.convert import tool_bodies

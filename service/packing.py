@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.timing import Rates
+from geometry.move_timing import Rates
 from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan

@@ -12,12 +12,12 @@ import numpy as np
 
 from geometry.bvh import TriangleTree
 from geometry.errors import CamError, SetupError
-from geometry.frames import Placement
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
+from geometry.setup_frame import Placement
 from geometry.step import read_part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from geometry.trim import FacePatch
 from schemas.setup import Access, Setup
 from service.blank import check_against_part

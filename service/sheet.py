@@ -16,7 +16,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.dialects import DIALECTS, Switches
 from output.model import Workplan
 from output.walker import label_number, lowest_tip

@@ -14,7 +14,7 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from geometry.stl import stl_bytes
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from service.deviation import COLOURS, Mark, Measured, draw_deviation
 from verify.machined import check_step, machined_stock, surface_error
 from verify.model import Finding, FindingKind, Proof, ProofSetup

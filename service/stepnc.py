@@ -17,10 +17,10 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-from geometry.child import run_limited
+from geometry.child_process import run_limited
 from geometry.errors import InputError, InternalError, ResourceError
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.model import Workplan
 from output.stepnc_aim import stream_stepnc_aim
 from output.stepnc_arm import stream_stepnc_arm

@@ -9,7 +9,7 @@ import json
 import pickle
 import sys
 
-from geometry.child import TYPED_ERROR, guard_child
+from geometry.child_process import TYPED_ERROR, guard_child
 from geometry.errors import CamError
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from output.text import decimal
 
 WIDTH, HEIGHT = 118.0, 88.0  # mm of paper

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.errors import CamError
 from geometry.keyed import KeyedPoints
 from geometry.sampling import SurfaceSamples
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from service.convert import tool_bodies
 from service.delivery import Files
 from service.prepare import Prepared

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from service.sides import Look
 from service.viewfile import Chunk, Column
 from verify.machined import LEVELS, stock_in_time

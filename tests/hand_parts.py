@@ -14,7 +14,7 @@ from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from toolpath.family import Target
 from toolpath.motion import Motion
 from toolpath.plan import Plan, plan_job

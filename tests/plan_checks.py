@@ -7,7 +7,7 @@ import numpy as np
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from tests.hand_parts import RAMP, Case
 from toolpath.motion import Motion, Workingstep
 from zones.assembly import Clearances, discs_of

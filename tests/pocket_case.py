@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.part import FaceInfo, Part
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from verify.model import ProofSetup, ScoredSamples
 
 TOOL = ToolBody("T1", 1, 4.0, 0.0, 8.0, 3.8, 20.0, 6.0, 30.0, (HolderSegment(20.0, 30.0, 20.0),))

@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.mesh import TriangleMesh
 from geometry.nurbs import NurbsSurface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine
 from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep

@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.part import Part
 from geometry.sampling import sample_surface
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from tests.hand_parts import as_part, terraces
 from verify.model import ProofSetup, ScoredSamples
 

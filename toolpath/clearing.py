@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.engaged import LOOK, SKIN_SHARE, SURE, over_limit
 from toolpath.inwards import NARROW, Inwards
 from toolpath.levels import moves_free

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.lines import dense
 
 CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much

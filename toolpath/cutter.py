@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from geometry.errors import SetupError
 from geometry.outline import Arc, Line, Outline
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 
 CARBIDE = 600e3
 """N/mm2, modulus of cemented carbide."""

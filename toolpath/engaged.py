@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.engaged import engaged
 from toolpath.lines import Line, dense, pieces_where

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.border import beyond
 from toolpath.deflection import left_by_layers
 from toolpath.engaged import UNBOUNDED

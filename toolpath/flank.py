@@ -32,7 +32,7 @@ from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.isoparametric import Laid
 from toolpath.lines import true_runs
 from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.leads import arc_onto, radii
 from toolpath.lines import dense, true_runs
 from toolpath.motion import Motion, Trajectory

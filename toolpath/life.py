@@ -1,7 +1,7 @@
 """How long tools are in cut, and steps parted where the life of a cutter ends.
 
 A feed move is taken to be in cut unless it is a link as fast as those in air are, so that what is counted is never less
-than what the proof finds in stock. Minutes are those of ``geometry.timing``, speeding up and slowing down counted. A
+than what the proof finds in stock. Minutes are those of ``geometry.move_timing``, speeding up and slowing down counted. A
 cutter is changed between two passes, where the tool is up at the clearance plane along Z, or between two steps.
 """
 

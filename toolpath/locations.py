@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.follow import STEEPEST, Limit
 from toolpath.forward import Profile
 from toolpath.lines import thinned, true_runs

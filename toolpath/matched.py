@@ -19,7 +19,7 @@ from scipy.interpolate import PchipInterpolator
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.isoparametric import IsoSurface
 from toolpath.locations import tips
 from toolpath.nose import Contacts, Nose, strip_edges

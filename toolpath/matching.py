@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 
 LEVEL = 1e-12  # what is less of a D makes no difference to a strip
 

@@ -13,8 +13,8 @@ from enum import StrEnum
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.timing import RATES, Rates, move_seconds
-from geometry.toolbody import ToolBody
+from geometry.move_timing import RATES, Rates, move_seconds
+from geometry.tool_body import ToolBody
 from toolpath.deflection import Bend
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.matching import clear_tilt, nose_radii
 
 ANGLES = 65  # places on each half of the nose

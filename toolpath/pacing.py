@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.engaged import SKIN_SHARE, angles
 from toolpath.lines import stretch
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap

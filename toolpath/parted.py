@@ -24,7 +24,7 @@ from functools import cache
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.isoparametric import IsoSurface
 from toolpath.kernels.parted import price_rows
 from toolpath.matched import MOST_RUN_OUT, TURNS, Wanted, longest_lag

@@ -21,7 +21,7 @@ from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tilted import axis_frames, blocked_along
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.forward import Profile
 from toolpath.lines import true_runs
 from toolpath.locations import LOOK, OFFS, chorded, contacts, sides, tips

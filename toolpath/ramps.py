@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.kernels.ramp import ease
 from toolpath.stock import SKIN
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.kernels.leaning import lower_leaning
 from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
 

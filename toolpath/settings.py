@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.timing import RATES, Rates
-from geometry.toolbody import ToolBody
+from geometry.move_timing import RATES, Rates
+from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.deflection import LEAST_FEED, Bend, Bending, effective_diameter
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.kernels.skins import near
 from toolpath.residual import ResidualMap
 from zones.assembly import Clearances, Disc

@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.tilted import axis_frames
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.forward import Profile
 from toolpath.lines import true_runs
 from toolpath.locations import sides, tips

@@ -17,7 +17,7 @@ from scipy import ndimage
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.poses import between, places_along

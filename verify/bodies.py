@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.kernels.stock import HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.bodies import Bodies
 from verify.kernels.clash import clash_chunk
 from verify.model import ProofSetup

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.timing import Rates, move_seconds
+from geometry.move_timing import Rates, move_seconds
 from verify.model import ProofSetup, Spent
 from verify.move_kinds import RAPID
 from verify.program import Program

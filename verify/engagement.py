@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.findings import Source, chains, worst_of
 from verify.kernels.engaged import FRONT, window_angles
 from verify.model import Engagement, Finding, FindingKind

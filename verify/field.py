@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.nearest import nearest
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.field import VOLUME_UNITS, field_tile

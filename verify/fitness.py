@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.clear_height import UP, Z_AXIS, _top_along, top_of_all
 from verify.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup

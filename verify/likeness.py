@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from geometry.errors import InternalError, ProgramError
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup

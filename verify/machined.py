@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.errors import InputError
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.blank import stock_bounds
 from verify.duration import minutes_of

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.toolaxes import ToolAxes
 
 Progress = Callable[[float], None]

@@ -11,7 +11,7 @@ from geometry.bvh import TriangleTree
 from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.blank import stock_on_normals
 from verify.clash import DIP

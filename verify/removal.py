@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from geometry.mesh import F64, I32
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.kernels.rays import cut_tile
 from verify.kernels.turned import cut_chunk
 from verify.moves import BOW, Moves, Progress, cutter_table

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.errors import VerificationError
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.blank import stock_bounds
 from verify.clear_height import from_above, top_of_all
 from verify.findings import Source

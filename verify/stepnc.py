@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from geometry.errors import ProgramError
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify import stepnc_aim, stepnc_arm
 from verify.course import Course, Cutter, CutterMoves
 from verify.kinematics import Kinematics

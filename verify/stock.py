@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies
 from verify.kernels.bodies import body_tile

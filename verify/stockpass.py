@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.kernels.clash import ASIDE
 from verify.kernels.engaged import WINDOW
 from verify.moves import Moves

@@ -18,7 +18,7 @@ from scipy.spatial.distance import cdist
 
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.blank import stock_on_normals
 from verify.findings import Source
 from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.bodies import Bodies
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program import Program

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.bvh import TriangleTree
 from geometry.mesh import F64
 from geometry.tilted import axis_frames, blocked_along
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, discs_of
 from zones.machinable import LEVEL, SEEN
 from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips

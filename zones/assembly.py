@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 
 FRUSTUM_SLICES = 6
 

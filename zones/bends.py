@@ -23,7 +23,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from geometry.bspline import CONTROL_POINTS, SplineCurve, arc_length, even_errors, fit_even, resample
 from geometry.mesh import F64
 

@@ -14,7 +14,7 @@ import numpy as np
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_grid, drop_tips
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, discs_of
 from zones.lattice import Lattice
 from zones.reach import LEVEL_TOLERANCE, LOOKUP_STEP

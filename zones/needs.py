@@ -16,7 +16,7 @@ from geometry.drop import drop_tips
 from geometry.mesh import F64
 from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.assembly import Clearances
 from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
 from zones.fixtures import over_the_part

@@ -20,7 +20,7 @@ from geometry.errors import InternalError
 from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
 from geometry.tilted import axis_frames
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.approach import approach, directions_over_hemisphere, resolution_of
 from zones.assembly import Clearances
 from zones.sight import able

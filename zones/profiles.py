@@ -15,7 +15,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import finite_points
+from geometry.array_checks import finite_points
 from zones.bends import Bend, BendMeasures, Way, measure_bends
 
 # Limits of the table; beyond the last relative distance there is no second type.

@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix, hstack, identity
 from geometry.errors import InternalError
 from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from zones.catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, nearest
 from zones.fixtures import covered, in_sight
 from zones.needs import Buyer, Cutter

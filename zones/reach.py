@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, Disc, discs_of
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
 from zones.lattice import Lattice

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.faces import connection_faces
 from zones.machinable import LEVEL, Form, forms_of
 from zones.model import Decomposition

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from zones.categories import Categories, Category
 from zones.machinable import Form
 from zones.model import Decomposition

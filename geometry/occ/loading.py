@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.frames import Placement
 from geometry.occ.curvature import face_info, surface_name
 from geometry.occ.edges import edge_infos
 from geometry.occ.healing import one_solid, swept_as_splines
@@ -16,6 +15,7 @@ from geometry.occ.reading import StepShape, read_shape
 from geometry.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
 from geometry.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.part import EdgeInfo, FaceInfo, Part
+from geometry.setup_frame import Placement
 from geometry.step import check_tolerances
 
 # Modelling tolerance (mm) taken when the file names none, and the range in which a named one is believed.

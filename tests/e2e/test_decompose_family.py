@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.frames import Placement
 from geometry.part import Part
+from geometry.setup_frame import Placement
 from geometry.step import read_part
 from zones.decompose import decompose
 from zones.model import Decomposition

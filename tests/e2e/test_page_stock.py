@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from service import viewstock
 from service.sides import Look
 from service.viewdata import tool_shape

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
 from verify.clash import run_clashes
 from verify.model import NcProgram, ProofSetup, ScoredSamples

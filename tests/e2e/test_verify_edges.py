@@ -8,7 +8,7 @@ import pytest
 
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from tests.hand_parts import as_part, prism
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.prove import prove

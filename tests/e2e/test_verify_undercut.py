@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from tests.hand_parts import prism
 from tests.pocket_case import line_of, text
 from verify.model import NcProgram, ProofSetup, ScoredSamples

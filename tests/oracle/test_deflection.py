@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.deflection import CARBIDE, CORE, compliance, cutting_force, engaged_angle
 
 TOOLS = [

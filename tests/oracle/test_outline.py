@@ -15,7 +15,7 @@ from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
 from geometry.mesh import TriangleMesh
 from geometry.outline import CHORD, Arc, Line, Outline, heights
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from geometry.turned import drop_turned, turned_contacts
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter

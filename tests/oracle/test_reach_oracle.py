@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, tool
 from tests.oracle.naive_drop import lift_of_points
 from zones.assembly import Clearances

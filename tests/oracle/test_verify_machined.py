@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from tests.pocket_case import SETUP, TOOL, block, program, text
 from verify.machined import clipped, machined_stock, surface_error
 from verify.model import ProofSetup

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from tests.pocket_case import SETUP, block, scored, text
 from verify.model import NcProgram, ScoredSamples
 from verify.prove import prove

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.moves import Moves
 from verify.toolaxes import ToolAxes
 

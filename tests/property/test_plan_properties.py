@@ -11,7 +11,7 @@ import pytest
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import (
     Case,
     ball,

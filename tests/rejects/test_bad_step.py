@@ -8,7 +8,7 @@ import time
 import psutil
 import pytest
 
-from geometry.child import run_limited
+from geometry.child_process import run_limited
 from geometry.errors import PartError, ResourceError, SetupError, StepError
 from geometry.occ.loading import load_part
 from geometry.step import read_part
@@ -274,9 +274,9 @@ def test_memory_hog_is_stopped():
 
 def test_child_dies_with_its_parent(tmp_path):
     note = tmp_path / "pid"
-    inner = ("from geometry.child import guard_child; guard_child(); import os, time; "
+    inner = ("from geometry.child_process import guard_child; guard_child(); import os, time; "
              f"open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)")
-    outer = ("import sys; from geometry.child import run_limited; "
+    outer = ("import sys; from geometry.child_process import run_limited; "
              f"run_limited([sys.executable, '-c', {inner!r}], b'', time_limit=60, memory_limit=1e9)")
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     parent = psutil.Popen([sys.executable, "-c", outer], cwd=root, env={**os.environ, "PYTHONPATH": root})

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool
 from zones.approach import approach, directions_over_hemisphere, resolution_of, zone_cone
 from zones.assembly import Clearances

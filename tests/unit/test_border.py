@@ -8,7 +8,7 @@ import pytest
 from geometry.bvh import TriangleTree
 from geometry.drop import drop_tips
 from geometry.mesh import TriangleMesh
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
 from toolpath.border import COARSEST, FAR, beyond
 from toolpath.family import Target

@@ -12,10 +12,10 @@ from scipy.spatial import cKDTree
 
 from benchmarks import brute_samples as brute
 from geometry.bvh import TriangleTree
-from geometry.frames import Placement
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment
+from geometry.setup_frame import Placement
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, bent_strip, low_walls, slope_field, tool
 from tests.step_files import write_step
 from zones.assembly import Clearances

@@ -9,7 +9,7 @@ from geometry.bvh import TriangleTree
 from geometry.drop import blocked_many, drop_grid, drop_tips
 from geometry.errors import GeometryError, SetupError
 from geometry.mesh import TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 

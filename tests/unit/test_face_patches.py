@@ -11,9 +11,9 @@ import cadquery as cq  # noqa: E402
 from geometry.errors import GeometryError, StepError  # noqa: E402
 from geometry.exact import ExactFaces  # noqa: E402
 from geometry.facepatches import patches_from_bytes, read_patches  # noqa: E402
-from geometry.frames import Placement  # noqa: E402
 from geometry.occ.loading import load_part  # noqa: E402
 from geometry.occ.patches import load_patches  # noqa: E402
+from geometry.setup_frame import Placement  # noqa: E402
 from geometry.step import read_part  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import SetupError
-from geometry.frames import Placement
+from geometry.setup_frame import Placement
 
 
 def test_default_is_the_file_frame():

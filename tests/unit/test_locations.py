@@ -5,7 +5,7 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine
 from service.programs import room_to_turn
 from tests.hand_parts import box_mesh, joined

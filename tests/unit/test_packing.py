@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import CamError
-from geometry.timing import Rates
+from geometry.move_timing import Rates
 from service.packing import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones import proposal
 from zones.assembly import Clearances

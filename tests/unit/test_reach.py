@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.bvh import TriangleTree
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from zones.assembly import Clearances, discs_of
 from zones.lattice import Lattice, lattice_step

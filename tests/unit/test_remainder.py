@@ -10,7 +10,7 @@ import pytest
 
 from geometry.bvh import TriangleTree
 from geometry.sampling import SurfaceSamples
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.catalogue import DIAMETERS, catalogue
 from zones.model import Connection, Decomposition

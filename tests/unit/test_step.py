@@ -8,12 +8,12 @@ import pytest
 import trimesh
 
 from geometry.exact import ExactFaces
-from geometry.frames import Placement
 from geometry.mesh import TriangleMesh
 from geometry.occ.holes import fill_slivers
 from geometry.occ.loading import load_part
 from geometry.occ.meshing import count_open_edges
 from geometry.part import EdgeKind
+from geometry.setup_frame import Placement
 from geometry.step import read_part
 from tests.step_files import real_part, write_step
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.timing import Rates, move_seconds
+from geometry.move_timing import Rates, move_seconds
 
 A = 1000.0
 STOPPING = Rates(10000.0, A, 0.0)

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from service.tooldrawing import HEIGHT, LETTER, WIDTH, draw_tool, svg_of
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.toolbody import HolderSegment, ToolBody
+from geometry.tool_body import HolderSegment, ToolBody
 from verify.fitness import way_findings
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from service.viewpaths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
 from tests.hand_parts import as_part, box_mesh
 from verify.model import NcProgram, ProofSetup

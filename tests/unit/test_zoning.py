@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.toolbody import HolderSegment
+from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
 from zones.machinable import Form, forms_of, machinable_faces
 from zones.model import Connection, Decomposition

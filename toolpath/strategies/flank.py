@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.family import Target
 from toolpath.flank import ALONG, UP, Wall, Wanted, bands
 from toolpath.leaning import UP_Z, Runs, Surroundings, in_turn

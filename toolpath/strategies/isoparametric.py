@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.family import Target
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, Laid

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.family import Target
 from toolpath.leaning import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.piece import LEAST_PIECE, Piece

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.family import Target
 from toolpath.isoparametric import IsoSurface, Laid
 from toolpath.leaning import LOOK, TURN_S, Runs, Surroundings, in_turn

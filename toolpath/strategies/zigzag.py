@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target

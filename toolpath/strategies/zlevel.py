@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.toolbody import ToolBody
+from geometry.tool_body import ToolBody
 from toolpath.levels import contour_pieces, dilated
 from toolpath.lines import Line
 from zones.reach import TipField
