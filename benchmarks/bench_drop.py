@@ -19,9 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numba  # noqa: E402
 import numpy as np  # noqa: E402
 
-from geometry.bvh import TriangleTree  # noqa: E402
-from geometry.drop import blocked_many, drop_tips  # noqa: E402
 from geometry.mesh import TriangleMesh  # noqa: E402
+from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
+from geometry.mesh_queries.drop import blocked_many, drop_tips  # noqa: E402
 
 from surfaces import convex, wavy  # noqa: E402 isort:skip
 

@@ -19,9 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 
-from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.mesh import TriangleMesh  # noqa: E402
-from geometry.outline import Outline, heights  # noqa: E402
+from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
+from geometry.mesh_queries.revolved_outline import Outline, heights  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_contacts, drop_cutter  # noqa: E402
 

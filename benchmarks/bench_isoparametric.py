@@ -24,12 +24,12 @@ from numpy.typing import NDArray  # noqa: E402
 
 from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
 from examples.family import make_part  # noqa: E402
-from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
 from geometry.facepatches import read_patches  # noqa: E402
 from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
+from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.squaring import Method, Squared, squared  # noqa: E402

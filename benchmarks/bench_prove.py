@@ -26,8 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 
-from geometry.bvh import TriangleTree  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
+from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.part import FaceInfo, Part  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402

@@ -15,10 +15,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay, cKDTree
 
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64, TriangleMesh
-from geometry.nearest import nearest
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
 from geometry.quadgrid import even
 
 MOST_ROUNDS = 20

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from geometry.bvh import TriangleTree
 from geometry.embedding import located
 from geometry.errors import GeometryError
 from geometry.footpoints import foot_points
 from geometry.mesh import F64, TriangleMesh
-from geometry.nearest import nearest
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
 from geometry.nurbs import NurbsSurface
 
 MOST_STRETCHED = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even

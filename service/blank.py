@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.boxes import point_of_mesh_in_box
-from geometry.bvh import TriangleTree
 from geometry.errors import SetupError
 from geometry.mesh import TriangleMesh
-from geometry.nearest import nearest
+from geometry.mesh_queries.box_overlap import point_of_mesh_in_box
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
-from geometry.rays import first_hits
 from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.convert import face_numbers

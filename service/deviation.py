@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from geometry.keyed import KeyedPoints
 from geometry.mesh import F64
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from output.text import ascii_text, decimal

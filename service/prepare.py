@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.errors import CamError, SetupError
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
 from geometry.setup_frame import Placement

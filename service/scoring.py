@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.keyed import KeyedPoints
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.prepare import Prepared, machinable_triangles
 from toolpath.family import Target

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from schemas.setup import Setup
 from service.convert import no_stock_file

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import CamError
-from geometry.keyed import KeyedPoints
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from service.convert import tool_bodies

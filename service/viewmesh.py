@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.asker import Asker, bisect
-from geometry.keyed import KeyedPoints
 from geometry.mesh import F64, I32
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import EdgeKind, Part
 from geometry.sampling import SurfaceSamples
 from geometry.sheet import Sheet, refined, sheet_of, sides_of

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.tool_body import HolderSegment, ToolBody

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import ToolBody
 from tests.hand_parts import RAMP, Case
 from toolpath.motion import Motion, Workingstep

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from geometry.drop import drop_contacts
 from geometry.mesh import F64
+from geometry.mesh_queries.drop import drop_contacts
 from toolpath.family import I64, Target
 from zones.reach import TipField, touchable
 

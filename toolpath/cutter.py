@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
-from geometry.outline import Arc, Line, Outline
+from geometry.mesh_queries.revolved_outline import Arc, Line, Outline
 from geometry.tool_body import ToolBody
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import drop, push, turned
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, I32, TriangleMesh
-from geometry.outline import Outline
+from geometry.mesh_queries import drop, outline_drop, push
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.revolved_outline import Outline
 from toolpath.cutter import Cutter
 
 
@@ -58,7 +58,7 @@ def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike
     """
     tree = _tree(mesh, cutter)
     if cutter.outline is not None:
-        return turned.drop_turned(tree, xy, cutter.outline)
+        return outline_drop.drop_turned(tree, xy, cutter.outline)
     return drop.drop_tips(tree, xy, cutter.radius, cutter.corner_radius)
 
 
@@ -66,7 +66,7 @@ def drop_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLi
     """``drop_cutter`` with what holds each tip up; parameters and errors as there."""
     tree = _tree(mesh, cutter)
     if cutter.outline is not None:
-        got = turned.turned_contacts(tree, xy, cutter.outline)
+        got = outline_drop.turned_contacts(tree, xy, cutter.outline)
     else:
         got = drop.drop_contacts(tree, xy, cutter.radius, cutter.corner_radius)
     return CutterContacts(got.z, got.point, got.triangle, _faces(tree, got.triangle))

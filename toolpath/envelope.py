@@ -16,8 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 from toolpath.roots import roots

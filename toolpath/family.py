@@ -17,10 +17,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
 from geometry.kernels.outline import ARC
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.follow import KINK, Limit, pieces

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.tilted import axis_frames, blocked_along
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
 from toolpath.forward import Profile
 from toolpath.lines import true_runs

@@ -29,7 +29,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from geometry.tilted import axis_frames
+from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.tool_body import ToolBody
 from toolpath.forward import Profile
 from toolpath.lines import true_runs

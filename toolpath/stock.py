@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_grid
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_grid
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.errors import VerificationError
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from verify.model import ProofSetup, StockKind
 from verify.ways import way_out_of_mesh
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
-from geometry.nearest import nearest
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
 from geometry.tool_body import ToolBody
 from verify.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.bodies import Bodies

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, I32, TriangleMesh
-from geometry.nearest import nearest
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples, lattice_samples
 from verify.kernels.depth import deepest
 from verify.progress import Report, silent

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD

@@ -17,9 +17,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 
 FACING = -0.5

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
 from verify.blank import stock_on_normals
 from verify.findings import Source

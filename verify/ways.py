@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.nearest import nearest
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.mesh_queries.rays import first_hits
 
 CLOSE = 1e-6  # mm: as near as this to the surface is on it
 MOST_STEPS = 200

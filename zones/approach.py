@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.tilted import axis_frames, blocked_along
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, discs_of
 from zones.machinable import LEVEL, SEEN
@@ -64,7 +64,7 @@ def directions_over_hemisphere(count: int, *, whole: bool = False) -> F64:
 
 
 def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
-    """Cutting part, shank and holder as ``geometry.tilted`` wants them.
+    """Cutting part, shank and holder as ``geometry.mesh_queries.tilted_collision`` wants them.
 
     Returns (k, 3) float64, mm: radius, corner radius, height above the tip, all grown by the allowance. Bodies that
     stand in the shadow of one as wide below them are left out.

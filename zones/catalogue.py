@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_grid, drop_tips
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_grid, drop_tips
 from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, discs_of
 from zones.lattice import Lattice

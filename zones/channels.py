@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
-from geometry.nearest import nearest
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
 from geometry.sampling import sample_surface
 from zones.borders import Border, Places, neighbours
 from zones.facegraph import FaceGraph, cast

@@ -12,10 +12,10 @@ from itertools import combinations
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.part import EdgeInfo, EdgeKind, Part
-from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples, joined, sample_surface
 
 STEEP_NZ = 0.5

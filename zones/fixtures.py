@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from zones.assembly import Clearances
 from zones.lattice import lattice_step

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.drop import drop_tips
 from geometry.mesh import F64
-from geometry.rays import first_hits
+from geometry.mesh_queries.drop import drop_tips
+from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from zones.assembly import Clearances

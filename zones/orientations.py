@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_matrix, hstack, identity
 
-from geometry.bvh import TriangleTree
 from geometry.errors import InternalError
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.sampling import SurfaceSamples
-from geometry.tilted import axis_frames
 from geometry.tool_body import ToolBody
 from zones.approach import approach, directions_over_hemisphere, resolution_of
 from zones.assembly import Clearances

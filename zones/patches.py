@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.keyed import KeyedPoints
 from geometry.mesh import F64, I32
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.trim import FacePatch, trim_faces
 from zones.machinable import LEVEL, STEEP

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.rays import first_hits
+from geometry.mesh_queries.rays import first_hits
 from zones.model import Wall
 from zones.slices import Slice, Slicer
 

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, maximum_filter
 from scipy.spatial import cKDTree
 
-from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many, drop_grid, drop_tips
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import blocked_many, drop_grid, drop_tips
 from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, Disc, discs_of
 from zones.kernels.lattice import noncut_blocked, noncut_lookup

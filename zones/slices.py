@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 
 
 @dataclass(frozen=True, eq=False)

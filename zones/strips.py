@@ -17,11 +17,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
-from geometry.keyed import KeyedPoints
 from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
+from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
-from geometry.rays import first_hits
 from zones.model import Channel, Decomposition
 from zones.sections import SideCurve
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
-from geometry.rays import first_hits
 from geometry.sampling import sample_surface
 from zones.model import Wall
 

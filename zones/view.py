@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from zones.reach import TipField

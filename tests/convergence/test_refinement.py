@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense

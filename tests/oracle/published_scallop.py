@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
+from geometry.mesh_queries.rays import first_hits
 
 FEED = 1.0
 FIRST_STEP = 1.0  # also the longest the thesis lets a side step be

@@ -5,11 +5,11 @@ import pytest
 from drop_shapes import CUTTERS, SHAPES, smooth, soup
 from naive_drop import drop, lift_of_points
 
-from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many, drop_contacts, drop_grid, drop_tips
-from geometry.heights import heights
 from geometry.kernels.drop import drop_tip_below
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import blocked_many, drop_contacts, drop_grid, drop_tips
+from geometry.mesh_queries.height_field import heights
 from geometry.sampling import sample_surface
 
 

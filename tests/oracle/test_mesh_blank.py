@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.errors import VerificationError
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, terraces
 from toolpath.stock import StockMap
 from verify.blank import stands_over_air, stock_bounds, stock_on_normals

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from drop_shapes import CUTTERS, SHAPES, smooth
 
-from geometry.bvh import TriangleTree
-from geometry.drop import FEW, drop_tips
 from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
 from geometry.mesh import TriangleMesh
-from geometry.outline import CHORD, Arc, Line, Outline, heights
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import FEW, drop_tips
+from geometry.mesh_queries.outline_drop import drop_turned, turned_contacts
+from geometry.mesh_queries.revolved_outline import CHORD, Arc, Line, Outline, heights
 from geometry.tool_body import HolderSegment, ToolBody
-from geometry.turned import drop_turned, turned_contacts
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from examples.thesis import Kind, surface
-from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.oracle.published_scallop import published_passes, published_scallop
 
 SLOPE = 0.2  # of the surfaces at their borders

@@ -11,11 +11,11 @@ from drop_shapes import CUTTERS, SHAPES, box, smooth, soup
 from naive_drop import drop as naive
 from test_outline import TURNED
 
-from geometry.bvh import TriangleTree
-from geometry.drop import FEW
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
-from geometry.outline import heights
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import FEW
+from geometry.mesh_queries.revolved_outline import heights
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_contacts, drop_cutter, push_contacts, push_cutter
 

@@ -5,12 +5,12 @@ import pytest
 from drop_shapes import SHAPES, box, smooth
 from naive_drop import dilate, first_hit
 
-from geometry.bvh import TriangleTree
-from geometry.dilate import Rounding, dilate_disc
 from geometry.errors import GeometryError
-from geometry.heights import height_grid, heights
 from geometry.mesh import TriangleMesh
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.dilate import Rounding, dilate_disc
+from geometry.mesh_queries.height_field import height_grid, heights
+from geometry.mesh_queries.rays import first_hits
 
 
 @pytest.mark.parametrize("shape", ["smooth", "walls", "soup"])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from drop_shapes import CUTTERS, SHAPES, walls
 
-from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
-from geometry.tilted import axis_frames, blocked_along
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import blocked_many
+from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 
 SPECIAL = [[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [1e-9, 0, -1], [1e-7, 1e-7, 1]]
 HOLDER = (3.0, 0.0, 5.0)
@@ -59,7 +59,7 @@ def test_blocked_is_what_the_turned_mesh_says(shape, cutter):
 @pytest.mark.parametrize("cutter", CUTTERS)
 def test_the_limit_itself_is_found(cutter):
     """A hair above the height that just touches is free, a hair below is not."""
-    from geometry.drop import drop_tips
+    from geometry.mesh_queries.drop import drop_tips
 
     mesh, (radius, corner) = walls(), CUTTERS[cutter]
     tree, frames = TriangleTree(mesh), axis_frames(axes(10, 4))

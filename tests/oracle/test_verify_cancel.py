@@ -115,7 +115,7 @@ def test_what_a_tile_raises_comes_through_and_results_keep_their_order():
 
 
 def test_depths_of_gouges_are_told_in_batches_and_do_not_depend_on_them():
-    from geometry.bvh import TriangleTree
+    from geometry.mesh_queries.bvh import TriangleTree
 
     tree = TriangleTree(PART.mesh)
     s = SCORED.samples

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.pocket_case import TOOL, block
 from verify.blank import stock_on_normals
 from verify.guard import convex_edges, gouge_depths

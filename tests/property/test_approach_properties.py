@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from tests.hand_parts import (
     HOLDER,

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.bvh import TriangleTree
-from geometry.drop import FEW, blocked_many, drop_contacts, drop_grid, drop_tips
 from geometry.mesh import TriangleMesh
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import FEW, blocked_many, drop_contacts, drop_grid, drop_tips
+from geometry.mesh_queries.rays import first_hits
 
 seeds = st.integers(0, 10_000)
 radii = st.tuples(st.floats(0.05, 5.0), st.floats(0.0, 1.0)).map(lambda t: (t[0], t[0] * t[1]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from geometry.drop import drop_tips
+from geometry.mesh_queries.drop import drop_tips
 from tests.hand_parts import box_mesh, field_of, joined, tool
 from tests.plan_checks import dense
 from toolpath.strategies import floor

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import (

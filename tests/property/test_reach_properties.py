@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface, with_surface_normals
 from tests.hand_parts import (
     SHORT_TOOLS,

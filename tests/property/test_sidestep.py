@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import slope_field
 from toolpath.cutter import Cutter
 from toolpath.direction import CANDIDATES, best_direction

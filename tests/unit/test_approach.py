@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool

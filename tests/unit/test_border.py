@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
 from toolpath.border import COARSEST, FAR, beyond

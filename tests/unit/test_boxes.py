@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.boxes import is_inside, point_of_mesh_in_box
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.box_overlap import is_inside, point_of_mesh_in_box
 
 
 def block(lower, upper):

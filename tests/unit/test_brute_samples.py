@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks import brute_samples as brute
-from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.setup_frame import Placement
 from geometry.tool_body import HolderSegment

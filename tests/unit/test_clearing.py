@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, box_mesh, field_of, joined, tool
 from toolpath.clearing import Clearing
 from toolpath.engaged import CLOSE, LOOK, angles

@@ -9,7 +9,7 @@ import pytest
 
 cq = pytest.importorskip("cadquery")
 
-from geometry.bvh import TriangleTree  # noqa: E402
+from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.occ.loading import load_part  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402

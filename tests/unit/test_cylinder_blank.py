@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.errors import SetupError
+from geometry.mesh_queries.bvh import TriangleTree
 from service.blank import check_against_part
 from service.convert import check_plannable, parse_setup
 from service.stock import blank_of

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many, drop_grid, drop_tips
 from geometry.errors import GeometryError, SetupError
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import blocked_many, drop_grid, drop_tips
 from geometry.tool_body import ToolBody
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
 from toolpath.engaged import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within

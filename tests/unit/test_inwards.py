@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, field_of, joined, tool
 from toolpath.inwards import DISC, Inwards
 from toolpath.kernels.march import march, spread

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.keyed import KeyedPoints
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 
 
 @pytest.mark.parametrize("seed", range(4))

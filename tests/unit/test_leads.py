@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
 from toolpath.leads import SIZES, arc_onto, radii

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.leaning import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
 from toolpath.piece import Piece

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.nurbs import NurbsSurface
 from service.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.lines import Line, dense

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
 from toolpath.cutter import Cutter

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
 from tests.unit.test_matched import bowl, measured
 from toolpath.family import Target

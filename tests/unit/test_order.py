@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
-from geometry.drop import blocked_many, drop_tips
 from geometry.mesh import TriangleMesh
-from geometry.order import LARGE, MANY, along_curve
-from geometry.outline import Outline
-from geometry.push import push_stops
-from geometry.turned import drop_turned
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.curve_order import LARGE, MANY, along_curve
+from geometry.mesh_queries.drop import blocked_many, drop_tips
+from geometry.mesh_queries.outline_drop import drop_turned
+from geometry.mesh_queries.push import push_stops
+from geometry.mesh_queries.revolved_outline import Outline
 
 
 def _field(n=80):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine

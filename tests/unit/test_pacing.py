@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from service.chain import cut_table
 from service.convert import parse_setup, tool_bodies
 from tests.hand_parts import ball, box_mesh, tool

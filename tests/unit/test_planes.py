@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, view_of
 from zones.machinable import Form
 from zones.model import Decomposition

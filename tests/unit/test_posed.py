@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.gridmap import GridMap
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
 from toolpath.family import Target

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from zones.assembly import Clearances, discs_of

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
-from geometry.rays import first_hits
 from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import SHAPES, to_part
 from zones.categories import Categories

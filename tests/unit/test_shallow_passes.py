@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.drop import drop_tips
+from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
 from tests.hand_parts import SURFACES, ball, dome, field_of, terraces, tool
 from tests.plan_checks import dense

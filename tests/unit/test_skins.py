@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, low_walls, plan_part
 from toolpath.family import Target
 from toolpath.finish import Finish

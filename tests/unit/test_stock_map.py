@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL

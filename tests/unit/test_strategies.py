@@ -9,8 +9,8 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_tips
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_tips
 from tests.hand_parts import SURFACES, ball, box_mesh, corner, field_of, samples_of, slope_field, terraces, tool, walls
 from tests.plan_checks import dense
 from toolpath.lines import Line

@@ -7,7 +7,7 @@ import math
 import cadquery as cq
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.decomposition_shapes import box, plate, to_part
 from zones.decompose import decompose
 from zones.thinness import Slender, slender_walls

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
+from geometry.mesh_queries.bvh import TriangleTree
 from service.packing import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.test_isoparametric_strategy import bowl

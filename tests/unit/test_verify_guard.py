@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
-from geometry.nearest import nearest
-from geometry.rays import first_hits
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.mesh_queries.rays import first_hits
 from tests.hand_parts import box_mesh, dome, slope_field
 from verify.guard import (
     DEEP_A_MOVE,

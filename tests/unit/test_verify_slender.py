@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from geometry.bvh import TriangleTree
 from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from tests.decomposition_shapes import box, to_part
 from tests.hand_parts import joined, terraces

@@ -1,7 +1,7 @@
 """Whether a body of revolution enters a mesh along any axis, without turning the mesh or building its tree again.
 
 A tool of several bodies (cutting part, shank, holder) is asked for in one walk. Every body goes on along its axis
-without end, as in ``geometry.drop``: the machine stands there. Theory: docs/theory/approach.md.
+without end, as in ``geometry.mesh_queries.drop``: the machine stands there. Theory: docs/theory/approach.md.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import tilted as kernels
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
 
 
 def axis_frames(axes: ArrayLike) -> F64:
@@ -67,7 +67,7 @@ def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips:
     -------
     (n,) bool
         True where some body would have to be lifted by more than 1e-9 mm along the axis to be free: for each what
-        ``geometry.drop.blocked_many`` says of the turned mesh, to rounding.
+        ``geometry.mesh_queries.drop.blocked_many`` says of the turned mesh, to rounding.
 
     Raises
     ------

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
 from geometry.mesh import F64, I32
-from geometry.order import in_order
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.curve_order import in_order
 
 FEW = 4000  # queries below this are not worth waking a second thread for
 

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
 from geometry.errors import GeometryError
 from geometry.kernels import ray as kernels
 from geometry.mesh import F64, I32
+from geometry.mesh_queries.bvh import TriangleTree
 
 
 def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_min: float = 0.0,

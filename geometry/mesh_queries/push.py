@@ -1,7 +1,7 @@
 """How far a body of revolution gets along a horizontal direction: the push, twin of the drop.
 
 The body is an ``Outline``, upright, and goes on upwards as a cylinder without end. Threads and bytes are as in
-``geometry.drop``. Theory: docs/theory/drop.md.
+``geometry.mesh_queries.drop``. Theory: docs/theory/drop.md.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
-from geometry.drop import one_thread
 from geometry.errors import GeometryError
 from geometry.kernels import push as kernels
 from geometry.mesh import F64, I32
-from geometry.order import in_order
-from geometry.outline import Outline
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.curve_order import in_order
+from geometry.mesh_queries.drop import one_thread
+from geometry.mesh_queries.revolved_outline import Outline
 
 
 @dataclass(frozen=True, eq=False)

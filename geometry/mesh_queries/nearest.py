@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.bvh import TriangleTree
 from geometry.kernels.nearest import nearest_triangles
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
 
 
 def nearest(tree: TriangleTree, points: F64, most: float = np.inf) -> tuple[F64, np.ndarray, F64]:

@@ -1,7 +1,7 @@
 """Drop of any body of revolution over a mesh: tapered balls, barrels, whole assemblies.
 
 The body is an ``Outline``, lines and arcs from the tip upwards. For balls, flat ends and bull noses alone
-``geometry.drop`` gives the same tips with less work. Threads and bytes are as there. Theory: docs/theory/drop.md.
+``geometry.mesh_queries.drop`` gives the same tips with less work. Threads and bytes are as there. Theory: docs/theory/drop.md.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from geometry.bvh import TriangleTree
-from geometry.drop import DropContacts, one_thread
 from geometry.kernels import outline as kernels
 from geometry.mesh import F64
-from geometry.order import in_order
-from geometry.outline import Outline
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.curve_order import in_order
+from geometry.mesh_queries.drop import DropContacts, one_thread
+from geometry.mesh_queries.revolved_outline import Outline
 
 
 def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:

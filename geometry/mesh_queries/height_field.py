@@ -1,15 +1,15 @@
 """Height of a mesh seen from above: the drop of a point.
 
-Apart from ``geometry.rays``, so that who asks for rays does not bring the drop kernel in.
+Apart from ``geometry.mesh_queries.rays``, so that who asks for rays does not bring the drop kernel in.
 """
 
 from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from geometry.bvh import TriangleTree
-from geometry.drop import drop_grid, drop_tips
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import drop_grid, drop_tips
 
 
 def heights(tree: TriangleTree, xy: ArrayLike) -> F64:
