@@ -31,8 +31,8 @@ from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.nurbs import NurbsSurface  # noqa: E402
+from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
-from geometry.squaring import Method, Squared, squared  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup, tool_bodies  # noqa: E402
 from service.prepare import clearances, placement_of, prepare  # noqa: E402

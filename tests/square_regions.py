@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.quadgrid import Quad
+from geometry.parameterization.quad_grid import Quad
 
 
 def region(bump: float, notch: float, step: float = 0.0, size: float = 1.0) -> tuple[np.ndarray, ...]:

@@ -24,10 +24,10 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from geometry.errors import GeometryError
-from geometry.gridmap import GridMap
-from geometry.joined import Joined
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
+from geometry.parameterization.grid_map import GridMap
+from geometry.parameterization.joined_faces import Joined
 from toolpath.forward import Curve
 from toolpath.kernels.beside import left_beside
 

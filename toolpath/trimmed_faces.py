@@ -10,10 +10,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from geometry.joined import Joined
 from geometry.mesh import F64, TriangleMesh
 from geometry.nurbs import NurbsSurface
-from geometry.squaring import Squared, squared
+from geometry.parameterization.joined_faces import Joined
+from geometry.parameterization.square_patches import Squared, squared
 from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 
 LATTICE = 9  # places each way at which the rise of both families of passes is looked at

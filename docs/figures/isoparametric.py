@@ -15,7 +15,7 @@ import numpy as np  # noqa: E402
 
 from benchmarks.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from geometry.squaring import Method, Squared, squared  # noqa: E402
+from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.corners import find_corners
 from geometry.errors import GeometryError
-from geometry.quadgrid import even
+from geometry.parameterization.quad_grid import even
+from geometry.parameterization.region_corners import find_corners
 from tests.square_regions import region
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from geometry.embedding import embedded, grid_of, triangulated
 from geometry.errors import GeometryError
-from geometry.laplace import laplace
-from geometry.quadgrid import Quad, areas, evenness, folds
+from geometry.parameterization.laplace_grid import laplace
+from geometry.parameterization.planar_embedding import embedded, grid_of, triangulated
+from geometry.parameterization.quad_grid import Quad, areas, evenness, folds
 from tests.square_regions import region
 
 SHAPES = {"A": (0.0, 0.05), "M": (0.2, -0.17), "B": (0.35, -0.28, 0.12), "slit": (0.75, 0.0)}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.joined import Joined
 from geometry.mesh import TriangleMesh
 from geometry.nurbs import NurbsSurface
-from geometry.squaring import squared
+from geometry.parameterization.joined_faces import Joined
+from geometry.parameterization.square_patches import squared
 from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import JoinedSurface, lay_out

@@ -7,8 +7,8 @@ import pytest
 
 from geometry.errors import GeometryError
 from geometry.footpoints import foot_points
-from geometry.gridmap import GridMap
 from geometry.nurbs import NurbsSurface
+from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import tool
 from toolpath.isoparametric import IsoSurface
 from toolpath.matched import Matched, Wanted

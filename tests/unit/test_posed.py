@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.gridmap import GridMap
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.nurbs import NurbsSurface
+from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import ball, tool
 from toolpath.family import Target
 from toolpath.forward import Profile, steps

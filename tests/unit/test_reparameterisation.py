@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.fronts import correction, interpolated
-from geometry.laplace import laplace
-from geometry.quadgrid import Quad, areas, coons, even, evenness, folds
+from geometry.parameterization.laplace_grid import laplace
+from geometry.parameterization.moving_fronts import correction, interpolated
+from geometry.parameterization.quad_grid import Quad, areas, coons, even, evenness, folds
 from tests.square_regions import quad, region
 
 

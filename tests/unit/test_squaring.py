@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from geometry.errors import GeometryError
-from geometry.quadgrid import folds
-from geometry.squaring import Method, squared
+from geometry.parameterization.quad_grid import folds
+from geometry.parameterization.square_patches import Method, squared
 from tests.square_regions import region
 
 T = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]

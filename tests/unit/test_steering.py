@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.gridmap import GridMap
+from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import ball
 from tests.unit.test_posed import CHORD, SCALLOP, opposite, tree_of, wall
 from toolpath.forward import Profile, steps

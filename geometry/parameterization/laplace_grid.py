@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from geometry.mesh import F64
-from geometry.quadgrid import Quad, coons
+from geometry.parameterization.quad_grid import Quad, coons
 
 SETTLED = 1e-9  # of the size of the region
 MOST_ROUNDS = 100

@@ -6,7 +6,7 @@ Petitjean, Ray and Maillot 2002): of all ways to lay a sheet of triangles down, 
     sum over triangles of |W1 U1 + W2 U2 + W3 U3|² / 2 A      is least,
 
 U the corners as complex numbers, W the opposite sides of the triangle in its own plane. What is one region there is
-squared like the parameters of a face (``geometry.squaring``), and each place goes back through its facet to the nearest
+squared like the parameters of a face (``geometry.parameterization.square_patches``), and each place goes back through its facet to the nearest
 place of the exact surface.
 
 Notation
@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from geometry.embedding import located
 from geometry.errors import GeometryError
 from geometry.footpoints import foot_points
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.nurbs import NurbsSurface
+from geometry.parameterization.planar_embedding import located
 
 MOST_STRETCHED = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even
 ROUGH = 1e-9  # of the size: sides of a triangle that are shorter are none

@@ -13,7 +13,7 @@ from scipy.interpolate import RectBivariateSpline
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.quadgrid import corner_jacobians
+from geometry.parameterization.quad_grid import corner_jacobians
 
 FINER = 4  # places a cell, each way, at which the map is looked at for folds
 STRAIGHT = 0.05  # of the mean: at a corner of the square where the border goes straight on, the map may be as flat

@@ -19,7 +19,7 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
-from geometry.quadgrid import even
+from geometry.parameterization.quad_grid import even
 
 MOST_ROUNDS = 20
 ROUNDS = 12  # of putting places on edges between two places of the border

@@ -3,7 +3,7 @@
 1. Holes are filled: passes go over them, and what has nothing under it is left out where the passes are walked.
 2. A border that turns inwards sharply (an L, a slit) is cut there, straight across to the nearest border: no grid known
    is free of folds at such a corner (docs/theory/isoparametric.md).
-3. Each piece gets its four corners (``geometry.corners``) and the first of these grids that does not fold: fronts from
+3. Each piece gets its four corners (``geometry.parameterization.region_corners``) and the first of these grids that does not fold: fronts from
    two sides, fronts blended with Laplace's grid by a quarter, a half, three quarters, Laplace's, and the triangulated
    piece laid into the square. Where all fold, turns in count that take more of the border, and it is cut there.
 What was filled, cut, tried and not taken is kept with each piece.
@@ -19,14 +19,14 @@ import shapely
 from scipy.spatial import QhullError
 from shapely.ops import split
 
-from geometry.corners import Corners, find_corners
-from geometry.embedding import embedded, grid_of, triangulated
 from geometry.errors import GeometryError
-from geometry.fronts import interpolated
-from geometry.gridmap import GridMap
-from geometry.laplace import laplace
 from geometry.mesh import F64
-from geometry.quadgrid import Quad, evenness
+from geometry.parameterization.grid_map import GridMap
+from geometry.parameterization.laplace_grid import laplace
+from geometry.parameterization.moving_fronts import interpolated
+from geometry.parameterization.planar_embedding import embedded, grid_of, triangulated
+from geometry.parameterization.quad_grid import Quad, evenness
+from geometry.parameterization.region_corners import Corners, find_corners
 
 INWARDS = np.radians(50.0)  # a border that turns in by more is cut there
 NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a turn is measured: first, and if need be

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.quadgrid import Quad, even
+from geometry.parameterization.quad_grid import Quad, even
 
 SHARPNESS, POWER = 1.0, 50.0
 """gamma of 2.13 and p of 2.15: from 0.5 to 1, and from 50 to 100, the grids are the same to the eye."""
