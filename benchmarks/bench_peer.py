@@ -32,7 +32,7 @@ from benchmarks.bench_prove import block, program  # noqa: E402
 from examples.demo import write_small  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
-from geometry.step import read_part  # noqa: E402
+from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
 from service.convert import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402

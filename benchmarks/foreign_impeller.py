@@ -32,7 +32,7 @@ from benchmarks.foreign_cases import CASES, MARGIN, Foreign, Paths, covered, pat
 from benchmarks.foreign_programs import GEOMETRIC, compare, lines_of, prove_case, run_twin  # noqa: E402
 from benchmarks.foreign_twin import SPACING  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
-from geometry.step import read_part  # noqa: E402
+from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.stl import write_stl  # noqa: E402
 from service.camera import Camera  # noqa: E402
 from service.scene import lit  # noqa: E402

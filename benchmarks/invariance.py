@@ -209,7 +209,7 @@ def zone_table(step: Path, setup: dict[str, Any]) -> dict[tuple[str, str, str], 
 def judge(recipe: str, seed: int, out: Path, with_zones: bool) -> dict[str, Any]:
     """All variants of one part."""
     from benchmarks.family_score import made_part
-    from geometry.step import read_part
+    from geometry.step_import.reader import read_part
 
     begin = time.perf_counter()
     step, _, _ = made_part(recipe, seed, out / "cache")

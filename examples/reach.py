@@ -38,7 +38,7 @@ def reach_of(step_file: Path, setup: dict[str, Any], step: float = STEP) -> dict
     ``by_tool`` with the share of each tool alone, ``step`` in mm.
     Machinable is every face with a place that looks up or sideways (normal z above -0.02).
     """
-    from geometry.step import read_part
+    from geometry.step_import.reader import read_part
 
     mesh = read_part(step_file, chord=CHORD).mesh
     seen = np.isin(mesh.face_ids, np.unique(mesh.face_ids[mesh.normals[:, 2] > SEEN]))

@@ -1,6 +1,6 @@
 """The part as every later stage sees it: plain arrays in the setup frame, mm.
 
-A ``Part`` is made in a child process (``geometry.step``) and travels as arrays;
+A ``Part`` is made in a child process (``geometry.step_import.reader``) and travels as arrays;
 nothing downstream touches OCP objects.
 """
 

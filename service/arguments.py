@@ -65,7 +65,7 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
         The file cannot be read, or its text is no STEP file.
     """
     from geometry.errors import InputError
-    from geometry.step_text import check_text
+    from geometry.step_import.text_checks import check_text
     from service.convert import no_stock_file, of_blank
 
     if setup.stock.kind != "step":

@@ -219,7 +219,7 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None],
           as_json: bool) -> None:
     """Run a command on part and setup, print its result and leave with its exit code."""
     with reported(as_json):
-        from geometry.step_text import check_text
+        from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
         from service.convert import read_setup
 

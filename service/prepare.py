@@ -16,7 +16,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
 from geometry.setup_frame import Placement
-from geometry.step import read_part
+from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trim import FacePatch
 from schemas.setup import Access, Setup
@@ -123,7 +123,7 @@ def load_blank(path: Path, setup: Setup) -> Part:
     Raises
     ------
     CamError
-        As ``geometry.step.read_part``, of the same class and code; it says that the blank is meant.
+        As ``geometry.step_import.reader.read_part``, of the same class and code; it says that the blank is meant.
     """
     try:
         return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup))

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.facepatches import read_patches
 from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
+from geometry.step_import.face_surfaces import read_patches
 from geometry.trim import trim_faces
 from service.prepare import Prepared, placement_of
 from toolpath.strategies.isoparametric import suits

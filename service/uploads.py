@@ -15,7 +15,7 @@ from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
 from geometry.errors import InputError, ProgramError, SetupError
-from geometry.step_text import check_text
+from geometry.step_import.text_checks import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.artifacts import Artifacts
 from service.convert import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup

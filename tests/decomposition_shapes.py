@@ -22,7 +22,7 @@ def to_part(shape: Shape, chord: float = 0.03) -> Part:
     """Write a shape as STEP and read it back, in this process."""
     import cadquery as cq
 
-    from geometry.occ.loading import load_part
+    from geometry.step_import.occ.loading import load_part
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "shape.step"

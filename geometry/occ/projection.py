@@ -11,8 +11,8 @@ from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64
-from geometry.occ.curvature import RESOLUTION
-from geometry.occ.topology import Shape
+from geometry.step_import.occ.curvature import RESOLUTION
+from geometry.step_import.occ.topology import Shape
 
 
 def surface_points(face: Shape, points: F64) -> tuple[F64, F64, F64, F64]:

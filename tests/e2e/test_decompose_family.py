@@ -9,7 +9,7 @@ import pytest
 
 from geometry.part import Part
 from geometry.setup_frame import Placement
-from geometry.step import read_part
+from geometry.step_import.reader import read_part
 from zones.decompose import decompose
 from zones.model import Decomposition
 

@@ -88,7 +88,7 @@ def test_every_square_millimetre_is_proved_or_in_the_remainder(report):
 
 def test_the_machinable_area_is_that_of_the_faces(demo_job, report):
     """The seat is left out, and what no upward line of sight exists for; the rest of the surface is all there."""
-    from geometry.step import read_part
+    from geometry.step_import.reader import read_part
 
     part = read_part(demo_job.part)
     bottom = part.mesh.areas[part.mesh.normals[:, 2] < -0.999].sum()

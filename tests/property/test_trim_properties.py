@@ -19,7 +19,7 @@ SHAPES = {"plane": plane, "tube": tube, "inner tube": lambda: tube(turned=True),
 def solid(folder, name: str) -> Part:
     """A part read from STEP: poles, seams, holes, fillets."""
     cq = pytest.importorskip("cadquery")
-    from geometry.occ.loading import load_part
+    from geometry.step_import.occ.loading import load_part
 
     shapes = {
         "ball": lambda: cq.Solid.makeSphere(4, angleDegrees1=-90, angleDegrees2=90),

@@ -18,7 +18,7 @@ import psutil
 import pytest
 from fastapi.testclient import TestClient
 
-from geometry.occ.loading import load_part
+from geometry.step_import.occ.loading import load_part
 from service.app import create_app
 from service.logs import configure
 from service.settings import Settings

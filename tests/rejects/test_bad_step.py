@@ -10,9 +10,9 @@ import pytest
 
 from geometry.child_process import run_limited
 from geometry.errors import PartError, ResourceError, SetupError, StepError
-from geometry.occ.loading import load_part
-from geometry.step import read_part
-from geometry.step_text import check_text
+from geometry.step_import.occ.loading import load_part
+from geometry.step_import.reader import read_part
+from geometry.step_import.text_checks import check_text
 from tests.step_files import real_part, write_step
 
 cq = pytest.importorskip("cadquery")
@@ -241,9 +241,9 @@ def test_a_reader_that_crashes_blames_the_part_and_one_killed_from_outside_does_
                                time_limit=20.0, memory_limit=1e9)
         return run
 
-    monkeypatch.setattr("geometry.step.run_limited", dying("SIGSEGV"))
+    monkeypatch.setattr("geometry.step_import.reader.run_limited", dying("SIGSEGV"))
     refused(PartError, "reader_crashed", lambda: read_part(tmp_path / "any.step"))
-    monkeypatch.setattr("geometry.step.run_limited", dying("SIGKILL"))
+    monkeypatch.setattr("geometry.step_import.reader.run_limited", dying("SIGKILL"))
     refused(ResourceError, "reader_crashed", lambda: read_part(tmp_path / "any.step"))
 
 

@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from geometry.errors import CamError, InternalError, SetupError, StepError
-from geometry.step_text import check_text
+from geometry.step_import.text_checks import check_text
 from service.convert import check_plannable, parse_setup
 from tests.hostile_inputs import FULL_SETUP, mutated_setup, mutated_step
 
@@ -86,7 +86,7 @@ def test_a_damaged_archive_is_still_told_to_be_one(small, tmp_path):
 
 
 def test_the_reader_outlives_what_it_is_given(small, tmp_path):
-    from geometry.step import read_part
+    from geometry.step_import.reader import read_part
 
     path = tmp_path / "p.step"
     for seed in (2003, 2014, 2018, 2019):  # their texts are in order; the kernel of today dies of the last one

@@ -115,7 +115,7 @@ def test_normals_that_keep_a_tool_out_count_as_wrong():
 
 def test_the_kernel_gives_the_normals_of_the_faces(tmp_path):
     cq = pytest.importorskip("cadquery")
-    from geometry.occ.loading import load_part
+    from geometry.step_import.occ.loading import load_part
 
     path = write_step(cq.Workplane().box(12, 12, 5).faces(">Z").workplane().hole(8), tmp_path / "a.step")
     setup = SimpleNamespace(placement=SimpleNamespace(origin_mm=(0, 0, 1), z_axis=(0, 0, 1), x_axis=(1, 0, 0)),

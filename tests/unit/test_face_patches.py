@@ -9,12 +9,12 @@ pytest.importorskip("cadquery")
 import cadquery as cq  # noqa: E402
 
 from geometry.errors import GeometryError, StepError  # noqa: E402
-from geometry.exact import ExactFaces  # noqa: E402
-from geometry.facepatches import patches_from_bytes, read_patches  # noqa: E402
-from geometry.occ.loading import load_part  # noqa: E402
-from geometry.occ.patches import load_patches  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402
-from geometry.step import read_part  # noqa: E402
+from geometry.step_import.exact_faces import ExactFaces  # noqa: E402
+from geometry.step_import.face_surfaces import patches_from_bytes, read_patches  # noqa: E402
+from geometry.step_import.occ.loading import load_part  # noqa: E402
+from geometry.step_import.occ.patches import load_patches  # noqa: E402
+from geometry.step_import.reader import read_part  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 
 PLACE = Placement((1, 2, 3), (0.1, 1, 0.2), (1, 0, 0))

@@ -10,13 +10,13 @@ cq = pytest.importorskip("cadquery")
 from OCP.BRepAdaptor import BRepAdaptor_Surface  # noqa: E402
 from OCP.gp import gp_Pnt, gp_Vec  # noqa: E402
 
-from geometry.occ import meshing  # noqa: E402
-from geometry.occ.curvature import surface_name  # noqa: E402
-from geometry.occ.deviation import distance_near, face_deviations  # noqa: E402
-from geometry.occ.meshing import count_open_edges, mesh_solid  # noqa: E402
-from geometry.occ.refining import Net, refine_net  # noqa: E402
-from geometry.occ.topology import faces_of  # noqa: E402
-from geometry.occ.triangulating import edge_sides, triangulate  # noqa: E402
+from geometry.step_import.occ import meshing  # noqa: E402
+from geometry.step_import.occ.curvature import surface_name  # noqa: E402
+from geometry.step_import.occ.deviation import distance_near, face_deviations  # noqa: E402
+from geometry.step_import.occ.meshing import count_open_edges, mesh_solid  # noqa: E402
+from geometry.step_import.occ.refining import Net, refine_net  # noqa: E402
+from geometry.step_import.occ.topology import faces_of  # noqa: E402
+from geometry.step_import.occ.triangulating import edge_sides, triangulate  # noqa: E402
 
 CHORD = 0.004
 LENGTH, HEIGHT = 50.0, 10.0

@@ -15,12 +15,12 @@ from OCP.TopAbs import TopAbs_VERTEX  # noqa: E402
 from OCP.TopoDS import TopoDS  # noqa: E402
 
 from geometry.mesh import TriangleMesh  # noqa: E402
-from geometry.occ.holes import extend_parameters  # noqa: E402
-from geometry.occ.loading import load_part, load_solid  # noqa: E402
-from geometry.occ.meshing import mesh_solid  # noqa: E402
-from geometry.occ.topology import edges_of, faces_of, sub_shapes  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402
+from geometry.step_import.occ.holes import extend_parameters  # noqa: E402
+from geometry.step_import.occ.loading import load_part, load_solid  # noqa: E402
+from geometry.step_import.occ.meshing import mesh_solid  # noqa: E402
+from geometry.step_import.occ.topology import edges_of, faces_of, sub_shapes  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 
 

@@ -7,14 +7,14 @@ import psutil
 import pytest
 import trimesh
 
-from geometry.exact import ExactFaces
 from geometry.mesh import TriangleMesh
-from geometry.occ.holes import fill_slivers
-from geometry.occ.loading import load_part
-from geometry.occ.meshing import count_open_edges
 from geometry.part import EdgeKind
 from geometry.setup_frame import Placement
-from geometry.step import read_part
+from geometry.step_import.exact_faces import ExactFaces
+from geometry.step_import.occ.holes import fill_slivers
+from geometry.step_import.occ.loading import load_part
+from geometry.step_import.occ.meshing import count_open_edges
+from geometry.step_import.reader import read_part
 from tests.step_files import real_part, write_step
 
 cq = pytest.importorskip("cadquery")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.sampling import sample_surface
-from geometry.step import read_part
+from geometry.step_import.reader import read_part
 from service.viewdata import tool_shape
 from service.viewfile import read_view, write_view
 from service.viewmesh import (

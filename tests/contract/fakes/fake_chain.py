@@ -24,8 +24,8 @@ def _report(setup, state, findings):
 
 def _raise_in_the_kernel():
     """An exception of Open CASCADE's own, on the way that those of its readings take."""
-    from geometry import step_child
-    from geometry.occ import loading
+    from geometry.step_import import reader_process
+    from geometry.step_import.occ import loading
 
     def load_part(**_):
         from OCP.gp import gp_Dir
@@ -33,7 +33,7 @@ def _raise_in_the_kernel():
         return gp_Dir(0.0, 0.0, 0.0)
 
     loading.load_part = load_part
-    step_child._load({"placement": None})
+    reader_process._load({"placement": None})
 
 
 def _misbehave(what, progress):

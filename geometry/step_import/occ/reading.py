@@ -11,8 +11,8 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TColStd import TColStd_SequenceOfAsciiString
 
 from geometry.errors import StepError
-from geometry.occ.topology import Shape, faces_of
-from geometry.step_text import StepText, check_text
+from geometry.step_import.occ.topology import Shape, faces_of
+from geometry.step_import.text_checks import StepText, check_text
 
 # Name the kernel gives a unit -> (name used here, mm in one of it).
 UNITS = {

@@ -17,8 +17,8 @@ from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_ListOfShape
 
 from geometry.errors import PartError
-from geometry.occ.gaps import free_edge_gap, free_edges
-from geometry.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
+from geometry.step_import.occ.gaps import free_edge_gap, free_edges
+from geometry.step_import.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
 
 # Faces further apart than this are a different part, not a sloppy export: sewing must stay below what is machined.
 SEWING_TOLERANCE = 0.01

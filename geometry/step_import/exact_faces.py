@@ -45,13 +45,13 @@ class ExactFaces:
     placement : Placement, the setup frame of all points and vectors; the file's own frame when None
     solid     : int, 1-based number of one of several separate solids
 
-    Raises what ``geometry.step.read_part`` raises about the file and its solids.
+    Raises what ``geometry.step_import.reader.read_part`` raises about the file and its solids.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, placement: Placement | None = None,
                  solid: int | None = None) -> None:
-        from geometry.occ.loading import load_solid
-        from geometry.occ.topology import faces_of
+        from geometry.step_import.occ.loading import load_solid
+        from geometry.step_import.occ.topology import faces_of
 
         self._faces = faces_of(load_solid(Path(path), solid).body)
         self._placement = placement or Placement()

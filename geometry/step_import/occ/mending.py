@@ -9,9 +9,9 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 
 from geometry.mesh import F64
-from geometry.occ.refining import I64, Net, present, refine_net
-from geometry.occ.topology import Shape, faces_of
-from geometry.occ.triangulating import FaceMesh, edge_sides, triangulate_plainly
+from geometry.step_import.occ.refining import I64, Net, present, refine_net
+from geometry.step_import.occ.topology import Shape, faces_of
+from geometry.step_import.occ.triangulating import FaceMesh, edge_sides, triangulate_plainly
 
 # Triangles that mending may make in one solid; a face that meets its share stays as far as it got.
 MAX_MENDED = 200_000

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.occ.curvature import face_info, surface_name
-from geometry.occ.edges import edge_infos
-from geometry.occ.healing import one_solid, swept_as_splines
-from geometry.occ.meshing import SolidMesh, mesh_solid
-from geometry.occ.reading import StepShape, read_shape
-from geometry.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
-from geometry.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.part import EdgeInfo, FaceInfo, Part
 from geometry.setup_frame import Placement
-from geometry.step import check_tolerances
+from geometry.step_import.occ.curvature import face_info, surface_name
+from geometry.step_import.occ.edges import edge_infos
+from geometry.step_import.occ.healing import one_solid, swept_as_splines
+from geometry.step_import.occ.meshing import SolidMesh, mesh_solid
+from geometry.step_import.occ.reading import StepShape, read_shape
+from geometry.step_import.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
+from geometry.step_import.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
+from geometry.step_import.reader import check_tolerances
 
 # Modelling tolerance (mm) taken when the file names none, and the range in which a named one is believed.
 USUAL_TOLERANCE, TOLERANCE_RANGE = 1e-3, (1e-5, 0.05)
@@ -41,7 +41,7 @@ class LoadedSolid:
 
 
 def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
-    """Read a file and heal it into one solid; errors are those of ``geometry.step.read_part``."""
+    """Read a file and heal it into one solid; errors are those of ``geometry.step_import.reader.read_part``."""
     step = read_shape(path)
     warnings = list(step.warnings)
     _check_size(step.shape, step)
@@ -53,7 +53,7 @@ def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
 
 def load_part(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2) -> Part:
-    """The work behind ``geometry.step.read_part``, in this process; arguments and errors are those of ``read_part``
+    """The work behind ``geometry.step_import.reader.read_part``, in this process; arguments and errors are those of ``read_part``
     except that nothing limits time or memory here."""
     check_tolerances(chord, angle)
     loaded = load_solid(path, solid)

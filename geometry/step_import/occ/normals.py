@@ -9,7 +9,7 @@ from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64, I32
-from geometry.occ.topology import Shape
+from geometry.step_import.occ.topology import Shape
 
 # Derivatives shorter than this (mm), the confusion distance of the kernel, or as parallel as this give no normal.
 SHORTEST, PARALLEL = 1e-7, 1e-6

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 
 from geometry.mesh import F64
-from geometry.occ.deviation import distance_near, node_gaps
+from geometry.step_import.occ.deviation import distance_near, node_gaps
 
 I64 = NDArray[np.int64]
 

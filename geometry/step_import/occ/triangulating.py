@@ -17,7 +17,7 @@ from OCP.TopoDS import TopoDS
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64, I32
-from geometry.occ.topology import Shape, faces_of
+from geometry.step_import.occ.topology import Shape, faces_of
 
 
 @dataclass

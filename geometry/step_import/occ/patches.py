@@ -16,12 +16,12 @@ from OCP.GeomAbs import GeomAbs_SurfaceType as Kind
 from OCP.GeomConvert import GeomConvert, GeomConvert_ApproxSurface
 from OCP.TopAbs import TopAbs_REVERSED
 
-from geometry.facepatches import FacePatch, no_such_face, patches_to_bytes
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
-from geometry.occ.loading import load_solid
-from geometry.occ.topology import Shape, faces_of
 from geometry.setup_frame import Placement
+from geometry.step_import.face_surfaces import FacePatch, no_such_face, patches_to_bytes
+from geometry.step_import.occ.loading import load_solid
+from geometry.step_import.occ.topology import Shape, faces_of
 
 # Angles among the parameters (u, v) of the surfaces that turn a line or an arc about their axis.
 ANGULAR = {Kind.GeomAbs_Cylinder: (True, False), Kind.GeomAbs_Cone: (True, False), Kind.GeomAbs_Sphere: (True, True),
@@ -36,7 +36,7 @@ LOOKS = 15
 
 def load_patches(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
                  faces: Iterable[int] | None = None) -> bytes:
-    """The work behind ``geometry.facepatches.read_patches``, in this process; arguments and errors as there.
+    """The work behind ``geometry.step_import.face_surfaces.read_patches``, in this process; arguments and errors as there.
 
     Returns the bytes ``patches_from_bytes`` reads.
     """

@@ -23,7 +23,7 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.nurbs import NurbsSurface
 from geometry.setup_frame import Placement
-from geometry.step import ask_reader
+from geometry.step_import.reader import ask_reader
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
     Raises
     ------
     CamError
-        What ``geometry.step.read_part`` raises about the file, its solids and the limits; GeometryError
+        What ``geometry.step_import.reader.read_part`` raises about the file, its solids and the limits; GeometryError
         (``no_such_face``).
     """
     request = {"wanted": "patches", "path": os.path.abspath(path), "solid": solid,

@@ -35,10 +35,10 @@ def _load(request: dict) -> bytes:
     where = Placement(**placement) if placement else None
     try:
         if request.pop("wanted", "part") == "patches":
-            from geometry.occ.patches import load_patches
+            from geometry.step_import.occ.patches import load_patches
 
             return load_patches(placement=where, **request)
-        from geometry.occ.loading import load_part
+        from geometry.step_import.occ.loading import load_part
 
         return load_part(placement=where, **request).to_bytes()
     except CamError:

@@ -13,10 +13,10 @@ from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 
 from geometry.mesh import F64
-from geometry.occ.topology import Shape
+from geometry.step_import.occ.topology import Shape
 
 if TYPE_CHECKING:
-    from geometry.occ.triangulating import FaceMesh
+    from geometry.step_import.occ.triangulating import FaceMesh
 
 MAX_SAMPLES = 20_000
 NEWTON_STEPS = 4

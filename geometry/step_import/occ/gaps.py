@@ -14,7 +14,7 @@ from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from geometry.occ.topology import Shape
+from geometry.step_import.occ.topology import Shape
 
 SAMPLES = 33
 

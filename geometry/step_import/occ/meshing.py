@@ -19,12 +19,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.occ.deviation import face_deviations, node_gaps
-from geometry.occ.holes import extend_parameters, fill_slivers
-from geometry.occ.mending import mend_faces
-from geometry.occ.normals import corner_normals
-from geometry.occ.topology import Shape, faces_of
-from geometry.occ.triangulating import FaceMesh, triangulate
+from geometry.step_import.occ.deviation import face_deviations, node_gaps
+from geometry.step_import.occ.holes import extend_parameters, fill_slivers
+from geometry.step_import.occ.mending import mend_faces
+from geometry.step_import.occ.normals import corner_normals
+from geometry.step_import.occ.topology import Shape, faces_of
+from geometry.step_import.occ.triangulating import FaceMesh, triangulate
 
 __all__ = ["FaceMesh", "SolidMesh", "count_open_edges", "mesh_solid"]
 

@@ -2,7 +2,7 @@
 
     part = read_part("wheel.step", placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
 
-The CAD kernel runs in a child process (``geometry.step_child``), so a file that crashes it, hangs it or eats
+The CAD kernel runs in a child process (``geometry.step_import.reader_process``), so a file that crashes it, hangs it or eats
 memory ends as a typed error here. Importing this module does not import the kernel.
 """
 
@@ -47,8 +47,8 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
 
 
 def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
-    """What the child of ``geometry.step_child`` answers; limits in s and bytes, errors as ``read_part`` has them."""
-    command = [sys.executable, "-m", "geometry.step_child"]
+    """What the child of ``geometry.step_import.reader_process`` answers; limits in s and bytes, errors as ``read_part`` has them."""
+    command = [sys.executable, "-m", "geometry.step_import.reader_process"]
     try:
         return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
     except ResourceError as error:

@@ -13,9 +13,9 @@ from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from geometry.mesh import F64
-from geometry.occ.meshing import SolidMesh
-from geometry.occ.topology import Shape, faces_of, length_of
 from geometry.part import EdgeInfo, EdgeKind
+from geometry.step_import.occ.meshing import SolidMesh
+from geometry.step_import.occ.topology import Shape, faces_of, length_of
 
 SMOOTH_ANGLE = np.radians(5.0)
 # Share of the edge along which the normals must agree for the edge to count as smooth.

@@ -11,9 +11,9 @@ from OCP.GeomAbs import GeomAbs_SurfaceType as Kind
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64
-from geometry.occ.meshing import FaceMesh
-from geometry.occ.topology import Shape, area_of, length_of
 from geometry.part import FaceInfo
+from geometry.step_import.occ.meshing import FaceMesh
+from geometry.step_import.occ.topology import Shape, area_of, length_of
 
 NAMES = {
     Kind.GeomAbs_Plane: "plane", Kind.GeomAbs_Cylinder: "cylinder", Kind.GeomAbs_Cone: "cone",
