@@ -25,14 +25,14 @@ from numpy.typing import NDArray  # noqa: E402
 from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
 from examples.family import make_part  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
-from geometry.faceting import facet_deviation, steps_for_chord  # noqa: E402
-from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
-from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
+from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa: E402
+from geometry.surfaces.foot_points import foot_points  # noqa: E402
+from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup, tool_bodies  # noqa: E402
 from service.prepare import clearances, placement_of, prepare  # noqa: E402

@@ -28,13 +28,13 @@ import shapely  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from scipy.interpolate import make_interp_spline  # noqa: E402
 
-from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.parameterization.grid_map import GridMap  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.step_import.reader import read_part  # noqa: E402
+from geometry.surfaces.foot_points import foot_points  # noqa: E402
+from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
 from geometry.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402

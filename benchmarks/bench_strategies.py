@@ -28,10 +28,10 @@ import service.chain as chain  # noqa: E402
 import toolpath.finish as finish  # noqa: E402
 import toolpath.plan as planner  # noqa: E402
 from examples.family import make_part  # noqa: E402
-from geometry.footpoints import foot_points  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
+from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import Prepared, placement_of  # noqa: E402
 from toolpath.motion import Motion, Workingstep  # noqa: E402

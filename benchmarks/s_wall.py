@@ -33,8 +33,8 @@ from scipy.interpolate import make_interp_spline  # noqa: E402
 import toolpath.flank as flank  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
-from geometry.nurbs import NurbsSurface  # noqa: E402
 from geometry.parameterization.grid_map import GridMap  # noqa: E402
+from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
 from output.kinematics import RotaryMachine  # noqa: E402
 from toolpath.forward import Profile, steps  # noqa: E402

@@ -13,7 +13,7 @@ from enum import StrEnum
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 
 STEP = 12.5
 

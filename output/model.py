@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.kinematics import RotaryMachine
 from toolpath.motion import Motion, Trajectory, Workingstep

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from geometry.errors import OutputError
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.grid import GRID, GridArc, check_plan, to_grid
 from output.model import Workplan

@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from output.clamping import Leg, each_section
 from output.grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
 from output.kinematics import RotaryMachine

@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.arcs import SHARE as ARCS
 from output.arcs import fitted

@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
-from geometry.bspline import SplineCurve
 from geometry.mesh import F64
+from geometry.surfaces.bspline import SplineCurve
 
 SAMPLES = 600
 Drawn = tuple[F64, bool]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.mesh import TriangleMesh
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import HolderSegment, ToolBody
 from output.kinematics import RotaryMachine
 from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan

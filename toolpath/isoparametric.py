@@ -25,9 +25,9 @@ from scipy.interpolate import RectBivariateSpline
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.grid_map import GridMap
 from geometry.parameterization.joined_faces import Joined
+from geometry.surfaces.nurbs import NurbsSurface
 from toolpath.forward import Curve
 from toolpath.kernels.beside import left_beside
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from toolpath.matching import clear_tilt, nose_radii
 

@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.joined_faces import Joined
 from geometry.parameterization.square_patches import Squared, squared
+from geometry.surfaces.nurbs import NurbsSurface
 from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 
 LATTICE = 9  # places each way at which the rise of both families of passes is looked at

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from geometry.bspline import CONTROL_POINTS, SplineCurve, arc_length, even_errors, fit_even, resample
 from geometry.mesh import F64
+from geometry.surfaces.bspline import CONTROL_POINTS, SplineCurve, arc_length, even_errors, fit_even, resample
 
 # Control points tried, the paper's ten first; samples per polyline by its number of points.
 COUNTS = (CONTROL_POINTS, 14, 20, 28, 40, 56, 80)

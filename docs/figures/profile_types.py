@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.bspline import SplineCurve, arc_length
 from geometry.mesh import F64
+from geometry.surfaces.bspline import SplineCurve, arc_length
 from zones.bends import Way
 from zones.profiles import Profile, classify
 

@@ -26,12 +26,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from geometry.errors import GeometryError
-from geometry.footpoints import foot_points
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.planar_embedding import located
+from geometry.surfaces.foot_points import foot_points
+from geometry.surfaces.nurbs import NurbsSurface
 
 MOST_STRETCHED = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even
 ROUGH = 1e-9  # of the size: sides of a triangle that are shorter are none

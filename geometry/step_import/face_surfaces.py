@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
 from geometry.setup_frame import Placement
 from geometry.step_import.reader import ask_reader
+from geometry.surfaces.nurbs import NurbsSurface
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from examples.thesis import Kind, surface
-from geometry.faceting import facet_deviation
+from geometry.surfaces.faceting import facet_deviation
 
 
 @pytest.mark.parametrize("kind", Kind)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.bspline import arc_length
+from geometry.surfaces.bspline import arc_length
 from tests.profile_curves import DRAW, draw
 from zones.bends import size_of
 from zones.profiles import Profile, VoidSide, classify

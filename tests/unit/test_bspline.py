@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.bspline import (
+from geometry.errors import GeometryError
+from geometry.surfaces.bspline import (
     Ends,
     SplineCurve,
     arc_length,
@@ -16,7 +17,6 @@ from geometry.bspline import (
     knot_vector,
     resample,
 )
-from geometry.errors import GeometryError
 
 EQUATION_3 = np.array([(100, 0), (196, 34), (281, 102), (346, 199), (383, 321), (385, 459), (350, 606), (274, 751),
                        (156, 886), (0, 1000)], float)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.grid_map import GridMap
 from geometry.parameterization.laplace_grid import laplace
 from geometry.parameterization.moving_fronts import interpolated
 from geometry.parameterization.quad_grid import Quad
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from tests.square_regions import region
 from toolpath.cutter import Cutter

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geometry.nurbs import NurbsSurface
 from geometry.sampling import sample_surface
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, field_of, plan_part, slope_field, tool
 from toolpath.counterexamples import NONE
 from toolpath.family import Target

@@ -5,9 +5,9 @@ import pytest
 
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.joined_faces import Joined
 from geometry.parameterization.square_patches import squared
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import JoinedSurface, lay_out

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 from service.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from geometry.footpoints import foot_points
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.grid_map import GridMap
+from geometry.surfaces.foot_points import foot_points
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from toolpath.isoparametric import IsoSurface
 from toolpath.matched import Matched, Wanted

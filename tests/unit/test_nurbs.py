@@ -8,11 +8,11 @@ from scipy.interpolate import BSpline
 
 from examples.thesis import Kind, control_points, surface
 from geometry.errors import GeometryError
-from geometry.faceting import facet_deviation, steps_for_chord
-from geometry.footpoints import foot_points
 from geometry.mesh import TriangleMesh
-from geometry.nurbs import NurbsSurface, open_uniform_knots
 from geometry.setup_frame import Placement
+from geometry.surfaces.faceting import facet_deviation, steps_for_chord
+from geometry.surfaces.foot_points import foot_points
+from geometry.surfaces.nurbs import NurbsSurface, open_uniform_knots
 
 ROOT_HALF = np.sqrt(0.5)
 QUARTER = np.array([[1, 0, 1], [ROOT_HALF, ROOT_HALF, ROOT_HALF], [0, 1, 1]])  # homogeneous, order 3

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.grid_map import GridMap
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from tests.unit.test_matched import bowl, measured, passes_along_y, random_surface
 from toolpath.isoparametric import IsoSurface

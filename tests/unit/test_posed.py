@@ -6,8 +6,8 @@ import pytest
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.nurbs import NurbsSurface
 from geometry.parameterization.grid_map import GridMap
+from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
 from toolpath.family import Target
 from toolpath.forward import Profile, steps

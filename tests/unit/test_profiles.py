@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from geometry.bspline import SplineCurve
 from geometry.errors import GeometryError
+from geometry.surfaces.bspline import SplineCurve
 from tests.profile_curves import DRAW, draw
 from tests.source_tree import ROOT
 from zones.bends import Way, _pivots, measure_bends, size_of

@@ -17,11 +17,11 @@ from OCP.GeomConvert import GeomConvert, GeomConvert_ApproxSurface
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
 from geometry.setup_frame import Placement
 from geometry.step_import.face_surfaces import FacePatch, no_such_face, patches_to_bytes
 from geometry.step_import.occ.loading import load_solid
 from geometry.step_import.occ.topology import Shape, faces_of
+from geometry.surfaces.nurbs import NurbsSurface
 
 # Angles among the parameters (u, v) of the surfaces that turn a line or an arc about their axis.
 ANGULAR = {Kind.GeomAbs_Cylinder: (True, False), Kind.GeomAbs_Cone: (True, False), Kind.GeomAbs_Sphere: (True, True),

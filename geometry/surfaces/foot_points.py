@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.nurbs import NurbsSurface
 
 # Starts to every span of knots and order; fewer and the nearest start may lie in another valley.
 STARTS = 3

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.errors import GeometryError
-from geometry.footpoints import FootPoints, foot_points
 from geometry.mesh import F64, TriangleMesh
-from geometry.nurbs import NurbsSurface
+from geometry.surfaces.foot_points import FootPoints, foot_points
+from geometry.surfaces.nurbs import NurbsSurface
 
 # Second derivatives are looked at this often to every span of knots and order.
 LOOKS = 2
