@@ -33,7 +33,7 @@ from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
-from geometry.trim import trim_faces  # noqa: E402
+from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup, tool_bodies  # noqa: E402
 from service.prepare import clearances, placement_of, prepare  # noqa: E402
 from toolpath.cutter import Cutter  # noqa: E402

@@ -36,7 +36,7 @@ from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
-from geometry.trim import trim_faces  # noqa: E402
+from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import placement_of  # noqa: E402
 from toolpath.isoparametric import IsoSurface  # noqa: E402

@@ -18,7 +18,7 @@ from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_sur
 from geometry.setup_frame import Placement
 from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
-from geometry.trim import FacePatch
+from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies

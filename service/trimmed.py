@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
-from geometry.trim import trim_faces
+from geometry.trimming.trim import trim_faces
 from service.prepare import Prepared, placement_of
 from toolpath.strategies.isoparametric import suits
 from toolpath.trimmed_faces import Faces, SmoothFaces, TrimmedFace

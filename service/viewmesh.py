@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.asker import Asker, bisect
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import EdgeKind, Part
 from geometry.sampling import SurfaceSamples
-from geometry.sheet import Sheet, refined, sheet_of, sides_of
+from geometry.trimming.facet_sheet import Sheet, refined, sheet_of, sides_of
+from geometry.trimming.label_query import Asker, bisect
 from service.viewfile import Chunk, Column
 
 PITCH, MOST = 0.8, 120_000  # mm between nodes, wider where that would be more facets

@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import TriangleMesh
 from geometry.part import FaceInfo, Part
-from geometry.sheet import sheet_of
-from geometry.trim import FacePatch
+from geometry.trimming.facet_sheet import sheet_of
+from geometry.trimming.trim import FacePatch
 
 
 def surface(point, us, vs, wrapped: bool = False, turned: bool = False) -> Part:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
-from geometry.trim import FacePatch, trim_faces
+from geometry.trimming.trim import FacePatch, trim_faces
 from zones.machinable import LEVEL, STEEP
 from zones.view import View
 from zones.zoning import ZoneArea

@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw
 
 from examples.family import make_part
 from geometry.mesh import F64
-from geometry.sheet import refined, sheet_of
+from geometry.trimming.facet_sheet import refined, sheet_of
 from service.camera import Camera
 from service.convert import parse_setup
 from service.prepare import Prepared, prepare

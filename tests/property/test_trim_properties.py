@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import geometry.bend
-import geometry.labelled
+import geometry.trimming.border_bending
+import geometry.trimming.label_cuts
 from geometry.part import Part
-from geometry.trim import trim_faces
+from geometry.trimming.trim import trim_faces
 from tests.step_files import write_step
 from tests.trim_parts import assert_partition, by_face, plane, saddle, tube, voronoi, wave, wrong_points
 
@@ -89,8 +89,8 @@ def disc_errors(pitches, tolerances):
 
 
 def test_area_error_falls_with_the_square_of_the_pitch_while_cuts_are_straight(monkeypatch):
-    monkeypatch.setattr(geometry.bend, "BEND_ROUNDS", 0)
-    monkeypatch.setattr(geometry.labelled, "CURVE_ROUNDS", 0)
+    monkeypatch.setattr(geometry.trimming.border_bending, "BEND_ROUNDS", 0)
+    monkeypatch.setattr(geometry.trimming.label_cuts, "CURVE_ROUNDS", 0)
     pitches = np.array([1.0, 0.5, 0.25, 0.125])
     error = disc_errors(pitches, [1e-6] * 4)
     assert np.polyfit(np.log(pitches), np.log(error), 1)[0] == pytest.approx(2.0, abs=0.3)

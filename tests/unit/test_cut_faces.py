@@ -7,7 +7,7 @@ from geometry.sampling import sample_surface
 from geometry.step_import.face_surfaces import read_patches
 from geometry.step_import.reader import read_part
 from geometry.surfaces.foot_points import foot_points
-from geometry.trim import trim_faces
+from geometry.trimming.trim import trim_faces
 from tests.hand_parts import ball
 from toolpath.forward import Profile, steps
 from toolpath.locations import lifted

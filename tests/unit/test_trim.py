@@ -9,9 +9,9 @@ import pytest
 
 from geometry.errors import GeometryError
 from geometry.kernels.trim import thin
-from geometry.labelled import split
-from geometry.sheet import refined, sheet_of, sides_of
-from geometry.trim import trim_faces
+from geometry.trimming.facet_sheet import refined, sheet_of, sides_of
+from geometry.trimming.label_cuts import split
+from geometry.trimming.trim import trim_faces
 from tests.trim_parts import assert_partition, plane, saddle, shoelace, surface, tube, wave
 
 TOLERANCE = 1e-3

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from geometry.mesh import F64, I32
-from geometry.sheet import BOOL, I64
+from geometry.trimming.facet_sheet import BOOL, I64
 
 # points (k, 3) mm, unit normals (k, 3), face numbers (k,) -> labels (k,)
 Label = Callable[[F64, F64, I32], I64]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.asker import Asker, bisect
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64
-from geometry.sheet import BOOL, I64, Sheet
+from geometry.trimming.facet_sheet import BOOL, I64, Sheet
+from geometry.trimming.label_query import Asker, bisect
 
 # Rounds of bending; each takes about three quarters off the error that is left.
 BEND_ROUNDS = 10

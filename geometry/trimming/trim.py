@@ -14,12 +14,12 @@ import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.asker import Label
 from geometry.kernels.trim import thin, trace
-from geometry.labelled import label_sheet
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.sheet import BOOL, I64, Sheet, refined, sheet_of
+from geometry.trimming.facet_sheet import BOOL, I64, Sheet, refined, sheet_of
+from geometry.trimming.label_cuts import label_sheet
+from geometry.trimming.label_query import Label
 
 # Pieces narrower than the tolerance are noise of the label along a border; they go to the neighbour, in so many rounds.
 ABSORB_ROUNDS = 3

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.asker import Asker, Label, bisect
-from geometry.bend import bend
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64, I32
-from geometry.sheet import BOOL, I64, Sheet, sides_of
+from geometry.trimming.border_bending import bend
+from geometry.trimming.facet_sheet import BOOL, I64, Sheet, sides_of
+from geometry.trimming.label_query import Asker, Label, bisect
 
 # Rounds of cutting sides that hold a third label; then the change nearest to one end is taken.
 SPLIT_ROUNDS = 4
