@@ -33,9 +33,9 @@ import numpy as np  # noqa: E402
 from benchmarks.foreign_cases import CASES, samples_root  # noqa: E402
 from benchmarks.stepnc_family import small  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from output.arcs import SHARE, fitted, stretches  # noqa: E402
-from output.grid import GridArc, pieces, to_grid  # noqa: E402
-from output.model import Workplan  # noqa: E402
+from output.arc_fitting import SHARE, fitted, stretches  # noqa: E402
+from output.program_grid import GridArc, pieces, to_grid  # noqa: E402
+from output.workplan import Workplan  # noqa: E402
 from service import chain, programs  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from tests.arc_plans import off  # noqa: E402

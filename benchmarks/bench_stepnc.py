@@ -21,9 +21,9 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
-from output.model import Workplan  # noqa: E402
 from output.stepnc_aim import stream_stepnc_aim  # noqa: E402
 from output.stepnc_arm import stream_stepnc_arm  # noqa: E402
+from output.workplan import Workplan  # noqa: E402
 from tests.synthetic_plan import clamped, long_plan  # noqa: E402
 from toolpath.motion import Motion, Trajectory  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402

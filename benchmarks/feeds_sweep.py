@@ -16,7 +16,7 @@ from typing import Any
 
 from examples.family import draw_layout, truth_of
 from examples.setups import suggest_setup
-from output.text import decimal
+from output.header_text import decimal
 from schemas.materials import MATERIALS
 from schemas.setup import Setup
 from service.chain import cut_table

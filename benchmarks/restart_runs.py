@@ -47,7 +47,7 @@ from scipy.spatial import cKDTree  # noqa: E402
 from benchmarks.five_axis_control import CONTROLLER, setup_of, write_bar  # noqa: E402
 from benchmarks.stepnc_family import LABEL, from_labels  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from output.clamping import SPARE  # noqa: E402
+from output.clamping_sequence import SPARE  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import chain  # noqa: E402
 from service.convert import machine_kinematics, parse_setup  # noqa: E402

@@ -36,7 +36,7 @@ from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.parameterization.grid_map import GridMap  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
-from output.kinematics import RotaryMachine  # noqa: E402
+from output.inverse_kinematics import RotaryMachine  # noqa: E402
 from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
 from toolpath.posed import enters, lead_and_tilt, posed  # noqa: E402

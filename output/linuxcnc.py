@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from output.dialects.base import Switches
 from output.dialects.linuxcnc import LinuxCnc
-from output.model import Workplan
 from output.walker import path_tolerance, write_program
+from output.workplan import Workplan
 
 LINE = LinuxCnc.line
 """Longest line of a program, characters."""

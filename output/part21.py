@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
-from output.grid import I64, PER_MM
+from output.program_grid import I64, PER_MM
 
 Write = Callable[[str], object]
 _LINES_A_PIECE = 4096

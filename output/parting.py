@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from geometry.errors import OutputError
 from output.dialects.base import Dialect
-from output.model import Workplan
 from output.walker import write_program
+from output.workplan import Workplan
 
 
 def parts_of(plan: Workplan, dialects: Sequence[Dialect], limit: int) -> list[Workplan]:

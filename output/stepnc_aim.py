@@ -7,7 +7,7 @@ Rapids are toolpaths of their operation with the speed profile 'rapid', those
 that lead to it and away from it too. Where a fresh cutter is due, a message and
 a program stop stand before the workingstep.
 
-What a file is for (``output.model.Ap238``): conformance class 1 has tool paths
+What a file is for (``output.workplan.Ap238``): conformance class 1 has tool paths
 and no shape, one workplan, and, as clause 6.2 wants of explicit tool paths, no
 strategy, whose figures stand in the purpose of the operation. Class 2 has part
 and stock as shapes, the strategies and the instructions for the setup as well:
@@ -24,9 +24,9 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
-from output.grid import I64, GridArc, check_plan
-from output.model import Ap238, Workplan
+from output.header_text import decimal, height_word, step_title, tool_name
 from output.part21 import Part21, Write, quoted, real, reals, refs
+from output.program_grid import I64, GridArc, check_plan
 from output.stepnc_words import (
     Curve,
     fresh_words,
@@ -43,7 +43,7 @@ from output.stepnc_words import (
     written_feed,
     written_speed,
 )
-from output.text import decimal, height_word, step_title, tool_name
+from output.workplan import Ap238, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
@@ -72,7 +72,7 @@ def stream_stepnc_aim(plan: Workplan, write: Write) -> None:
 
     plan  : lengths in mm, setup frame; ``plan.ap238`` says what the file is for
     write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
-    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
+    Raises OutputError as ``output.program_grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
     written until then is no file.
     """
     check_plan(plan)

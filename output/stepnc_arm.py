@@ -22,9 +22,9 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
-from output.grid import GRID, GridArc, check_plan, to_grid
-from output.model import Workplan
+from output.header_text import step_title, tool_name
 from output.part21 import Part21, Write, quoted, real, reals, refs
+from output.program_grid import GRID, GridArc, check_plan, to_grid
 from output.stepnc_words import (
     Curve,
     fresh_words,
@@ -44,7 +44,7 @@ from output.stepnc_words import (
     written_feed,
     written_speed,
 )
-from output.text import step_title, tool_name
+from output.workplan import Workplan
 from toolpath.motion import Motion, Workingstep
 
 _TYPE = {
@@ -67,7 +67,7 @@ def stream_stepnc_arm(plan: Workplan, write: Write) -> None:
 
     plan  : lengths in mm, setup frame
     write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
-    Raises OutputError as ``output.grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
+    Raises OutputError as ``output.program_grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
     written until then is no file.
     """
     check_plan(plan)

@@ -11,12 +11,12 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
-from output.clamping import Leg, each_section
-from output.grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
-from output.kinematics import RotaryMachine
-from output.model import Workplan
+from output.clamping_sequence import Leg, each_section
+from output.header_text import face_words
+from output.inverse_kinematics import RotaryMachine
 from output.part21 import Part21, real
-from output.text import face_words
+from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
+from output.workplan import Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 
 

@@ -3,7 +3,7 @@
 The shape of a program: header comments for the machinist, the modes, then
 per tool the change and per workingstep a comment and its moves. Nothing is
 added to a planned path and nothing is taken from it but points that are equal
-on the grid of ``output.grid``. Between steps that do not join, the writer goes
+on the grid of ``output.program_grid``. Between steps that do not join, the writer goes
 up to the clearance plane, across, and down, one after the other.
 
 Rotary axes. A job of one clamping is one program: XYZ stay the tip in the setup
@@ -29,11 +29,11 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from output.clamping import Leg, Section, home_of, sections
+from output.clamping_sequence import Leg, Section, home_of, sections
 from output.dialects.base import Dialect
-from output.grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
-from output.model import FIRST_NUMBER, Clamping, Workplan
-from output.text import decimal, face_words, height_word, step_title, tool_name
+from output.header_text import decimal, face_words, height_word, step_title, tool_name
+from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
+from output.workplan import FIRST_NUMBER, Clamping, Workplan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted

@@ -20,7 +20,7 @@ import numpy as np
 
 from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
-from output.arcs import SHARE as ARCS
+from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean, Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another

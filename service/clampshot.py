@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
-from output.text import ascii_text, decimal
+from output.header_text import ascii_text, decimal
 from service.camera import Camera
 from service.lettering import (
     AXES,

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
 from geometry.tool_body import HolderSegment, ToolBody
-from output.kinematics import RotaryMachine, said_limits
+from output.inverse_kinematics import RotaryMachine, said_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool

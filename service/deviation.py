@@ -20,7 +20,7 @@ from geometry.mesh import F64
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
-from output.text import ascii_text, decimal
+from output.header_text import ascii_text, decimal
 from service.camera import Camera
 from service.lettering import (
     GREY,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from PIL import ImageDraw, ImageFont
 from PIL.ImageFont import FreeTypeFont
 
-from output.text import ascii_text, decimal
+from output.header_text import ascii_text, decimal
 from service.camera import Camera
 
 RGB = tuple[float, float, float]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from geometry.mesh import F64, TriangleMesh
-from output.text import ascii_text, decimal
+from output.header_text import ascii_text, decimal
 from service.camera import Camera
 from service.lettering import (
     GREY,

@@ -12,15 +12,15 @@ from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
-from output.arcs import SHARE as ARCS
-from output.arcs import fitted
-from output.clamping import SWING, home_of
+from output.arc_fitting import SHARE as ARCS
+from output.arc_fitting import fitted
+from output.clamping_sequence import SWING, home_of
 from output.dialects import DIALECTS, Switches
 from output.figures import AWAITED, filled
-from output.model import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.header_text import decimal
 from output.parting import parts_of
-from output.text import decimal
 from output.walker import write_program
+from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
 from service.convert import rotary_machine, tool_bodies

@@ -18,8 +18,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from output.dialects import DIALECTS, Switches
-from output.model import Workplan
 from output.walker import label_number, lowest_tip
+from output.workplan import Workplan
 from schemas.setup import Setup
 from service.clampshot import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.convert import tool_bodies

@@ -12,8 +12,8 @@ from fpdf.enums import TableBordersLayout
 from fpdf.fonts import FontFace
 from PIL import Image
 
+from output.header_text import ascii_text
 from output.part21 import time_stamp
-from output.text import ascii_text
 from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
 from service.tooldrawing import HEIGHT, LETTER, WIDTH, ToolDrawing
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from output.text import decimal
+from output.header_text import decimal
 from schemas.setup import Setup
 from service.sheetmodel import Facts, Lines, Section, Table
 

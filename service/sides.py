@@ -10,7 +10,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
-from output.model import Workplan
+from output.workplan import Workplan
 from schemas.machine import DIALECT_ENDINGS
 from toolpath.plan import Plan
 from toolpath.stock import StockMap

@@ -21,9 +21,9 @@ from geometry.child_process import run_limited
 from geometry.errors import InputError, InternalError, ResourceError
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from output.model import Workplan
 from output.stepnc_aim import stream_stepnc_aim
 from output.stepnc_arm import stream_stepnc_arm
+from output.workplan import Workplan
 from service.delivery import Files
 from service.sides import Program
 from verify.agree import check_agreement

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from geometry.tool_body import ToolBody
-from output.text import decimal
+from output.header_text import decimal
 
 WIDTH, HEIGHT = 118.0, 88.0  # mm of paper
 FLOOR, CEILING = 80.0, 5.0  # where the tip stands, and how high the assembly may go

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from output.arcs import fitted
-from output.model import Frame, Workplan
+from output.arc_fitting import fitted
+from output.workplan import Frame, Workplan
 from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
 from toolpath.lines import thinned
 from toolpath.motion import Motion, Trajectory

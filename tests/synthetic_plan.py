@@ -9,8 +9,8 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import HolderSegment, ToolBody
-from output.kinematics import RotaryMachine
-from output.model import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.inverse_kinematics import RotaryMachine
+from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 from zones.view import access_rotation
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
-from output.grid import PER_MM, GridArc
-from output.text import ascii_text, decimal
+from output.header_text import ascii_text, decimal
+from output.program_grid import PER_MM, GridArc
 
 UP_THE_TOOL = 50.0
 """mm above the tip at which a tool may leave its place by the path tolerance where its axis is smoothed too."""

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 from geometry.errors import OutputError
 from output.dialects.base import Dialect, axis_tolerance, coolant
-from output.grid import PER_MM, GridArc
-from output.text import decimal
+from output.header_text import decimal
+from output.program_grid import PER_MM, GridArc
 
 
 class Heidenhain(Dialect):

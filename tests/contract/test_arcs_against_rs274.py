@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from output.arcs import fitted
+from output.arc_fitting import fitted
 from output.linuxcnc import write_linuxcnc
 from tests import rs274
 from tests.arc_plans import HALF, round_clamped, round_plan

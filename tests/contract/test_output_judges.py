@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from output.linuxcnc import write_linuxcnc
-from output.model import Ap238
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
+from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
 from toolpath.motion import Motion

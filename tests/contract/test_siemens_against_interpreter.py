@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from output.arcs import fitted
+from output.arc_fitting import fitted
 from output.dialects import DIALECTS, Switches
 from output.walker import write_program
 from tests.arc_plans import HALF, round_clamped, round_plan

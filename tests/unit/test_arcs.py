@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import ProgramError
-from output.arcs import BLOCK, MOST_RADIUS, MOST_SWEEP, SAG, fitted, stretches
+from output.arc_fitting import BLOCK, MOST_RADIUS, MOST_SWEEP, SAG, fitted, stretches
 from output.dialects import DIALECTS, Switches
-from output.grid import GRID, GridArc, pieces, to_grid
 from output.linuxcnc import write_linuxcnc
+from output.program_grid import GRID, GridArc, pieces, to_grid
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm
 from output.walker import write_program

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.clamping import Leg, home_of, sections
-from output.kinematics import RotaryMachine
+from output.clamping_sequence import Leg, home_of, sections
+from output.inverse_kinematics import RotaryMachine
 from output.linuxcnc import write_linuxcnc
 from output.stepnc_words import _curves
 from tests.synthetic_plan import clamped

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError, ProgramError, VerificationError
-from output.arcs import fitted
+from output.arc_fitting import fitted
 from output.dialects import DIALECTS, Switches
-from output.kinematics import RotaryMachine, said_limits
+from output.inverse_kinematics import RotaryMachine, said_limits
 from output.linuxcnc import write_linuxcnc
 from output.walker import write_program
 from tests.arc_plans import HALF, round_clamped, round_plan

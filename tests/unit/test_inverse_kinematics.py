@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.kinematics import RotaryMachine
+from output.inverse_kinematics import RotaryMachine
 from verify.kinematics import KINDS, Kinematics
 
 PIVOTS = {"table-table-AC": ((0.0, -3.0, -80.0), (12.0, 5.0, 0.0)),

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from output.clamping import sections
+from output.clamping_sequence import sections
 from output.linuxcnc import write_linuxcnc
 from output.stepnc_aim import write_stepnc_aim
 from output.stepnc_arm import write_stepnc_arm

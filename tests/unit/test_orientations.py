@@ -8,7 +8,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment, ToolBody
-from output.kinematics import RotaryMachine
+from output.inverse_kinematics import RotaryMachine
 from service.programs import room_to_turn
 from tests.hand_parts import box_mesh, joined
 from verify.kinematics import Kinematics

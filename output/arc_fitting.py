@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from output.grid import GRID, I64, PER_MM
-from output.model import Workplan
+from output.program_grid import GRID, I64, PER_MM
+from output.workplan import Workplan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 BOOL = NDArray[np.bool_]

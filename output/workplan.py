@@ -9,7 +9,7 @@ from enum import StrEnum
 from geometry.mesh import F64, TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
-from output.kinematics import RotaryMachine
+from output.inverse_kinematics import RotaryMachine
 from toolpath.motion import Motion, Trajectory, Workingstep
 
 FIRST_NUMBER = 1000

@@ -16,9 +16,9 @@ import numpy as np
 
 from geometry.errors import OutputError
 from geometry.mesh import F64
-from output.grid import GRID, I64, grid_path, to_grid
-from output.grid import link as grid_link
-from output.model import Clamping, Frame, Workplan
+from output.program_grid import GRID, I64, grid_path, to_grid
+from output.program_grid import link as grid_link
+from output.workplan import Clamping, Frame, Workplan
 from toolpath.motion import Arc, Motion, Workingstep
 
 TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a turn
@@ -93,7 +93,7 @@ def each_section(plan: Workplan) -> Iterator[Section]:
     Raises
     ------
     OutputError
-        As ``output.grid.grid_path``; no_clamping: the plan has none; no_frame: a step is in the frame of an access
+        As ``output.program_grid.grid_path``; no_clamping: the plan has none; no_frame: a step is in the frame of an access
         that the clamping does not have; rotary_limit: the rotary axes cannot stand as a step wants.
     """
     if plan.clamping is None:

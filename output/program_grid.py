@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from output.model import Workplan
+from output.workplan import Workplan
 from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 
 I64 = NDArray[np.int64]
