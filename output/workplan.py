@@ -93,7 +93,7 @@ class Workplan:
     clamping        : of a machine with rotary axes: steps are in the frame of their access; None: all in the setup's
     labels          : passed through to headers
     comments        : header lines for the machinist (ASCII, no parentheses)
-    figures         : header lines for the figures of the proof, ``output.figures``
+    figures         : header lines for the figures of the proof, ``output.gcode.proof_header``
     restart         : every step begins as after a tool change, so that a program can be started at each of them
     stock_words     : what kind of blank it is, where it is no box: ``stock`` is then a box round it
     cylinder        : the blank where it is one, or None; stock_mesh : where it is a mesh, or None

@@ -15,11 +15,11 @@ from geometry.tool_body import ToolBody
 from output.arc_fitting import SHARE as ARCS
 from output.arc_fitting import fitted
 from output.clamping_sequence import SWING, home_of
-from output.dialects import DIALECTS, Switches
-from output.figures import AWAITED, filled
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_splitting import parts_of
+from output.gcode.program_writer import write_program
+from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
-from output.parting import parts_of
-from output.walker import write_program
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting

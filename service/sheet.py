@@ -17,8 +17,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
-from output.dialects import DIALECTS, Switches
-from output.walker import label_number, lowest_tip
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from schemas.setup import Setup
 from service.clampshot import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of

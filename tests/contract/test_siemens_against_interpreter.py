@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from output.arc_fitting import fitted
-from output.dialects import DIALECTS, Switches
-from output.walker import write_program
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_writer import write_program
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.synthetic_plan import clamped, plan, tiny
 from verify.kinematics import Kinematics

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from geometry.errors import InternalError
-from output.dialects import DIALECTS
+from output.gcode.dialects import DIALECTS
 from schemas.machine import DIALECT_ENDINGS
 from service import chain, programs
 from service.artifacts import clear_results

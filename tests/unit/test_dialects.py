@@ -10,10 +10,10 @@ import pytest
 
 from geometry.errors import OutputError, ProgramError, VerificationError
 from output.arc_fitting import fitted
-from output.dialects import DIALECTS, Switches
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_writer import write_program
 from output.inverse_kinematics import RotaryMachine, said_limits
 from output.linuxcnc import write_linuxcnc
-from output.walker import write_program
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny

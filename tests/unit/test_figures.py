@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import InternalError
-from output.dialects import DIALECTS, Switches
-from output.figures import AWAITED, LINES, WIDE, filled
-from output.walker import write_program
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_writer import write_program
+from output.gcode.proof_header import AWAITED, LINES, WIDE, filled
 from service.programs import figures_of
 from tests.synthetic_plan import clamped, plan
 from verify.reader import read_program

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from geometry.errors import OutputError
-from output.dialects import DIALECTS, Switches
-from output.parting import parts_of
-from output.walker import write_program
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_splitting import parts_of
+from output.gcode.program_writer import write_program
 from tests.synthetic_plan import clamped, plan
 from verify.kinematics import Kinematics
 from verify.reader import read_program

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from output.dialects.base import Dialect, Switches
+from output.gcode.dialects.base import Dialect, Switches
+from output.gcode.program_writer import write_program
 from output.linuxcnc import write_linuxcnc
-from output.walker import write_program
 from tests.arc_plans import round_plan
 from tests.synthetic_plan import clamped, plan
 from verify.dialects import CONTROLS

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 
-from output.dialects.base import Dialect
+from output.gcode.dialects.base import Dialect
 
 _ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;]", re.IGNORECASE)
 

@@ -6,12 +6,12 @@
 
 from __future__ import annotations
 
-from output.dialects.base import Dialect, Switches
-from output.dialects.fanuc import Fanuc
-from output.dialects.haas import Haas
-from output.dialects.heidenhain import Heidenhain
-from output.dialects.linuxcnc import LinuxCnc
-from output.dialects.siemens import Siemens
+from output.gcode.dialects.base import Dialect, Switches
+from output.gcode.dialects.fanuc import Fanuc
+from output.gcode.dialects.haas import Haas
+from output.gcode.dialects.heidenhain import Heidenhain
+from output.gcode.dialects.linuxcnc import LinuxCnc
+from output.gcode.dialects.siemens import Siemens
 
 DIALECTS: dict[str, type[Dialect]] = {d.name: d for d in (LinuxCnc, Fanuc, Haas, Siemens, Heidenhain)}
 """By the name that ``machine.dialects`` has for it."""

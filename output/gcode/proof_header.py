@@ -12,7 +12,7 @@ import re
 from collections.abc import Sequence
 
 from geometry.errors import InternalError
-from output.dialects.base import Dialect
+from output.gcode.dialects.base import Dialect
 
 WIDE = 64
 """Characters of a line of figures, so that it is one comment on every control."""

@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 
 from geometry.errors import OutputError
-from output.dialects.base import Dialect, axis_tolerance, coolant
+from output.gcode.dialects.base import Dialect, axis_tolerance, coolant
 from output.header_text import decimal
 from output.program_grid import PER_MM, GridArc
 

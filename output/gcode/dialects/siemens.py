@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from output.dialects.base import Dialect, Switches, about_x, about_y, axis_tolerance
+from output.gcode.dialects.base import Dialect, Switches, about_x, about_y, axis_tolerance
 
 
 class Siemens(Dialect):

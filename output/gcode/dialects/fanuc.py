@@ -10,7 +10,7 @@ there. Numbers have a decimal point, for X10 may mean 0.010 mm (parameter 3401).
 
 from __future__ import annotations
 
-from output.dialects.base import Dialect
+from output.gcode.dialects.base import Dialect
 
 NAMED = 40
 """Characters of what stands beside the number of a program."""

@@ -6,8 +6,8 @@ offsets (G154 P) and the rounding of corners, which the program bounds itself (G
 
 from __future__ import annotations
 
-from output.dialects.base import Switches
-from output.dialects.fanuc import Fanuc
+from output.gcode.dialects.base import Switches
+from output.gcode.dialects.fanuc import Fanuc
 
 
 class Haas(Fanuc):

@@ -30,7 +30,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from output.clamping_sequence import Leg, Section, home_of, sections
-from output.dialects.base import Dialect
+from output.gcode.dialects.base import Dialect
 from output.header_text import decimal, face_words, height_word, step_title, tool_name
 from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.workplan import FIRST_NUMBER, Clamping, Workplan

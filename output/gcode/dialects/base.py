@@ -1,6 +1,6 @@
 """What a control has to be told, and in which words: those of RS-274 where a dialect does not say otherwise.
 
-A dialect is asked by ``output.walker`` and keeps nothing between two questions. What it answers are lines of a
+A dialect is asked by ``output.gcode.program_writer`` and keeps nothing between two questions. What it answers are lines of a
 program; lengths come as whole steps of the grid or as text, speeds and feeds as text.
 """
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from geometry.errors import OutputError
-from output.dialects.base import Dialect
-from output.walker import write_program
+from output.gcode.dialects.base import Dialect
+from output.gcode.program_writer import write_program
 from output.workplan import Workplan
 
 
@@ -26,7 +26,7 @@ def parts_of(plan: Workplan, dialects: Sequence[Dialect], limit: int) -> list[Wo
     Raises
     ------
     OutputError
-        Code program_too_large: a step alone is larger; else as ``output.walker.write_program``.
+        Code program_too_large: a step alone is larger; else as ``output.gcode.program_writer.write_program``.
     """
     if _size(plan, dialects) <= limit:
         return [plan]
