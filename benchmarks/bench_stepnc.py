@@ -21,8 +21,8 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
-from output.stepnc_aim import stream_stepnc_aim  # noqa: E402
-from output.stepnc_arm import stream_stepnc_arm  # noqa: E402
+from output.stepnc.ap238 import stream_stepnc_aim  # noqa: E402
+from output.stepnc.iso14649 import stream_stepnc_arm  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
 from tests.synthetic_plan import clamped, long_plan  # noqa: E402
 from toolpath.motion import Motion, Trajectory  # noqa: E402

@@ -13,7 +13,7 @@ from fpdf.fonts import FontFace
 from PIL import Image
 
 from output.header_text import ascii_text
-from output.part21 import time_stamp
+from output.stepnc.part21 import time_stamp
 from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
 from service.tooldrawing import HEIGHT, LETTER, WIDTH, ToolDrawing
 

@@ -21,8 +21,8 @@ from geometry.child_process import run_limited
 from geometry.errors import InputError, InternalError, ResourceError
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from output.stepnc_aim import stream_stepnc_aim
-from output.stepnc_arm import stream_stepnc_arm
+from output.stepnc.ap238 import stream_stepnc_aim
+from output.stepnc.iso14649 import stream_stepnc_arm
 from output.workplan import Workplan
 from service.delivery import Files
 from service.sides import Program

@@ -13,8 +13,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from output.linuxcnc import write_linuxcnc
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny

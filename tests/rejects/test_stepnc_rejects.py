@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import InternalError, ProgramError
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from tests.broken_stepnc import broken
 from tests.synthetic_plan import clamped, shaped, tiny
 from verify import stepnc_aim, stepnc_arm

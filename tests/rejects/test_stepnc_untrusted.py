@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import ProgramError
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from tests.synthetic_plan import clamped, tiny
 from verify.course import Course
 from verify.kinematics import Kinematics

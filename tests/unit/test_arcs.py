@@ -15,8 +15,8 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import write_program
 from output.linuxcnc import write_linuxcnc
 from output.program_grid import GRID, GridArc, pieces, to_grid
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, round_plan, turn
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step

@@ -11,7 +11,7 @@ from geometry.errors import OutputError
 from output.clamping_sequence import Leg, home_of, sections
 from output.inverse_kinematics import RotaryMachine
 from output.linuxcnc import write_linuxcnc
-from output.stepnc_words import _curves
+from output.stepnc.common import _curves
 from tests.synthetic_plan import clamped
 from toolpath.motion import Motion, Trajectory
 from verify.kinematics import KINDS, Kinematics

@@ -11,8 +11,8 @@ import pytest
 
 from output.clamping_sequence import sections
 from output.linuxcnc import write_linuxcnc
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from service.cautions import lives_ended
 from tests import synthetic_plan as made
 from toolpath.life import minutes_in_cut, with_fresh_cutters, worn

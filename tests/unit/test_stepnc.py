@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.part21 import quoted, real, time_stamp
 from output.program_grid import grid_path
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
-from output.stepnc_words import pass_plane_normal
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.common import pass_plane_normal
+from output.stepnc.iso14649 import write_stepnc_arm
+from output.stepnc.part21 import quoted, real, time_stamp
 from output.workplan import Ap238, StockBox
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny

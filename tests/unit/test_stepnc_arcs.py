@@ -11,8 +11,8 @@ import pytest
 from geometry.errors import ProgramError
 from output.arc_fitting import SAG, fitted
 from output.linuxcnc import write_linuxcnc
-from output.stepnc_aim import write_stepnc_aim
-from output.stepnc_arm import write_stepnc_arm
+from output.stepnc.ap238 import write_stepnc_aim
+from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken

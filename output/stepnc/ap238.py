@@ -25,9 +25,8 @@ from geometry.errors import OutputError
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from output.header_text import decimal, height_word, step_title, tool_name
-from output.part21 import Part21, Write, quoted, real, reals, refs
 from output.program_grid import I64, GridArc, check_plan
-from output.stepnc_words import (
+from output.stepnc.common import (
     Curve,
     fresh_words,
     header_words,
@@ -43,6 +42,7 @@ from output.stepnc_words import (
     written_feed,
     written_speed,
 )
+from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Ap238, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 

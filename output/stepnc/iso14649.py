@@ -23,9 +23,8 @@ from geometry.errors import OutputError
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.header_text import step_title, tool_name
-from output.part21 import Part21, Write, quoted, real, reals, refs
 from output.program_grid import GRID, GridArc, check_plan, to_grid
-from output.stepnc_words import (
+from output.stepnc.common import (
     Curve,
     fresh_words,
     header_words,
@@ -44,6 +43,7 @@ from output.stepnc_words import (
     written_feed,
     written_speed,
 )
+from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Workplan
 from toolpath.motion import Motion, Workingstep
 

@@ -14,8 +14,8 @@ from geometry.surfaces.nurbs import NurbsSurface
 from output.clamping_sequence import Leg, each_section
 from output.header_text import face_words
 from output.inverse_kinematics import RotaryMachine
-from output.part21 import Part21, real
 from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
+from output.stepnc.part21 import Part21, real
 from output.workplan import Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
 
