@@ -38,7 +38,7 @@ from toolpath.motion import Motion, Workingstep  # noqa: E402
 from toolpath.settings import Pattern
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from zones.machinable import Form  # noqa: E402
+from zones.machinable_area import Form  # noqa: E402
 
 PARALLEL_S = 120
 DEEPEST = 60  # samples of the part whose depth in a ball is measured exactly

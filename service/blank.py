@@ -21,7 +21,7 @@ from service.convert import face_numbers
 from service.stock import Blank
 from verify.blank import stock_on_normals
 from verify.model import ProofSetup
-from zones.machinable import SEEN, SEEN_SHARE
+from zones.machinable_area import SEEN, SEEN_SHARE
 
 OVERHANG = 0.01  # mm the part may stand out of its blank or into a fixture: rounding of what people type
 AWAY = 1e-6  # of a unit normal: what looks along a side does not look at it

@@ -29,7 +29,7 @@ from zones.categories import Categories
 from zones.decompose import decompose
 from zones.fixtures import AIR
 from zones.lattice import lattice_step
-from zones.machinable import machinable_faces
+from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches

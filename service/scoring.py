@@ -19,7 +19,7 @@ from geometry.sampling import SurfaceSamples, sample_surface, with_surface_norma
 from service.prepare import Prepared, machinable_triangles
 from toolpath.family import Target
 from toolpath.plan import Plan
-from zones.machinable import forms_of
+from zones.machinable_area import forms_of
 from zones.reach import touchable
 from zones.regions import Labels
 from zones.view import View, turned_samples

@@ -15,7 +15,7 @@ from geometry.trimming.trim import trim_faces
 from service.prepare import Prepared, placement_of
 from toolpath.strategies.isoparametric import suits
 from toolpath.trimmed_faces import Faces, SmoothFaces, TrimmedFace
-from zones.machinable import Form
+from zones.machinable_area import Form
 
 TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one
 WIDE = 1e3  # mm between places a face is looked at for a change of label, of which there is none

@@ -23,7 +23,7 @@ from toolpath.stock import StockMap
 from toolpath.trimmed_faces import TrimmedFace
 from zones.assembly import Clearances
 from zones.lattice import lattice_step
-from zones.machinable import machinable_faces
+from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.planview import ChannelPlan
 from zones.reach import TipField

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from toolpath.counterexamples import HighWall
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.zoning import ZoneArea
 
 LEAST_DEPTH = 2.0

@@ -43,7 +43,7 @@ from toolpath.travel import Motions
 from toolpath.trimmed_faces import Faces
 from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
 

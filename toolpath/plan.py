@@ -32,7 +32,7 @@ from toolpath.strategies import layers
 from toolpath.trimmed_faces import Faces
 from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.walked import Depths, Walked
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.reach import TipField
 from zones.zoning import ZoneArea
 

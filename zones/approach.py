@@ -20,7 +20,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
 from zones.assembly import Clearances, discs_of
-from zones.machinable import LEVEL, SEEN
+from zones.machinable_area import LEVEL, SEEN
 from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))

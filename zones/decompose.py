@@ -14,7 +14,7 @@ from geometry.part import EdgeKind, Part
 from zones.channels import find_facings
 from zones.connections import Bridges, find_bridges
 from zones.facegraph import STEEP_NZ, FaceGraph
-from zones.machinable import STEEP
+from zones.machinable_area import STEEP
 from zones.model import Channel, Connection, Decomposition, Wall
 from zones.walls import SEAT, Sheets, find_sheets
 

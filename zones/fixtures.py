@@ -13,7 +13,7 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from zones.assembly import Clearances
 from zones.lattice import lattice_step
-from zones.machinable import SEEN
+from zones.machinable_area import SEEN
 from zones.reach import DiscHeights, TipField
 
 SKIN = 0.02  # mm off the surface where a ray upward starts

@@ -15,7 +15,7 @@ from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.trimming.trim import FacePatch, trim_faces
-from zones.machinable import LEVEL, STEEP
+from zones.machinable_area import LEVEL, STEEP
 from zones.view import View
 from zones.zoning import ZoneArea
 

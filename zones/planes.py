@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.regions import base_of
 from zones.sight import Sight
 

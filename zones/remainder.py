@@ -20,7 +20,7 @@ from zones.assembly import Clearances
 from zones.catalogue import MOST_SLENDER
 from zones.faces import connection_of
 from zones.fixtures import above, covered
-from zones.machinable import SEEN
+from zones.machinable_area import SEEN
 from zones.model import Decomposition
 from zones.needs import DOES, Buyer, Cutter
 from zones.reach import TipField

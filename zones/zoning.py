@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from zones.categories import Categories, Category
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.openness import OPEN_SHARE, open_share
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares

@@ -25,7 +25,7 @@ from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.trimmed_faces import TrimmedFace
 from zones.assembly import Clearances
-from zones.machinable import Form
+from zones.machinable_area import Form
 
 BALL = ball(6.0)
 TILTED, LEADING = Leaned(0.0, np.radians(15.0)), Leaned(np.radians(10.0), 0.0)

@@ -13,7 +13,7 @@ from tests.decomposition_shapes import box, to_part
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, tool, view_of
 from zones.decompose import decompose
 from zones.kernels.flood import escape_heights
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.openness import escape_field, open_share
 from zones.reach import TipField

@@ -20,7 +20,7 @@ from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.layers import EVEN
 from toolpath.walked import OVERLAP, Depths, Walked
-from zones.machinable import Form
+from zones.machinable_area import Form
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it
 CUT = {"T1": CutData(11_000, 810, 210, 3100, 0.9), "T2": CutData(12_000, 820, 220, 3200, 1.2)}

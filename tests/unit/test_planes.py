@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, view_of
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.planes import PLANE_MARGIN, snapped
 from zones.regions import Regioner

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
-from zones.machinable import Form, forms_of, machinable_faces
+from zones.machinable_area import Form, forms_of, machinable_faces
 from zones.model import Connection, Decomposition
 from zones.reach import touchable
 from zones.regions import Labels, Region, face_bases

@@ -28,7 +28,7 @@ from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.steering import Limits, Steered, steered
 from toolpath.strategies.isoparametric import Stretch, course
 from toolpath.trimmed_faces import Faces
-from zones.machinable import Form
+from zones.machinable_area import Form
 from zones.reach import TipField
 
 NAME = "led"
