@@ -58,7 +58,7 @@ def made_part(recipe: str, seed: int, cache: Path) -> tuple[Path, dict[str, Any]
 def judge(recipe: str, seed: int, cache: Path, pictures: Path, limit: float) -> dict[str, Any]:
     """Decompose one part and hold it against its truth; plain data, see ``compare``."""
     from geometry.step_import.reader import read_part
-    from zones.decompose import decompose
+    from zones.features.decomposition import decompose
 
     step, truth, made = made_part(recipe, seed, cache)
     begin = time.perf_counter()

@@ -44,7 +44,7 @@ class Found:
 def look(part: Any) -> Found:
     """Decompose a part and label its surface."""
     from geometry.sampling import sample_surface
-    from zones.decompose import decompose
+    from zones.features.decomposition import decompose
     from zones.planview import ChannelPlan
     from zones.profiles import classify
     from zones.regions import Regioner

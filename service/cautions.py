@@ -25,8 +25,8 @@ from toolpath.ramps import LEAST_RUN
 from toolpath.settings import Leaned
 from toolpath.strategies import led
 from verify.model import Support
+from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
-from zones.thinness import slender_walls
 
 MOST_REASONS = 3  # a caution says
 MOSTLY = 0.5  # of what a tool that is asked to lean cuts in a zone: where more is upright it is told of

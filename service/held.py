@@ -12,8 +12,8 @@ from service.prepare import Prepared
 from toolpath.bands import largest_corner, planes
 from toolpath.counterexamples import HighWall
 from verify.slender import thin_walls
+from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
-from zones.thinness import slender_walls
 from zones.view import View
 
 FREE_RATIO = MOST_RATIO

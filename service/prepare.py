@@ -26,7 +26,7 @@ from service.stock import Blank, blank_of
 from zones.approach import directions_over_hemisphere
 from zones.assembly import Clearances
 from zones.categories import Categories
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.fixtures import AIR
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.part import Part
-from zones.faces import connection_faces
+from zones.features.connection_faces import connection_faces
 from zones.model import Decomposition
 from zones.places import MATERIAL, NARROW, OPEN, LevelPlaces, Places
 from zones.sections import SideCurve

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.part import Part
 from zones.cover import FACES_UP, cover_border, upward
-from zones.faces import connection_faces, face_bases
+from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.parting import Parting
 from zones.planmap import Area, PlanMap

@@ -17,7 +17,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
-from zones.faces import connection_faces, face_bases
+from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.planmap import PlanMap
 from zones.planview import ChannelPlan, footprints

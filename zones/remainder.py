@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from zones.assembly import Clearances
 from zones.catalogue import MOST_SLENDER
-from zones.faces import connection_of
+from zones.features.connection_faces import connection_of
 from zones.fixtures import above, covered
 from zones.machinable_area import SEEN
 from zones.model import Decomposition

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from zones.faces import connection_faces
+from zones.features.connection_faces import connection_faces
 from zones.machinable_area import LEVEL, Form, forms_of
 from zones.model import Decomposition
 from zones.reach import touchable

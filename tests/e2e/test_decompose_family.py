@@ -10,7 +10,7 @@ import pytest
 from geometry.part import Part
 from geometry.setup_frame import Placement
 from geometry.step_import.reader import read_part
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 
 pytest.importorskip("cadquery")

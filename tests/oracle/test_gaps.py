@@ -1,4 +1,4 @@
-"""Gaps of ``zones.channels`` and normals of ``zones.smooth`` against closed forms and dense rays of exact surfaces.
+"""Gaps of ``zones.features.channels`` and normals of ``zones.features.smooth_surface`` against closed forms and dense rays of exact surfaces.
 
 The sides are parametric surfaces written down here; the program sees their nodes only, meshed in full-height triangles
 or in a few rows. The twin sends rays from a dense grid along the exact normal, solves for the exact foot with Newton's
@@ -16,9 +16,9 @@ import pytest
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeKind
-from zones.channels import Facing, find_facings
-from zones.facegraph import Link
-from zones.smooth import SmoothFaces
+from zones.features.channels import Facing, find_facings
+from zones.features.face_graph import Link
+from zones.features.smooth_surface import SmoothFaces
 
 Surface = Callable[[F64, F64], F64]
 """(n,) u and (n,) v, both 0 to 1, to (n, 3) mm; the outward normal is X_u x X_v times a sign."""

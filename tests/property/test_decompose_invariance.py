@@ -11,7 +11,7 @@ import pytest
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeInfo, Part
 from tests.decomposition_shapes import SHAPES, to_part
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 
 pytest.importorskip("cadquery")

@@ -7,9 +7,9 @@ import pytest
 
 from geometry.part import Part
 from tests.decomposition_shapes import box, plate, to_part
-from zones.channels import _Field
-from zones.decompose import decompose
-from zones.facegraph import FaceGraph
+from zones.features.channels import _Field
+from zones.features.decomposition import decompose
+from zones.features.face_graph import FaceGraph
 
 pytest.importorskip("cadquery")
 

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.part import Part
 from tests.decomposition_shapes import SHAPES, to_part
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 
 pytest.importorskip("cadquery")

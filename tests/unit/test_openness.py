@@ -11,7 +11,7 @@ from geometry.part import Part
 from geometry.sampling import joined, sample_borders, sample_surface
 from tests.decomposition_shapes import box, to_part
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, tool, view_of
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.kernels.flood import escape_heights
 from zones.machinable_area import Form
 from zones.model import Decomposition

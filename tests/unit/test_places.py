@@ -13,7 +13,7 @@ from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import box, outline, plate, to_part
 from zones.categories import Categories
 from zones.cover import FACES_UP, cover_border
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.places import MATERIAL, LevelPlaces
 from zones.planmap import PlanMap

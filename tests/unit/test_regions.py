@@ -13,7 +13,7 @@ from geometry.part import Part
 from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import SHAPES, to_part
 from zones.categories import Categories
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.planview import ChannelPlan
 from zones.regions import Labels, Regioner

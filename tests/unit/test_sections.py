@@ -10,7 +10,7 @@ import pytest
 from geometry.mesh import TriangleMesh
 from geometry.part import Part
 from tests.decomposition_shapes import SHAPES, box, pair, plate, ring, to_part
-from zones.decompose import decompose
+from zones.features.decomposition import decompose
 from zones.model import Decomposition, Wall
 from zones.sections import SideCurve, _Section, wall_sections
 from zones.slices import Slicer

@@ -12,8 +12,8 @@ from geometry.part import Part
 from geometry.sampling import sample_surface
 from tests.decomposition_shapes import SHAPES, Shape, rounded, to_part
 from tests.hand_parts import ball, field_of, view_of
-from zones.decompose import decompose
-from zones.faces import connection_faces, connection_of
+from zones.features.connection_faces import connection_faces, connection_of
+from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.planview import footprints
 from zones.remainder import explain

@@ -9,8 +9,8 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.decomposition_shapes import box, plate, to_part
-from zones.decompose import decompose
-from zones.thinness import Slender, slender_walls
+from zones.features.decomposition import decompose
+from zones.features.wall_slenderness import Slender, slender_walls
 
 
 def walls_of(shape, ratio: float = 10.0) -> list[Slender]:

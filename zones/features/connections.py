@@ -1,6 +1,6 @@
 """Connections: material that bridges a channel and leaves void below some part of its span.
 
-A *body* is a thin sheet (see ``zones.walls``) or a component of the remaining faces across convex and smooth edges.
+A *body* is a thin sheet (see ``zones.features.walls``) or a component of the remaining faces across convex and smooth edges.
 A body *ends* at a wall where their common concave edges (or fillets) run round it: its normals along that border
 point to different sides. A wall that something else ends at shows one normal there, so a long wall with a window
 or a gate is not mistaken for a bridge between the ribs that meet it.
@@ -15,8 +15,8 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import EdgeKind
-from zones.facegraph import STEEP_NZ, FaceGraph, UnionFind, cast, connected_runs
-from zones.walls import NO_WALL, SEAT, Sheets
+from zones.features.face_graph import STEEP_NZ, FaceGraph, UnionFind, cast, connected_runs
+from zones.features.walls import NO_WALL, SEAT, Sheets
 
 # Normals of a body along the border it shares with a wall differ by more than 60 degrees where it ends there.
 END_DOT = 0.5

@@ -3,9 +3,9 @@
 From samples of every side a ray leaves along the outward normal; connections, fillets and slivers are left out of
 the mesh it meets. The first hit decides what the side faces. A pair of walls (or one wall with itself) has a
 channel when the side area that faces the other adds up to ``FACING_SHARE`` of half the smaller one's side area.
-The shortest ray is then refined on the triangles around it, and along the borders of both sides (``zones.borders``).
+The shortest ray is then refined on the triangles around it, and along the borders of both sides (``zones.features.side_borders``).
 Rays start and end on the exact surface with its normal there, as patches through the mesh nodes give it
-(``zones.smooth``): facets alone are half a facet wrong at borders.
+(``zones.features.smooth_surface``): facets alone are half a facet wrong at borders.
 
 A ray from a wall to itself does not count where start and foot lie on one piece of the side within a ball as wide as
 the wall is thick: that is a notch or a corner of the side.
@@ -23,11 +23,11 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.sampling import sample_surface
-from zones.borders import Border, Places, neighbours
-from zones.facegraph import FaceGraph, cast
-from zones.footprints import cap_footprints
+from zones.features.connection_caps import cap_footprints
+from zones.features.face_graph import FaceGraph, cast
+from zones.features.side_borders import Border, Places, neighbours
+from zones.features.smooth_surface import SmoothFaces
 from zones.kernels.nearby import one_piece
-from zones.smooth import SmoothFaces
 
 FACING_DOT = -0.3
 FACING_SHARE = 0.02

@@ -18,7 +18,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import EdgeKind
-from zones.facegraph import FaceGraph, Link, UnionFind, connected_runs
+from zones.features.face_graph import FaceGraph, Link, UnionFind, connected_runs
 
 THIN_SHARE = 0.5
 OPPOSED_DOT = -0.5

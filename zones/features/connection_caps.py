@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from zones.facegraph import FaceGraph, Link, UnionFind
+from zones.features.face_graph import FaceGraph, Link, UnionFind
 
 
 def cap_footprints(graph: FaceGraph, left_out: np.ndarray, side: np.ndarray) -> F64:

@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.part import EdgeKind, Part
-from zones.channels import find_facings
-from zones.connections import Bridges, find_bridges
-from zones.facegraph import STEEP_NZ, FaceGraph
+from zones.features.channels import find_facings
+from zones.features.connections import Bridges, find_bridges
+from zones.features.face_graph import STEEP_NZ, FaceGraph
+from zones.features.walls import SEAT, Sheets, find_sheets
 from zones.machinable_area import STEEP
 from zones.model import Channel, Connection, Decomposition, Wall
-from zones.walls import SEAT, Sheets, find_sheets
 
 # Part of its side area that must be steep for a thin body to be a wall: the blades of an inducer twist from upright
 # at the hub to lying at the tip, so most of their area may be less steep.
