@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np  # noqa: E402
 
 from zones.kernels.trapezoid import DONE, build_map  # noqa: E402
-from zones.noding import node_segments, take_noded  # noqa: E402
-from zones.trapezoids import TrapezoidMap, insertion_order  # noqa: E402
+from zones.plan_view.snap_rounding import node_segments, take_noded  # noqa: E402
+from zones.plan_view.trapezoidal_map import TrapezoidMap, insertion_order  # noqa: E402
 
 LOOK_UPS = 10_000
 RUNS = {1_000: 40, 10_000: 10, 100_000: 5}

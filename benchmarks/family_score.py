@@ -175,8 +175,8 @@ def compare_profiles(
 ) -> dict[str, list[int]] | None:
     """Right and total of the profile types of wall sides by true type; None where the program has no classifier."""
     try:
-        from zones.profiles import classify
-        from zones.sections import wall_sections
+        from zones.plan_view.profile_types import classify
+        from zones.plan_view.wall_sections import wall_sections
     except ImportError:
         return None
     import numpy as np

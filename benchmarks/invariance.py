@@ -45,9 +45,9 @@ def look(part: Any) -> Found:
     """Decompose a part and label its surface."""
     from geometry.sampling import sample_surface
     from zones.features.decomposition import decompose
-    from zones.planview import ChannelPlan
-    from zones.profiles import classify
-    from zones.regions import Regioner
+    from zones.plan_view.channel_plan import ChannelPlan
+    from zones.plan_view.profile_types import classify
+    from zones.plan_view.regions import Regioner
 
     d = decompose(part)
     plan = ChannelPlan.of(part, d)

@@ -25,7 +25,6 @@ from service.convert import face_numbers, no_stock_file, of_blank, rotary_machin
 from service.stock import Blank, blank_of
 from zones.approach import directions_over_hemisphere
 from zones.assembly import Clearances
-from zones.categories import Categories
 from zones.features.decomposition import decompose
 from zones.fixtures import AIR
 from zones.lattice import lattice_step
@@ -33,9 +32,10 @@ from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches
-from zones.planview import ChannelPlan
+from zones.plan_view.categories import Categories
+from zones.plan_view.channel_plan import ChannelPlan
+from zones.plan_view.regions import Regioner
 from zones.reach import DiscHeights, TipField
-from zones.regions import Regioner
 from zones.sight import Reach
 from zones.view import View, access_rotation, turned, turned_samples
 from zones.zoning import ZoneArea, Zoning, build_zones

@@ -22,7 +22,7 @@ from toolpath.finish import ZonePlan
 from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan
 from verify.model import Proof
-from zones.regions import Labels
+from zones.plan_view.regions import Labels
 from zones.remainder import Remainder, explain
 from zones.zoning import ZoneArea, is_open
 

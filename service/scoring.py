@@ -20,8 +20,8 @@ from service.prepare import Prepared, machinable_triangles
 from toolpath.family import Target
 from toolpath.plan import Plan
 from zones.machinable_area import forms_of
+from zones.plan_view.regions import Labels
 from zones.reach import touchable
-from zones.regions import Labels
 from zones.view import View, turned_samples
 from zones.zoning import ZoneArea
 

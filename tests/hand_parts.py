@@ -25,9 +25,9 @@ from zones.assembly import Clearances
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
-from zones.planview import ChannelPlan
+from zones.plan_view.channel_plan import ChannelPlan
+from zones.plan_view.regions import Labels, Regioner
 from zones.reach import TipField
-from zones.regions import Labels, Regioner
 from zones.view import View
 from zones.zoning import ZoneArea, build_zones
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zones.machinable_area import Form
-from zones.regions import base_of
+from zones.plan_view.regions import base_of
 from zones.sight import Sight
 
 PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids

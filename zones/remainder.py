@@ -23,8 +23,8 @@ from zones.fixtures import above, covered
 from zones.machinable_area import SEEN
 from zones.model import Decomposition
 from zones.needs import DOES, Buyer, Cutter
+from zones.plan_view.regions import Labels
 from zones.reach import TipField
-from zones.regions import Labels
 from zones.view import View
 from zones.zoning import LEAST_ZONE_MM2
 

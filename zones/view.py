@@ -12,8 +12,8 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
+from zones.plan_view.regions import Labels, Regioner
 from zones.reach import TipField
-from zones.regions import Labels, Regioner
 
 ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its own x axis is taken from Y
 

@@ -1,6 +1,6 @@
 """Which tool cuts which area from where: samples of the machinable area become zones.
 
-1. Every sample has a *region* in each view (``zones.regions``: SCZ, or SCZI on, under or over a connection) and a
+1. Every sample has a *region* in each view (``zones.plan_view.regions``: SCZ, or SCZI on, under or over a connection) and a
    *form*: level, steep or shallow.
 2. Views are asked in turn. Between two opposite ones the walls are shared out first (``zones.planes``).
 3. In each region and form tools are tried from the stoutest on. A tool takes the samples its cutting part can touch,
@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from zones.categories import Categories, Category
 from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.openness import OPEN_SHARE, open_share
+from zones.plan_view.categories import Categories, Category
+from zones.plan_view.regions import base_of
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach import TipField
-from zones.regions import base_of
 from zones.sight import Reach, Sight
 from zones.view import View
 

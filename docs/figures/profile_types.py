@@ -12,8 +12,8 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.surfaces.bspline import SplineCurve, arc_length
-from zones.bends import Way
-from zones.profiles import Profile, classify
+from zones.plan_view.curve_bends import Way
+from zones.plan_view.profile_types import Profile, classify
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 WIDTH, HEIGHT, MARGIN = 150.0, 70.0, 9.0

@@ -24,7 +24,7 @@ from service.convert import parse_setup
 from service.prepare import Prepared, prepare
 from service.raster import Canvas
 from zones.patches import Nearest
-from zones.planview import ChannelPlan
+from zones.plan_view.channel_plan import ChannelPlan
 from zones.zoning import ZoneArea
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"

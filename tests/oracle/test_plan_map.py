@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zones.planmap import OUTSIDE, Area, PlanMap
+from zones.plan_view.plan_map import OUTSIDE, Area, PlanMap
 
 
 def random_areas(seed: int) -> list[Area]:

@@ -8,8 +8,8 @@ import shapely
 
 from tests.oracle import arrangement_twin as twin
 from zones.kernels.trapezoid import LIMIT, SUB
-from zones.noding import node_segments, take_noded
-from zones.trapezoids import TrapezoidMap, _hilbert, insertion_order
+from zones.plan_view.snap_rounding import node_segments, take_noded
+from zones.plan_view.trapezoidal_map import TrapezoidMap, _hilbert, insertion_order
 
 EVERYDAY = [(kind, seed) for kind in sorted(twin.KINDS) for seed in range(6)]
 SWEEP = 1000

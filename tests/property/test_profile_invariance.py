@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from geometry.surfaces.bspline import arc_length
 from tests.profile_curves import DRAW, draw
-from zones.bends import size_of
-from zones.profiles import Profile, VoidSide, classify
+from zones.plan_view.curve_bends import size_of
+from zones.plan_view.profile_types import Profile, VoidSide, classify
 
 kinds = st.sampled_from(list(DRAW))
 seeds = st.integers(1000, 9000)

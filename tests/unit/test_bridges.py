@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zones.bridges import bridge, direction
+from zones.plan_view.section_bridges import bridge, direction
 
 RADIUS = 10.0
 

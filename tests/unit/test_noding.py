@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError, InputError
-from zones import noding as module
 from zones.kernels.trapezoid import LIMIT
-from zones.noding import crossing_pixel, node_segments, runs_through, take_noded
-from zones.trapezoids import TrapezoidMap
+from zones.plan_view import snap_rounding as module
+from zones.plan_view.snap_rounding import crossing_pixel, node_segments, runs_through, take_noded
+from zones.plan_view.trapezoidal_map import TrapezoidMap
 
 CROSS = np.array([[[0.0, 0.0], [10.0, 10.0]], [[0.0, 10.0], [10.0, 0.0]]])
 

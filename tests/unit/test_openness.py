@@ -16,8 +16,8 @@ from zones.kernels.flood import escape_heights
 from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.openness import escape_field, open_share
+from zones.plan_view.regions import base_of
 from zones.reach import TipField
-from zones.regions import base_of
 from zones.zoning import build_zones, is_open
 
 

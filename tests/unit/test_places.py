@@ -11,14 +11,14 @@ import shapely
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import box, outline, plate, to_part
-from zones.categories import Categories
-from zones.cover import FACES_UP, cover_border
 from zones.features.decomposition import decompose
 from zones.model import Decomposition
-from zones.places import MATERIAL, LevelPlaces
-from zones.planmap import PlanMap
-from zones.planview import ChannelPlan
-from zones.regions import Labels, Region, Regioner, base_of, connections_of, place_of
+from zones.plan_view.categories import Categories
+from zones.plan_view.channel_plan import ChannelPlan
+from zones.plan_view.free_places import MATERIAL, LevelPlaces
+from zones.plan_view.plan_cover import FACES_UP, cover_border
+from zones.plan_view.plan_map import PlanMap
+from zones.plan_view.regions import Labels, Region, Regioner, base_of, connections_of, place_of
 
 pytest.importorskip("cadquery")
 

@@ -9,8 +9,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, view_of
 from zones.machinable_area import Form
 from zones.model import Decomposition
+from zones.plan_view.regions import Regioner
 from zones.planes import PLANE_MARGIN, snapped
-from zones.regions import Regioner
 from zones.view import View, access_rotation, turned, turned_samples
 from zones.zoning import build_zones
 

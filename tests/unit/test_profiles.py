@@ -12,8 +12,8 @@ from geometry.errors import GeometryError
 from geometry.surfaces.bspline import SplineCurve
 from tests.profile_curves import DRAW, draw
 from tests.source_tree import ROOT
-from zones.bends import Way, _pivots, measure_bends, size_of
-from zones.profiles import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
+from zones.plan_view.curve_bends import Way, _pivots, measure_bends, size_of
+from zones.plan_view.profile_types import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
 
 # Limits were chosen on seeds below 1000; scores are taken on these.
 SCORE = 20_000

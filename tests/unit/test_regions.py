@@ -12,12 +12,12 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, sample_surface
 from tests.decomposition_shapes import SHAPES, to_part
-from zones.categories import Categories
 from zones.features.decomposition import decompose
 from zones.model import Decomposition
-from zones.planview import ChannelPlan
-from zones.regions import Labels, Regioner
-from zones.strips import Strip, spread
+from zones.plan_view.categories import Categories
+from zones.plan_view.channel_plan import ChannelPlan
+from zones.plan_view.channel_strips import Strip, spread
+from zones.plan_view.regions import Labels, Regioner
 
 pytest.importorskip("cadquery")
 

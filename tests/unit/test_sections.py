@@ -12,8 +12,8 @@ from geometry.part import Part
 from tests.decomposition_shapes import SHAPES, box, pair, plate, ring, to_part
 from zones.features.decomposition import decompose
 from zones.model import Decomposition, Wall
-from zones.sections import SideCurve, _Section, wall_sections
-from zones.slices import Slicer
+from zones.plan_view.mesh_slices import Slicer
+from zones.plan_view.wall_sections import SideCurve, _Section, wall_sections
 
 pytest.importorskip("cadquery")
 

@@ -15,7 +15,7 @@ from tests.hand_parts import ball, field_of, view_of
 from zones.features.connection_faces import connection_faces, connection_of
 from zones.features.decomposition import decompose
 from zones.model import Decomposition
-from zones.planview import footprints
+from zones.plan_view.channel_plan import footprints
 from zones.remainder import explain
 from zones.view import View
 

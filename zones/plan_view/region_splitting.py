@@ -2,7 +2,7 @@
 
 A region belongs to a *level*: a channel to the lower of the heights its two walls were cut at, where both stand; the
 outside of a wall to that of the wall; floor and free surface to the lowest of the channels. The places of that level
-(``zones.places``) which the region has part in are its own. Wall tops and connections are never parted: over them a
+(``zones.plan_view.free_places``) which the region has part in are its own. Wall tops and connections are never parted: over them a
 tool passes.
 """
 
@@ -19,8 +19,8 @@ from geometry.mesh import F64
 from geometry.part import Part
 from zones.features.connection_faces import connection_faces
 from zones.model import Decomposition
-from zones.places import MATERIAL, NARROW, OPEN, LevelPlaces, Places
-from zones.sections import SideCurve
+from zones.plan_view.free_places import MATERIAL, NARROW, OPEN, LevelPlaces, Places
+from zones.plan_view.wall_sections import SideCurve
 
 OFF = (0.02, 0.1, 0.3)  # mm off the surface where its place is looked up; then the nearest of its region
 LEANING = 0.3  # |n_xy| below: no side to slide along

@@ -8,7 +8,7 @@
    segments that were led over it.
 
 Floating point decides in step 2 only, and whether it missed a crossing is seen when the map is built, exactly
-(``zones.trapezoids``); the crossing is then made hot and step 3 repeated.
+(``zones.plan_view.trapezoidal_map``); the crossing is then made hot and step 3 repeated.
 """
 
 from __future__ import annotations

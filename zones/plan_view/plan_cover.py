@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from geometry.mesh import F64, I32, TriangleMesh
-from zones.noding import I64
+from zones.plan_view.snap_rounding import I64
 
 FACES_UP = 1e-3  # n_z above: a triangle covers part of the plan; steeper ones 0.05 mm if they are 50 mm high
 THIN = 5e-4  # mm: what borders may be straightened by, half a step of the grid they are rounded to

@@ -1,7 +1,7 @@
 """The plan view cut into cells: which named areas lie over a place.
 
 The borders of the areas, and lines that cut without enclosing anything, go into one trapezoidal map
-(``zones.trapezoids``). Its faces are the cells; a cell carries the names of the areas that cover it. A look-up
+(``zones.plan_view.trapezoidal_map``). Its faces are the cells; a cell carries the names of the areas that cover it. A look-up
 goes down the search DAG of the map, so it costs O(log n) in the number of segments.
 """
 
@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.mesh import F64
-from zones.trapezoids import Faces, TrapezoidMap
+from zones.plan_view.trapezoidal_map import Faces, TrapezoidMap
 
 OUTSIDE = -1  # cell of a place outside the box of the map
 
@@ -68,7 +68,7 @@ class PlanMap:
     @staticmethod
     def of_cover(name: str, border: F64, grid: float = 1e-3, seed: int = 0) -> PlanMap:
         """Map of one area, told by directed borders (k, 2, 2), mm, that make closed lines: where they wind round a
-        place counter-clockwise (``zones.cover``). Its cells are as large as can be."""
+        place counter-clockwise (``zones.plan_view.plan_cover``). Its cells are as large as can be."""
         made = TrapezoidMap.of(border, grid, seed)
         faces = made.faces()
         inside = np.append(made.windings(faces) > 0, False)  # the last for what is outside of the box

@@ -18,10 +18,10 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.part import Part
-from zones.bridges import bridge
 from zones.model import Decomposition, Wall
-from zones.pieces import FREE, MINE, OTHER, Pieces, turn_between
-from zones.slices import Slicer
+from zones.plan_view.mesh_slices import Slicer
+from zones.plan_view.section_bridges import bridge
+from zones.plan_view.wall_pieces import FREE, MINE, OTHER, Pieces, turn_between
 
 # Lengths are multiples of the thickness of the wall.
 # What of the last two thicknesses before its end a stretch that ends there has behind it.

@@ -1,7 +1,7 @@
 """Places of the plan view: where a tool may go at a level without being lifted over what stands there.
 
 What stands above a level, connections left out, covers part of the plan. The rest falls into the cells of a plan map
-(``zones.planmap``), trapezoids joined across the edges they share: these are the places of the level. Two that touch
+(``zones.plan_view.plan_map``), trapezoids joined across the edges they share: these are the places of the level. Two that touch
 in a point are two. A connection does not part a place, for what it stops below goes on above it.
 """
 
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
 from geometry.part import Part
-from zones.cover import FACES_UP, cover_border, upward
-from zones.planmap import PlanMap
+from zones.plan_view.plan_cover import FACES_UP, cover_border, upward
+from zones.plan_view.plan_map import PlanMap
 
 MATERIAL = -1  # number of what lies under something that stands above the level
 OPEN = 0  # number of the place outside all that stands

@@ -1,6 +1,6 @@
 """Trapezoidal map of segments in plan, its look-up, and the faces of the arrangement.
 
-1. The segments are snap-rounded to pieces on a grid (``zones.noding``).
+1. The segments are snap-rounded to pieces on a grid (``zones.plan_view.snap_rounding``).
 2. The pieces are put into the map in random order (``zones.kernels.trapezoid``), inside a box.
 3. Trapezoids that are neighbours across a wall belong to one face.
 
@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.errors import GeometryError, InputError, InternalError
 from geometry.mesh import F64
 from zones.kernels import trapezoid as kernel
-from zones.noding import I64, Noding, finite_pairs, node_segments
+from zones.plan_view.snap_rounding import I64, Noding, finite_pairs, node_segments
 
 REPAIRS = 64  # crossings that floating point may miss before the noding counts as failed
 FIRST_ROUND = 256  # pieces put in without regard to place

@@ -9,7 +9,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.mesh_queries.rays import first_hits
 from zones.model import Wall
-from zones.slices import Slice, Slicer
+from zones.plan_view.mesh_slices import Slice, Slicer
 
 # Lengths are multiples of the thickness of the wall.
 BACKED_REACH = 3.0

@@ -1,7 +1,7 @@
 """What is drawn in plan: wall traces, channels with their centre lines and ends, footprints of connections.
 
-1. Every side of a wall is cut at mid height (``zones.sections``): its trace.
-2. Level rays from the traces sweep strips (``zones.strips``).
+1. Every side of a wall is cut at mid height (``zones.plan_view.wall_sections``): its trace.
+2. Level rays from the traces sweep strips (``zones.plan_view.channel_strips``).
 3. The strips a pair of walls sends to each other are one area, the channel.
 4. A footprint is what the faces of a connection and its fillets cover, seen along the access.
 """
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.part import Part
-from zones.cover import FACES_UP, cover_border, upward
 from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
-from zones.parting import Parting
-from zones.planmap import Area, PlanMap
-from zones.sections import SideCurve, wall_sections
-from zones.strips import CLEAR, RayIndex, side_rays
+from zones.plan_view.channel_strips import CLEAR, RayIndex, side_rays
+from zones.plan_view.plan_cover import FACES_UP, cover_border, upward
+from zones.plan_view.plan_map import Area, PlanMap
+from zones.plan_view.region_splitting import Parting
+from zones.plan_view.wall_sections import SideCurve, wall_sections
 
 FAR = 0.3  # of the least gap: how far off the next trial is, where a leaning wall hides its channel from above
 UPRIGHT = 0.3  # |n_xy| below: no side to slide along

@@ -1,9 +1,9 @@
 """Which region of the part a point of its surface belongs to: SCZ and SCZI of the paper.
 
 A region is a channel, the outside of a wall, a connection, wall tops, floor or free surface. The cells of the plan
-view (``zones.planmap``) decide which channel a point of a wall side faces, and whether it lies under or over the
+view (``zones.plan_view.plan_map``) decide which channel a point of a wall side faces, and whether it lies under or over the
 footprint of a connection: then it is SCZI, else SCZ. A region in several places, between which walls stand, is a region
-for each (``zones.parting``).
+for each (``zones.plan_view.region_splitting``).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
 from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
-from zones.planmap import PlanMap
-from zones.planview import ChannelPlan, footprints
-from zones.strips import CLEAR
+from zones.plan_view.channel_plan import ChannelPlan, footprints
+from zones.plan_view.channel_strips import CLEAR
+from zones.plan_view.plan_map import PlanMap
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Region:
 
     base  : 'H1' a channel, 'W1' the outside of a wall, 'C1' a connection, 'top', 'floor' or 'free'
     over  : connections that lie below the point; under : those that lie above it; along the access
-    place : which of the places of the base, 1, 2 ...; 0 the open one, or the only one (``zones.parting``)
+    place : which of the places of the base, 1, 2 ...; 0 the open one, or the only one (``zones.plan_view.region_splitting``)
     """
 
     base: str

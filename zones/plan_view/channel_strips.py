@@ -23,7 +23,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
 from zones.model import Channel, Decomposition
-from zones.sections import SideCurve
+from zones.plan_view.wall_sections import SideCurve
 
 CLEAR = 0.02  # mm off the surface where a ray or a look-up starts, so that it does not fall on the border itself
 PITCH = 0.4  # mm between rays along a trace

@@ -13,11 +13,11 @@ import numpy as np
 import shapely
 
 from geometry.mesh import F64
-from zones.planview import ChannelPlan
-from zones.profiles import Level, Profile, classify
-from zones.regions import base_of, connections_of, place_of
-from zones.sections import SideCurve
-from zones.strips import FACING_SHARE, PITCH, runs_of, spread
+from zones.plan_view.channel_plan import ChannelPlan
+from zones.plan_view.channel_strips import FACING_SHARE, PITCH, runs_of, spread
+from zones.plan_view.profile_types import Level, Profile, classify
+from zones.plan_view.regions import base_of, connections_of, place_of
+from zones.plan_view.wall_sections import SideCurve
 
 RANK = {Level.SIMPLE: 0, Level.MEDIUM: 1, Level.HIGH: 2}
 NEAR = 0.05  # mm round a footprint within which a side counts as touched

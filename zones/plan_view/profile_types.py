@@ -1,6 +1,6 @@
 """The ten profile types of Arivazhagan (2020), table 1, made computable: one type for every curve, with a margin.
 
-    polyline -> B-spline -> bends, skew, roundness (zones.bends) -> decision table -> type, level
+    polyline -> B-spline -> bends, skew, roundness (zones.plan_view.curve_bends) -> decision table -> type, level
     the same table with each measure moved over its nearest limit -> margin and second type
 
 The curve is walked with the void on its left, so the part says which end it starts from, and the same side of a wall
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from zones.bends import Bend, BendMeasures, Way, measure_bends
+from zones.plan_view.curve_bends import Bend, BendMeasures, Way, measure_bends
 
 # Limits of the table; beyond the last relative distance there is no second type.
 SKEW = 0.10
