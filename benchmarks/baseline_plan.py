@@ -26,7 +26,7 @@ from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 from zones.zoning import ZoneArea
 
 

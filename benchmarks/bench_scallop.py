@@ -34,8 +34,8 @@ from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
 from toolpath.sidestep import lay_out  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from zones.assembly import Clearances
-from zones.reach import TipField
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import TipField
 
 # Table A.1, uv 0.025: radius, scallop, then passes, tool positions and seconds on each surface
 PAPER = {

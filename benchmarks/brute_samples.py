@@ -1,4 +1,4 @@
-"""Whether reach is right: every sample of a part asked of ``zones.reach`` and of a dense cloud of points.
+"""Whether reach is right: every sample of a part asked of ``zones.reach.tip_field`` and of a dense cloud of points.
 
 Run from the root of the checkout: ``python benchmarks/brute_samples.py [RECIPE:SEED ...] [--json FILE]``, or with
 ``PART.step:SETUP.json`` for a name. Without names 30 parts of the family are taken. Reach is asked with the normals the
@@ -336,7 +336,7 @@ def solid_of(tool: Any, clear: Any) -> Solid:
 
 def compare(cloud: Cloud, solid: Solid, said: dict[str, BOOL], points: F64, normals: F64, lift: float,
             cusp: float) -> dict[str, BOOL]:
-    """Where ``zones.reach`` and the cloud differ for one tool.
+    """Where ``zones.reach.tip_field`` and the cloud differ for one tool.
 
     said : (n,) bool of touchable: 'cutter' and 'tool' without play, 'played' the tool with it
 
@@ -378,13 +378,13 @@ def planned_normals(mesh: Any, points: F64, triangles: NDArray[np.int64]) -> F64
 
 def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, normals: F64, lift: float,
                   allowance: float, cusp: float) -> dict[str, BOOL]:
-    """What ``zones.reach.touchable`` says of samples (n, 3) mm, with and without its play."""
-    from zones import reach
+    """What ``zones.reach.tip_field.touchable`` says of samples (n, 3) mm, with and without its play."""
+    from zones.reach.tip_field import tip_field
 
-    field = reach.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, reach.lattice_step(tool), allowance,
+    field = tip_field.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, tip_field.lattice_step(tool), allowance,
                            cusp)
-    played = reach.touchable(field, points, normals, lift)[1]
-    by_cutter, by_tool, _ = reach.touchable(field, points, normals, lift, play=0.0)
+    played = tip_field.touchable(field, points, normals, lift)[1]
+    by_cutter, by_tool, _ = tip_field.touchable(field, points, normals, lift, play=0.0)
     return {"cutter": by_cutter, "tool": by_tool, "played": played}
 
 

@@ -44,7 +44,7 @@ from toolpath.steering import Limits, steered  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402
-from zones.assembly import Clearances
+from zones.reach.assembly import Clearances
 
 LENGTH, HIGH, THICK, WAVE, LESS, SHIFT = 160.0, 30.0, 3.0, 25.0, 4.0, 7.0  # mm
 SCALLOP, CHORD, DEPTH, OFF = 0.02, 0.0025, 0.0025, 0.004  # mm

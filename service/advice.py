@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from service.prepare import Prepared, clearances
-from zones.approach import Cone, approach, directions_over_hemisphere, zone_cone
+from zones.reach.approach_cones import Cone, approach, directions_over_hemisphere, zone_cone
 from zones.zoning import ZoneArea
 
 CONE_SAMPLES = 40  # of a zone that are asked

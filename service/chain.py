@@ -68,7 +68,7 @@ from verify.dialects import dialect_of
 from verify.likeness import carried
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
-from zones.view import View
+from zones.reach.access_view import View
 
 Progress = Callable[[str, float], None]
 Planner = Callable[..., Plan]

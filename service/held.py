@@ -14,7 +14,7 @@ from toolpath.counterexamples import HighWall
 from verify.slender import thin_walls
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
-from zones.view import View
+from zones.reach.access_view import View
 
 FREE_RATIO = MOST_RATIO
 """Times its thickness that a wall may be free for where it is finished: what is not told of when it stands alone."""

@@ -23,21 +23,21 @@ from schemas.setup import Access, Setup
 from service.blank import check_against_part
 from service.convert import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
 from service.stock import Blank, blank_of
-from zones.approach import directions_over_hemisphere
-from zones.assembly import Clearances
 from zones.features.decomposition import decompose
 from zones.fixtures import AIR
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
-from zones.orientations import DIRECTIONS, Gatherer, orientations
 from zones.patches import zone_patches
 from zones.plan_view.categories import Categories
 from zones.plan_view.channel_plan import ChannelPlan
 from zones.plan_view.regions import Regioner
-from zones.reach import DiscHeights, TipField
-from zones.sight import Reach
-from zones.view import View, access_rotation, turned, turned_samples
+from zones.reach.access_reach import Reach
+from zones.reach.access_view import View, access_rotation, turned, turned_samples
+from zones.reach.approach_cones import directions_over_hemisphere
+from zones.reach.assembly import Clearances
+from zones.reach.index_orientations import DIRECTIONS, Gatherer, orientations
+from zones.reach.tip_field import DiscHeights, TipField
 from zones.zoning import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²

@@ -33,7 +33,7 @@ from service.version import VERSION
 from toolpath.motion import Workingstep
 from toolpath.settings import Turning
 from toolpath.trimmed_faces import Faces
-from zones.view import View
+from zones.reach.access_view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded

@@ -42,7 +42,7 @@ from toolpath.plan import Plan
 from toolpath.stock import StockMap
 from toolpath.underway import NOTHING, Keeper, PlanNow
 from verify.model import NcProgram, Proof
-from zones.view import View
+from zones.reach.access_view import View
 
 log = structlog.get_logger(__name__)
 

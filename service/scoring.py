@@ -21,8 +21,8 @@ from toolpath.family import Target
 from toolpath.plan import Plan
 from zones.machinable_area import forms_of
 from zones.plan_view.regions import Labels
-from zones.reach import touchable
-from zones.view import View, turned_samples
+from zones.reach.access_view import View, turned_samples
+from zones.reach.tip_field import touchable
 from zones.zoning import ZoneArea
 
 PROOF_DENSITY = 100.0  # samples a mm²

@@ -15,7 +15,7 @@ from schemas.machine import DIALECT_ENDINGS
 from toolpath.plan import Plan
 from toolpath.stock import StockMap
 from verify.model import NcProgram, Proof
-from zones.view import View, turned_samples
+from zones.reach.access_view import View, turned_samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from geometry.part import Part
 from schemas.setup import Setup
 from service.convert import no_stock_file
 from toolpath.stock import StockMap
-from zones.view import View, turned
+from zones.reach.access_view import View, turned
 
 
 @dataclass(frozen=True)

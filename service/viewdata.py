@@ -27,8 +27,8 @@ from service.viewpaths import GRID as PATH_GRID
 from service.viewstock import stock_chunk
 from verify.model import NcProgram, Proof, ProofSetup
 from verify.sequence import Reading, read_all
+from zones.reach.access_view import turned_samples
 from zones.remainder import Remainder
-from zones.view import turned_samples
 
 VIEW_NAME = "view.bin"
 VIEW_VERSION = 2

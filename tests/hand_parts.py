@@ -21,14 +21,14 @@ from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.trimmed_faces import TrimmedFace
-from zones.assembly import Clearances
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.plan_view.channel_plan import ChannelPlan
 from zones.plan_view.regions import Labels, Regioner
-from zones.reach import TipField
-from zones.view import View
+from zones.reach.access_view import View
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import TipField
 from zones.zoning import ZoneArea, build_zones
 
 RAMP = math.radians(3.0)

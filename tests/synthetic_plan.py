@@ -12,7 +12,7 @@ from geometry.tool_body import HolderSegment, ToolBody
 from output.inverse_kinematics import RotaryMachine
 from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from toolpath.motion import Motion, Trajectory, Workingstep
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
 
 HOLDER = (HolderSegment(20.0, 20.0, 30.0),)
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from geometry.mesh_queries.drop import drop_contacts
 from toolpath.family import I64, Target
-from zones.reach import TipField, touchable
+from zones.reach.tip_field import TipField, touchable
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them
 OPEN = np.radians(135.0)  # a sample with no neighbour over this angle is at the border

@@ -44,7 +44,7 @@ from toolpath.trimmed_faces import Faces
 from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable_area import Form
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 from zones.zoning import ZoneArea
 
 LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest

@@ -25,7 +25,7 @@ from toolpath.kernels.march import march, spread
 from toolpath.levels import dilated, lines_at
 from toolpath.lines import Line
 from toolpath.stock import StockMap
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 AROUND = 2.0  # mm, and two diameters: how far round an area the tool looks for air
 EDGE = 0.8  # lattice steps: so much nearer than the radius, stock is still only touched

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from geometry.mesh import F64
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 SIZES = (0.12, 0.25, 0.5)  # radii, of the diameter of the tool: the least that gets it off the stock of the wall
 LEAST_RADIUS = 0.05  # mm

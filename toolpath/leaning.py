@@ -27,7 +27,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.shell import shells
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
-from zones.assembly import Clearances, Disc
+from zones.reach.assembly import Clearances, Disc
 
 TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most

@@ -26,7 +26,7 @@ from toolpath.kernels.contour import (
     trace,
 )
 from toolpath.lines import Line, dense, pieces_where, true_runs
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 LEAST_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
 BISECTIONS = 9  # a crossing is placed to step / 2**9

@@ -37,7 +37,7 @@ from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.travel import Motions, Travel
 from toolpath.walked import Depths, still_to_walk
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them

@@ -33,7 +33,7 @@ from toolpath.trimmed_faces import Faces
 from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.walked import Depths, Walked
 from zones.machinable_area import Form
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 from zones.zoning import ZoneArea
 
 AGAIN_SHARE = 0.95  # of the progress, before zones are gone over again

@@ -26,9 +26,9 @@ from toolpath.forward import Profile
 from toolpath.lines import true_runs
 from toolpath.locations import LOOK, OFFS, chorded, contacts, sides, tips
 from toolpath.poses import Axes, Blocked, angles_between
-from zones.approach import assembly
-from zones.assembly import Clearances
-from zones.reach import LEVEL_TOLERANCE
+from zones.reach.approach_cones import assembly
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import LEVEL_TOLERANCE
 
 SWING_SHARE = 0.1  # of the chordal tolerance: what turning between two locations may add
 ROUNDS = 16  # of halving ways between which the axis turns too much

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import BRANCH, LEAF
-from zones.assembly import Clearances, Disc
+from zones.reach.assembly import Clearances, Disc
 
 BITS = 8  # of each coordinate on the curve along which places are put in boxes
 KEPT = 48  # shells: of a tool as it is and a bit wider, for what may stand at its flank and under its end

@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.skins import near
 from toolpath.residual import ResidualMap
-from zones.assembly import Clearances, Disc
+from zones.reach.assembly import Clearances, Disc
 
 
 class Skins:

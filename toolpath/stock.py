@@ -22,8 +22,8 @@ from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.poses import between, places_along
 from toolpath.shell import Shell
-from zones.assembly import Disc
 from zones.lattice import Lattice
+from zones.reach.assembly import Disc
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
 POOLED = 12  # nodes a side of the squares whose highest stock is kept

@@ -20,7 +20,7 @@ from toolpath.lines import dense, stretch
 from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import GUARD
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
 MOST_IN_FRONT = 0.5  # mm

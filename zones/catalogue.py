@@ -15,9 +15,9 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_grid, drop_tips
 from geometry.tool_body import ToolBody
-from zones.assembly import Clearances, discs_of
 from zones.lattice import Lattice
-from zones.reach import LEVEL_TOLERANCE, LOOKUP_STEP
+from zones.reach.assembly import Clearances, discs_of
+from zones.reach.tip_field import LEVEL_TOLERANCE, LOOKUP_STEP
 
 # mm, stout to thin; nobody is asked to buy a thinner one than the last
 DIAMETERS = (40.0, 32.0, 25.0, 20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.2, 1.0, 0.8, 0.6, 0.5,

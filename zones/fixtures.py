@@ -11,10 +11,10 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
-from zones.assembly import Clearances
 from zones.lattice import lattice_step
 from zones.machinable_area import SEEN
-from zones.reach import DiscHeights, TipField
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import DiscHeights, TipField
 
 SKIN = 0.02  # mm off the surface where a ray upward starts
 AIR = 4.0  # mm beside the part, beyond the cutter's radius

@@ -16,7 +16,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.trimming.trim import FacePatch, trim_faces
 from zones.machinable_area import LEVEL, STEEP
-from zones.view import View
+from zones.reach.access_view import View
 from zones.zoning import ZoneArea
 
 PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from zones.machinable_area import Form
 from zones.plan_view.regions import base_of
-from zones.sight import Sight
+from zones.reach.access_reach import Sight
 
 PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids
 OPPOSITE = -0.99  # d1·d2 below: two views look at each other

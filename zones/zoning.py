@@ -24,13 +24,13 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from zones.machinable_area import Form
 from zones.model import Decomposition
-from zones.openness import OPEN_SHARE, open_share
 from zones.plan_view.categories import Categories, Category
 from zones.plan_view.regions import base_of
 from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
-from zones.reach import TipField
-from zones.sight import Reach, Sight
-from zones.view import View
+from zones.reach.access_reach import Reach, Sight
+from zones.reach.access_view import View
+from zones.reach.openness import OPEN_SHARE, open_share
+from zones.reach.tip_field import TipField
 
 # What a tool has to gain to be used in a region, whatever the size of that: 1 mm² is 25 planning samples, on which an
 # area is known to a fifth; where samples stand wider, 25 of them. It is also what a tool to buy has to gain.

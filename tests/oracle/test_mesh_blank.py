@@ -15,7 +15,7 @@ from verify.field import stock_field
 from verify.model import ProofSetup
 from verify.stock import blank
 from verify.ways import way_out_of_mesh
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
 
 XS, YS, HEIGHTS = [0.0, 3.0, 5.0, 9.0], [0.0, 2.0, 6.0], [[2.0, 6.0, 3.0], [4.0, 1.0, 5.0]]
 SHELL = terraces(XS, YS, HEIGHTS, base=-1.0)

@@ -9,8 +9,8 @@ from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, tool
 from tests.oracle.naive_drop import lift_of_points
-from zones.assembly import Clearances
-from zones.reach import LOOKUP_STEP, touchable
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import LOOKUP_STEP, touchable
 
 CLEAR = Clearances(shank=0.2, holder=1.0)
 BODIES = {

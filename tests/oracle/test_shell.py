@@ -10,7 +10,7 @@ from tests.hand_parts import ball, box_mesh, tool
 from toolpath.leaning import CELLS, loaded
 from toolpath.shell import shells
 from toolpath.stock import StockMap
-from zones.assembly import Clearances, Disc
+from zones.reach.assembly import Clearances, Disc
 
 STEP, DEEP = 0.1, 0.2
 PART = TriangleTree(box_mesh([0, 0, -2], [30, 30, 0]))

@@ -20,8 +20,8 @@ from tests.hand_parts import (
     low_walls,
     slope_field,
 )
-from zones.approach import approach, directions_over_hemisphere
-from zones.assembly import Clearances
+from zones.reach.approach_cones import approach, directions_over_hemisphere
+from zones.reach.assembly import Clearances
 
 LIFT = 0.005
 CLEAR = Clearances()

@@ -12,7 +12,7 @@ from geometry.mesh_queries.drop import drop_tips
 from tests.hand_parts import box_mesh, field_of, joined, tool
 from tests.plan_checks import dense
 from toolpath.strategies import floor
-from zones.reach import INSIDE, touchable
+from zones.reach.tip_field import INSIDE, touchable
 
 LIFT, CHORD = 0.002, 0.002
 LONG = 14.0  # mm, of the walls

@@ -39,7 +39,7 @@ from tests.plan_checks import (
     worst_plunge,
 )
 from toolpath.motion import Motion
-from zones.reach import touchable
+from zones.reach.tip_field import touchable
 
 
 def valley():

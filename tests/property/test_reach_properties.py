@@ -24,9 +24,9 @@ from tests.hand_parts import (
     tool,
     walls,
 )
-from zones.assembly import Clearances
 from zones.lattice import lattice_step
-from zones.reach import LOOKUP_STEP, TipField, touchable
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import LOOKUP_STEP, TipField, touchable
 
 LIFT = 0.005
 MARGIN = 8.0  # of the fields: the same for tools of any diameter

@@ -11,9 +11,9 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool
-from zones.approach import approach, directions_over_hemisphere, resolution_of, zone_cone
-from zones.assembly import Clearances
-from zones.reach import touchable
+from zones.reach.approach_cones import approach, directions_over_hemisphere, resolution_of, zone_cone
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import touchable
 
 LIFT = 0.001
 CLEAR = Clearances(shank=0.2, holder=1.0)

@@ -12,7 +12,7 @@ from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
 from toolpath.border import COARSEST, FAR, beyond
 from toolpath.family import Target
-from zones.reach import touchable
+from zones.reach.tip_field import touchable
 
 LIFT, SPACING = 0.002, 0.2
 

@@ -18,7 +18,7 @@ from geometry.setup_frame import Placement
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, bent_strip, low_walls, slope_field, tool
 from tests.step_files import write_step
-from zones.assembly import Clearances
+from zones.reach.assembly import Clearances
 
 CLEAR = Clearances()
 LIFT = 0.004

@@ -17,10 +17,10 @@ from service.convert import parse_setup  # noqa: E402
 from service.prepare import planning_samples  # noqa: E402
 from tests.hand_parts import ball, tool  # noqa: E402
 from tests.step_files import write_step  # noqa: E402
-from zones.assembly import Clearances  # noqa: E402
 from zones.features.decomposition import decompose  # noqa: E402
 from zones.lattice import lattice_step  # noqa: E402
-from zones.reach import TipField, touchable  # noqa: E402
+from zones.reach.assembly import Clearances  # noqa: E402
+from zones.reach.tip_field import TipField, touchable  # noqa: E402
 
 
 def from_axis(p, slope=0.0):

@@ -13,7 +13,7 @@ from tests.pocket_case import block
 from toolpath.stock import StockMap
 from verify.blank import BlankCylinder, blank_cylinder, stands_over_air, stock_bounds, stock_on_normals
 from verify.model import ProofSetup
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
 
 TOOL = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flutes": 2, "flute_length_mm": 8, "neck_diameter_mm": 3.8,
         "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 30}

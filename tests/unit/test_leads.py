@@ -20,7 +20,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
 from toolpath.travel import Motions
 from toolpath.walked import Depths
-from zones.assembly import Clearances
+from zones.reach.assembly import Clearances
 
 
 @pytest.mark.parametrize("radius", [0.06, 0.5, 3.0, 20.0])

@@ -11,7 +11,7 @@ from toolpath.leaning import LEAST_PACE, Surroundings, _begun_level, _descends, 
 from toolpath.piece import Piece
 from toolpath.settings import Turning
 from toolpath.stock import StockMap
-from zones.assembly import Clearances, Disc
+from zones.reach.assembly import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0
 PART = box_mesh([0, 0, -2], [30, 30, 0])

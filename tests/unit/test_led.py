@@ -24,8 +24,8 @@ from toolpath.steering import Limits
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.trimmed_faces import TrimmedFace
-from zones.assembly import Clearances
 from zones.machinable_area import Form
+from zones.reach.assembly import Clearances
 
 BALL = ball(6.0)
 TILTED, LEADING = Leaned(0.0, np.radians(15.0)), Leaned(np.radians(10.0), 0.0)

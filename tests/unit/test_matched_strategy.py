@@ -19,7 +19,7 @@ from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.matched import matched, suits
 from toolpath.trimmed_faces import TrimmedFace
-from zones.assembly import Clearances
+from zones.reach.assembly import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0
 LOOP = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float)

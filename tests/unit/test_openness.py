@@ -15,9 +15,9 @@ from zones.features.decomposition import decompose
 from zones.kernels.flood import escape_heights
 from zones.machinable_area import Form
 from zones.model import Decomposition
-from zones.openness import escape_field, open_share
 from zones.plan_view.regions import base_of
-from zones.reach import TipField
+from zones.reach.openness import escape_field, open_share
+from zones.reach.tip_field import TipField
 from zones.zoning import build_zones, is_open
 
 

@@ -15,9 +15,9 @@ from verify.kinematics import Kinematics
 from verify.model import ProofSetup
 from verify.reader import read_program
 from verify.table import table_findings
-from zones.approach import directions_over_hemisphere
-from zones.assembly import Clearances
-from zones.orientations import Gatherer, _chosen, orientations
+from zones.reach.approach_cones import directions_over_hemisphere
+from zones.reach.assembly import Clearances
+from zones.reach.index_orientations import Gatherer, _chosen, orientations
 
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 24.0, 6.0, 36.0, (HolderSegment(20.0, 20.0, 30.0),))
 

@@ -11,7 +11,7 @@ from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.plan_view.regions import Regioner
 from zones.planes import PLANE_MARGIN, snapped
-from zones.view import View, access_rotation, turned, turned_samples
+from zones.reach.access_view import View, access_rotation, turned, turned_samples
 from zones.zoning import build_zones
 
 NOTHING = Decomposition((), (), ())

@@ -18,8 +18,8 @@ from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes
-from zones.assembly import Clearances
-from zones.reach import TipField
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import TipField
 
 SCALLOP, CHORD, RADIUS = 0.02, 0.004, 3.0
 KNOTS = np.array([0.0, 0, 0, 1, 1, 1])

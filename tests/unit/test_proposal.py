@@ -12,12 +12,12 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones import proposal
-from zones.assembly import Clearances
 from zones.catalogue import DIAMETERS, MOST_SLENDER, catalogue
 from zones.needs import Buyer, Cutter
 from zones.proposal import propose
-from zones.reach import touchable
-from zones.sight import able
+from zones.reach.access_reach import able
+from zones.reach.assembly import Clearances
+from zones.reach.tip_field import touchable
 from zones.zoning import LEAST_ZONE_MM2
 
 LIFT = 0.002

@@ -10,9 +10,9 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
-from zones.assembly import Clearances, discs_of
 from zones.lattice import Lattice, lattice_step
-from zones.reach import DiscHeights, contact_tips, touchable
+from zones.reach.assembly import Clearances, discs_of
+from zones.reach.tip_field import DiscHeights, contact_tips, touchable
 
 
 def test_a_lattice_covers_its_bounds_and_finds_its_nodes():

@@ -102,7 +102,7 @@ def test_every_point_has_one_region_whatever_the_view() -> None:
     part, d, plan, samples, labels = measured("square bar")
     assert (labels.code >= 0).all() and len(labels.code) == len(samples)
     flip = np.diag([1.0, -1.0, -1.0])
-    from zones.view import turned, turned_samples
+    from zones.reach.access_view import turned, turned_samples
 
     here, seen = turned(part, flip), turned_samples(samples, flip)
     other = Regioner(here, d, plan, first=False).of(seen.points, seen.normals, seen.face,

@@ -14,7 +14,7 @@ from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.catalogue import DIAMETERS, catalogue
 from zones.model import Connection, Decomposition
-from zones.reach import touchable
+from zones.reach.tip_field import touchable
 from zones.remainder import explain
 
 NOTHING = Decomposition((), (), ())

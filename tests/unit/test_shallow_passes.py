@@ -14,7 +14,7 @@ from toolpath.envelope import Envelope
 from toolpath.family import Promise, Target
 from toolpath.settings import Pattern
 from toolpath.strategies import zigzag
-from zones.reach import touchable
+from zones.reach.tip_field import touchable
 
 
 def kind(body):

@@ -25,7 +25,7 @@ from service.sides import Program
 from service.stock import blank_of
 from tests.synthetic_plan import plan, step
 from toolpath.motion import Workingstep
-from zones.view import access_rotation, turned
+from zones.reach.access_view import access_rotation, turned
 
 HOSTILE = "<script>alert('Ø')</script> & \"4711\""
 FACES = " ".join(f"F{k}" for k in range(1, 900))

@@ -17,8 +17,8 @@ from toolpath.residual import ResidualMap
 from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.skins import Skins, behind
 from toolpath.stock import StockMap
-from zones.assembly import Clearances, Disc
 from zones.machinable_area import Form
+from zones.reach.assembly import Clearances, Disc
 
 SCALLOP, STEP = 0.02, 0.15
 TOOL = ball(1.5, neck=15.0, shank=4.0, stickout=31.0)  # flutes 3 mm, neck 1.425: 0.0375 relieved, 0.01875 kept clear

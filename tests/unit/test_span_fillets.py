@@ -16,8 +16,8 @@ from zones.features.connection_faces import connection_faces, connection_of
 from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.plan_view.channel_plan import footprints
+from zones.reach.access_view import View
 from zones.remainder import explain
-from zones.view import View
 
 pytest.importorskip("cadquery")
 

@@ -12,7 +12,7 @@ from toolpath.locations import tips
 from toolpath.posed import enters, lead_and_tilt, leaned, posed
 from toolpath.poses import angles_between
 from toolpath.steering import FAN, SPACING, Limits, fan, steered
-from zones.assembly import Clearances
+from zones.reach.assembly import Clearances
 
 WIDE = Limits(np.radians(40.0), np.radians(6.0))
 R = 2.0

@@ -21,7 +21,7 @@ from service.prepare import load_blank, prepare
 from service.stock import blank_of
 from tests.hand_parts import as_part, box_mesh, joined, terraces
 from tests.step_files import write_step
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
 
 cq = pytest.importorskip("cadquery")
 

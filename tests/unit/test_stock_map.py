@@ -13,8 +13,8 @@ from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL
 from toolpath.stock import SKIN, StockMap
-from zones.assembly import Disc
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
+from zones.reach.assembly import Disc
 
 STEP = 0.2
 PART = joined(box_mesh([0, 0, -2], [12, 12, 0]), box_mesh([3.05, 3.0, 0], [4.0, 9.0, 5.0]))

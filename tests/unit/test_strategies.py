@@ -16,7 +16,7 @@ from tests.plan_checks import dense
 from toolpath.lines import Line
 from toolpath.stock import StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
-from zones.reach import LEVEL_TOLERANCE, touchable
+from zones.reach.tip_field import LEVEL_TOLERANCE, touchable
 
 CHORD = 0.003
 WALLS = [((5.0, 2.0), (7.0, 12.0)), ((15.0, 2.0), (17.0, 12.0))]  # plan of ``walls()``, whose plate is at z = 3

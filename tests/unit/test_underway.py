@@ -23,7 +23,7 @@ from toolpath.plan import Plan, plan_job
 from toolpath.settings import CutData
 from toolpath.stock import StockMap
 from toolpath.underway import Keeper, PlanNow, Ways
-from zones.view import access_rotation
+from zones.reach.access_view import access_rotation
 
 Stock = Callable[[Case], StockMap]
 

@@ -10,8 +10,8 @@ from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces
 from zones.machinable_area import Form, forms_of, machinable_faces
 from zones.model import Connection, Decomposition
 from zones.plan_view.regions import Labels, Region, face_bases
-from zones.reach import touchable
-from zones.sight import able, preference
+from zones.reach.access_reach import able, preference
+from zones.reach.tip_field import touchable
 from zones.zoning import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
 
 NOTHING = Decomposition((), (), ())

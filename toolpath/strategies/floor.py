@@ -15,7 +15,7 @@ from scipy import ndimage
 from geometry.mesh import F64
 from toolpath.levels import contours, dilated, lines_at
 from toolpath.lines import Line, pieces_where, thinned
-from zones.reach import INSIDE, LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
 EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE

@@ -22,7 +22,7 @@ from toolpath.isoparametric import Flank, Laid
 from toolpath.lines import Line, true_runs
 from toolpath.locations import lifted
 from toolpath.trimmed_faces import Faces
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 NAME = "isoparametric"
 LEAST_AREA = 1.0  # of r²: a face smaller than that is left to passes in between

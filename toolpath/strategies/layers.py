@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath.levels import contours, dilated, rings
 from toolpath.lines import Line, pieces_where
 from toolpath.stock import SURE_RIM, StockMap
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis where it is evened out

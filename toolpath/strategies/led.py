@@ -29,7 +29,7 @@ from toolpath.steering import Limits, Steered, steered
 from toolpath.strategies.isoparametric import Stretch, course
 from toolpath.trimmed_faces import Faces
 from zones.machinable_area import Form
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 NAME = "led"
 LAID_SHARE = 0.8  # of the scallop, given to the distance between passes; chords and facets take the rest

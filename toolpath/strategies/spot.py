@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh import F64
 from toolpath.levels import moves_free
 from toolpath.lines import Line
-from zones.reach import LEVEL_TOLERANCE, TipField
+from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MOST = 400  # places; a zone with more has another problem than a missed spot
 APART = 0.1  # mm, places nearer than this are one

@@ -19,7 +19,7 @@ from toolpath.settings import Pattern
 from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 LEAST_STEP = 0.02  # mm between passes of a round
 WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried

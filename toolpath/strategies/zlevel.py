@@ -10,7 +10,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.levels import contour_pieces, dilated
 from toolpath.lines import Line
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 LEAST_STEP = 0.02  # mm, levels are never closer
 SHARP_DIP = 1.5e-4  # mm a sharp-cornered end goes below its level: rounding in the program must not lift it off

@@ -13,7 +13,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from zones.plan_view.regions import Labels, Regioner
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its own x axis is taken from Y
 

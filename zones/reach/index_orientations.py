@@ -1,7 +1,7 @@
 """The fewest further tool axes that get at what is left: 3+2 on a machine that can lean its tool or its table.
 
 Every axis of an even set over the half of the sphere the machine can turn to is asked, by the exact approach of
-``zones.approach``, which of the samples left some tool reaches along it. Choosing the axes is a set cover with a
+``zones.reach.approach_cones``, which of the samples left some tool reaches along it. Choosing the axes is a set cover with a
 price: area won less ``worth`` for each axis, solved exactly. Each axis chosen is then turned by smaller and smaller
 angles, for as long as the area of what it was chosen for grows.
 """
@@ -21,9 +21,9 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
-from zones.approach import approach, directions_over_hemisphere, resolution_of
-from zones.assembly import Clearances
-from zones.sight import able
+from zones.reach.access_reach import able
+from zones.reach.approach_cones import approach, directions_over_hemisphere, resolution_of
+from zones.reach.assembly import Clearances
 
 DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most
 ASKED_AT_MOST = 1500

@@ -15,7 +15,7 @@ from scipy.ndimage import minimum_filter
 
 from geometry.mesh import F64
 from zones.kernels.flood import escape_heights
-from zones.reach import TipField
+from zones.reach.tip_field import TipField
 
 AROUND = 5  # lattice nodes across, round a tip: beside a wall it has a play of 1.42 steps, and half a step to the node
 TOLERANCE = 1e-3  # mm, and the cusp that may stand: an edge no higher does not hold a pass back

@@ -13,8 +13,8 @@ from geometry.tool_body import ToolBody
 from zones.features.connection_faces import connection_faces
 from zones.machinable_area import LEVEL, Form, forms_of
 from zones.model import Decomposition
-from zones.reach import touchable
-from zones.view import View
+from zones.reach.access_view import View
+from zones.reach.tip_field import touchable
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,10 +27,10 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many, drop_grid, drop_tips
 from geometry.tool_body import ToolBody
-from zones.assembly import Clearances, Disc, discs_of
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
 from zones.lattice import Lattice
 from zones.machinable_area import LEVEL, SEEN
+from zones.reach.assembly import Clearances, Disc, discs_of
 
 LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits

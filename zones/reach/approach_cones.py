@@ -1,6 +1,6 @@
 """From which directions a tool gets at a place: the approach of samples, and the cone of a zone.
 
-An axis may be used for a sample if the tool, stood on it along that axis by the contact of ``zones.reach``, enters
+An axis may be used for a sample if the tool, stood on it along that axis by the contact of ``zones.reach.tip_field``, enters
 nothing. Cutting part, shank and holder go on without end along the axis: the tool comes in along it, and the machine
 stands behind. Theory: docs/theory/approach.md.
 """
@@ -19,9 +19,9 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
-from zones.assembly import Clearances, discs_of
 from zones.machinable_area import LEVEL, SEEN
-from zones.reach import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
+from zones.reach.assembly import Clearances, discs_of
+from zones.reach.tip_field import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 AT_ONCE = 400_000  # pairs of sample and direction asked in one go
@@ -89,7 +89,7 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     directions : (d, 3) float64, tool axes from the tip to the spindle
     lift       : mm, distance along the normal within which a touch counts
     allowance  : mm, material to leave on the part: the assembly is grown by it all round
-    tips       : (n, 3) float64, mm, of ``zones.reach.touchable``: where the tool touches each sample along the first
+    tips       : (n, 3) float64, mm, of ``zones.reach.tip_field.touchable``: where the tool touches each sample along the first
                  direction; they are tried as well
 
     Returns
@@ -99,7 +99,7 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
 
     Notes
     -----
-    Contact as in ``zones.reach.contact_tips``, in the frame of the axis: the highest tip that touches. Lower ones touch
+    Contact as in ``zones.reach.tip_field.contact_tips``, in the frame of the axis: the highest tip that touches. Lower ones touch
     with the flank, but what blocks the highest blocks them too. No sideways play is asked for. Under a flat end a
     sample whose normal is the axis is tried from 17 positions. Reach also aims it at free places near by, on the
     lattice of the upright tool; that is why its tips are taken over.
