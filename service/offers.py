@@ -14,12 +14,12 @@ from schemas.setup import Setup
 from schemas.tools import Tool
 from service.convert import tool_bodies
 from service.prepare import Prepared, clearances, tip_field
-from zones.fixtures import in_sight
-from zones.needs import Buyer
-from zones.proposal import Proposal, ProposedTool, propose
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View
 from zones.reach.tip_field import TipField, touchable
+from zones.remainder.obstructions import in_sight
+from zones.remainder.tool_proposal import Proposal, ProposedTool, propose
+from zones.remainder.tool_requirements import Buyer
 from zones.zoning import LEAST_ZONE_MM2, Zoning, build_zones
 
 LENGTHS = ("diameter_mm", "corner_radius_mm", "flute_length_mm", "neck_diameter_mm", "neck_length_mm",

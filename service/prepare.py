@@ -24,7 +24,6 @@ from service.blank import check_against_part
 from service.convert import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
 from service.stock import Blank, blank_of
 from zones.features.decomposition import decompose
-from zones.fixtures import AIR
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
@@ -38,6 +37,7 @@ from zones.reach.approach_cones import directions_over_hemisphere
 from zones.reach.assembly import Clearances
 from zones.reach.index_orientations import DIRECTIONS, Gatherer, orientations
 from zones.reach.tip_field import DiscHeights, TipField
+from zones.remainder.obstructions import AIR
 from zones.zoning import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²

@@ -23,7 +23,7 @@ from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan
 from verify.model import Proof
 from zones.plan_view.regions import Labels
-from zones.remainder import Remainder, explain
+from zones.remainder.remainder import Remainder, explain
 from zones.zoning import ZoneArea, is_open
 
 REMAINDER_FLOOR_MM2 = 0.005

@@ -28,7 +28,7 @@ from service.viewstock import stock_chunk
 from verify.model import NcProgram, Proof, ProofSetup
 from verify.sequence import Reading, read_all
 from zones.reach.access_view import turned_samples
-from zones.remainder import Remainder
+from zones.remainder.remainder import Remainder
 
 VIEW_NAME = "view.bin"
 VIEW_VERSION = 2

@@ -11,13 +11,13 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
-from zones import proposal
-from zones.catalogue import DIAMETERS, MOST_SLENDER, catalogue
-from zones.needs import Buyer, Cutter
-from zones.proposal import propose
 from zones.reach.access_reach import able
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import touchable
+from zones.remainder.remainder import tool_proposal
+from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, catalogue
+from zones.remainder.tool_proposal import propose
+from zones.remainder.tool_requirements import Buyer, Cutter
 from zones.zoning import LEAST_ZONE_MM2
 
 LIFT = 0.002
@@ -183,18 +183,18 @@ def test_the_cover_is_the_best_of_all_subsets(seed):
         body = ball(float(rng.choice([1.0, 2.0, 4.0])), neck=float(rng.integers(2, 20)))
         rows = np.flatnonzero(rng.random(30) < 0.35)
         cutter = Cutter(body.diameter, body.corner_radius, "T1", bool(rng.random() < 0.3))
-        candidates.append(proposal._Candidate(cutter, body, rows, np.zeros((len(rows), 2))))
+        candidates.append(tool_proposal._Candidate(cutter, body, rows, np.zeros((len(rows), 2))))
 
     def cost(chosen):
         got = np.zeros(30, bool)
         for c in chosen:
             got[c.rows] = True
-        ties = sum(proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + proposal.PER_NEW * (not c.cutter.at_hand)
-                   - proposal.PER_STOUT * c.body.diameter / max(DIAMETERS) for c in chosen)
+        ties = sum(tool_proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + tool_proposal.PER_NEW * (not c.cutter.at_hand)
+                   - tool_proposal.PER_STOUT * c.body.diameter / max(DIAMETERS) for c in chosen)
         return len(chosen) + ties + float(area[~got & reachable].sum()) / LEAST_ZONE_MM2
 
     reachable = np.zeros(30, bool)
     for c in candidates:
         reachable[c.rows] = True
     best = min(cost(s) for k in range(11) for s in combinations(candidates, k))
-    assert cost(proposal._fewest(candidates, area)) == pytest.approx(best, abs=2e-6)
+    assert cost(tool_proposal._fewest(candidates, area)) == pytest.approx(best, abs=2e-6)

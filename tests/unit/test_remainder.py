@@ -12,10 +12,10 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
-from zones.catalogue import DIAMETERS, catalogue
 from zones.model import Connection, Decomposition
 from zones.reach.tip_field import touchable
-from zones.remainder import explain
+from zones.remainder.remainder import explain
+from zones.remainder.tool_catalogue import DIAMETERS, catalogue
 
 NOTHING = Decomposition((), (), ())
 LIFT = 0.002

@@ -17,7 +17,7 @@ from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.plan_view.channel_plan import footprints
 from zones.reach.access_view import View
-from zones.remainder import explain
+from zones.remainder.remainder import explain
 
 pytest.importorskip("cadquery")
 

@@ -18,9 +18,9 @@ from geometry.errors import InternalError
 from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import HolderSegment, ToolBody
-from zones.catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, nearest
-from zones.fixtures import covered, in_sight
-from zones.needs import Buyer, Cutter
+from zones.remainder.obstructions import covered, in_sight
+from zones.remainder.tool_catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, nearest
+from zones.remainder.tool_requirements import Buyer, Cutter
 from zones.zoning import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 2000

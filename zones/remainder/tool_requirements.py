@@ -17,13 +17,13 @@ from geometry.mesh_queries.drop import drop_tips
 from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
-from zones.catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
-from zones.fixtures import over_the_part
 from zones.lattice import lattice_step
 from zones.reach.access_reach import able
 from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField, touchable
+from zones.remainder.obstructions import over_the_part
+from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
 
 ALL_BUT = 0.98  # of the samples a named tool is long enough for; one more may ask for a neck of twice the length
 DOES = 0.5  # of the area of an entry, the least a tool named for it takes

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from zones.catalogue import MOST_SLENDER
 from zones.features.connection_faces import connection_of
-from zones.fixtures import above, covered
 from zones.machinable_area import SEEN
 from zones.model import Decomposition
-from zones.needs import DOES, Buyer, Cutter
 from zones.plan_view.regions import Labels
 from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
+from zones.remainder.obstructions import above, covered
+from zones.remainder.tool_catalogue import MOST_SLENDER
+from zones.remainder.tool_requirements import DOES, Buyer, Cutter
 from zones.zoning import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
