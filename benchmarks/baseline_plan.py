@@ -27,7 +27,7 @@ from toolpath.strategies import layers
 from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
 from zones.reach.tip_field import TipField
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 
 class Retracting(Linker):

@@ -6,7 +6,7 @@ import numpy as np
 
 from service.prepare import Prepared, clearances
 from zones.reach.approach_cones import Cone, approach, directions_over_hemisphere, zone_cone
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 CONE_SAMPLES = 40  # of a zone that are asked
 CONE_DIRECTIONS = 91  # over the half of the sphere round the access

@@ -19,7 +19,7 @@ from service.sides import Look, Program, Side
 from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
 from toolpath.motion import Workingstep
 from verify.model import Finding, FindingKind, Proof
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 PLANS = 3  # of a job, where proofs go on finding something
 FURTHER = 3  # of a job beyond these, while each proof finds no more than half of what the one before it found

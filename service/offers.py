@@ -20,7 +20,7 @@ from zones.reach.tip_field import TipField, touchable
 from zones.remainder.obstructions import in_sight
 from zones.remainder.tool_proposal import Proposal, ProposedTool, propose
 from zones.remainder.tool_requirements import Buyer
-from zones.zoning import LEAST_ZONE_MM2, Zoning, build_zones
+from zones.zoning.zones import LEAST_ZONE_MM2, Zoning, build_zones
 
 LENGTHS = ("diameter_mm", "corner_radius_mm", "flute_length_mm", "neck_diameter_mm", "neck_length_mm",
            "shank_diameter_mm", "stickout_mm")

@@ -27,7 +27,6 @@ from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
-from zones.patches import zone_patches
 from zones.plan_view.categories import Categories
 from zones.plan_view.channel_plan import ChannelPlan
 from zones.plan_view.regions import Regioner
@@ -38,7 +37,8 @@ from zones.reach.assembly import Clearances
 from zones.reach.index_orientations import DIRECTIONS, Gatherer, orientations
 from zones.reach.tip_field import DiscHeights, TipField
 from zones.remainder.obstructions import AIR
-from zones.zoning import ZoneArea, Zoning, build_zones
+from zones.zoning.zone_patches import zone_patches
+from zones.zoning.zones import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²
 MOST_SAMPLES = 1_500_000

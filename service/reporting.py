@@ -24,7 +24,7 @@ from toolpath.plan import Plan
 from verify.model import Proof
 from zones.plan_view.regions import Labels
 from zones.remainder.remainder import Remainder, explain
-from zones.zoning import ZoneArea, is_open
+from zones.zoning.zones import ZoneArea, is_open
 
 REMAINDER_FLOOR_MM2 = 0.005
 ZONES_KEYS = ("part", "walls", "connections", "channels", "accesses", "mcz", "cutting_planes", "machinable_area_mm2",

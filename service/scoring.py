@@ -23,7 +23,7 @@ from zones.machinable_area import forms_of
 from zones.plan_view.regions import Labels
 from zones.reach.access_view import View, turned_samples
 from zones.reach.tip_field import touchable
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 PROOF_DENSITY = 100.0  # samples a mm²
 PROOF_SEED = 20_011

@@ -29,7 +29,7 @@ from zones.plan_view.regions import Labels, Regioner
 from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
-from zones.zoning import ZoneArea, build_zones
+from zones.zoning.zones import ZoneArea, build_zones
 
 RAMP = math.radians(3.0)
 

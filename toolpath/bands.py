@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from toolpath.counterexamples import HighWall
 from zones.machinable_area import Form
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 LEAST_DEPTH = 2.0
 """Times the thickness: no band is lower, however large the corner of a tool is that goes below it."""

@@ -45,7 +45,7 @@ from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 LAID_SHARE = 0.8  # of the allowed scallop, given to passes whose envelope is measured; program and facets take the rest
 CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passes; reach and chord take the rest

@@ -34,7 +34,7 @@ from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, To
 from toolpath.walked import Depths, Walked
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 AGAIN_SHARE = 0.95  # of the progress, before zones are gone over again
 # A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.

@@ -23,9 +23,9 @@ from service.camera import Camera
 from service.convert import parse_setup
 from service.prepare import Prepared, prepare
 from service.raster import Canvas
-from zones.patches import Nearest
 from zones.plan_view.channel_plan import ChannelPlan
-from zones.zoning import ZoneArea
+from zones.zoning.zone_patches import Nearest
+from zones.zoning.zones import ZoneArea
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 SIZE, LINE = (1500, 900), 24

@@ -18,7 +18,7 @@ from zones.model import Decomposition
 from zones.plan_view.regions import base_of
 from zones.reach.openness import escape_field, open_share
 from zones.reach.tip_field import TipField
-from zones.zoning import build_zones, is_open
+from zones.zoning.zones import build_zones, is_open
 
 
 def escapes(height):

@@ -18,7 +18,7 @@ from zones.remainder.remainder import tool_proposal
 from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, catalogue
 from zones.remainder.tool_proposal import propose
 from zones.remainder.tool_requirements import Buyer, Cutter
-from zones.zoning import LEAST_ZONE_MM2
+from zones.zoning.zones import LEAST_ZONE_MM2
 
 LIFT = 0.002
 HOLDER = (HolderSegment(10, 16, 8), HolderSegment(16, 16, 20))

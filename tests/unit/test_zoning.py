@@ -12,7 +12,7 @@ from zones.model import Connection, Decomposition
 from zones.plan_view.regions import Labels, Region, face_bases
 from zones.reach.access_reach import able, preference
 from zones.reach.tip_field import touchable
-from zones.zoning import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
+from zones.zoning.zones import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
 
 NOTHING = Decomposition((), (), ())
 

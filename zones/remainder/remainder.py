@@ -26,7 +26,7 @@ from zones.reach.tip_field import TipField
 from zones.remainder.obstructions import above, covered
 from zones.remainder.tool_catalogue import MOST_SLENDER
 from zones.remainder.tool_requirements import DOES, Buyer, Cutter
-from zones.zoning import LEAST_ZONE_MM2
+from zones.zoning.zones import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
 # how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last

@@ -21,7 +21,7 @@ from geometry.tool_body import HolderSegment, ToolBody
 from zones.remainder.obstructions import covered, in_sight
 from zones.remainder.tool_catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, nearest
 from zones.remainder.tool_requirements import Buyer, Cutter
-from zones.zoning import LEAST_ZONE_MM2
+from zones.zoning.zones import LEAST_ZONE_MM2
 
 ASKED_AT_MOST = 2000
 SEED = 11

@@ -2,7 +2,7 @@
 
 1. Every sample has a *region* in each view (``zones.plan_view.regions``: SCZ, or SCZI on, under or over a connection) and a
    *form*: level, steep or shallow.
-2. Views are asked in turn. Between two opposite ones the walls are shared out first (``zones.planes``).
+2. Views are asked in turn. Between two opposite ones the walls are shared out first (``zones.zoning.cutting_planes``).
 3. In each region and form tools are tried from the stoutest on. A tool takes the samples its cutting part can touch,
    down to the cutting plane where its shank or holder first meets the surroundings (the neck rule, cell by cell);
    what lies deeper, or where it does not fit, is left to the next tool. What no other tool takes either is then given
@@ -26,11 +26,11 @@ from zones.machinable_area import Form
 from zones.model import Decomposition
 from zones.plan_view.categories import Categories, Category
 from zones.plan_view.regions import base_of
-from zones.planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 from zones.reach.access_reach import Reach, Sight
 from zones.reach.access_view import View
 from zones.reach.openness import OPEN_SHARE, open_share
 from zones.reach.tip_field import TipField
+from zones.zoning.cutting_planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
 
 # What a tool has to gain to be used in a region, whatever the size of that: 1 mm² is 25 planning samples, on which an
 # area is known to a fifth; where samples stand wider, 25 of them. It is also what a tool to buy has to gain.

@@ -17,7 +17,7 @@ from geometry.sampling import SurfaceSamples
 from geometry.trimming.trim import FacePatch, trim_faces
 from zones.machinable_area import LEVEL, STEEP
 from zones.reach.access_view import View
-from zones.zoning import ZoneArea
+from zones.zoning.zones import ZoneArea
 
 PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them
 MOST = 4e5
