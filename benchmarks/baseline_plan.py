@@ -18,14 +18,14 @@ from toolpath.family import Target
 from toolpath.finish import Finish, motions_of, step_of, turned
 from toolpath.levels import dilated
 from toolpath.linking import Linker
-from toolpath.motion import Workingstep
 from toolpath.order import nearest_order
 from toolpath.plan import Plan
-from toolpath.settings import CutData, Pattern, PlanSettings
+from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
+from toolpath.workingsteps import Workingstep
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 

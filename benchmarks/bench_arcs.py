@@ -40,7 +40,7 @@ from service import chain, programs  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
-from toolpath.motion import Motion  # noqa: E402
+from toolpath.workingsteps import Motion  # noqa: E402
 from verify import motion  # noqa: E402
 from verify.program import Program  # noqa: E402
 from verify.reader import read_program  # noqa: E402

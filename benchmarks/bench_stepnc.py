@@ -25,7 +25,7 @@ from output.stepnc.ap238 import stream_stepnc_aim  # noqa: E402
 from output.stepnc.iso14649 import stream_stepnc_arm  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
 from tests.synthetic_plan import clamped, long_plan  # noqa: E402
-from toolpath.motion import Motion, Trajectory  # noqa: E402
+from toolpath.workingsteps import Motion, Trajectory  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
 from verify.stepnc import read_stepnc  # noqa: E402
 

@@ -34,8 +34,8 @@ from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import Prepared, placement_of  # noqa: E402
-from toolpath.motion import Motion, Workingstep  # noqa: E402
-from toolpath.settings import Pattern
+from toolpath.plan_settings import Pattern
+from toolpath.workingsteps import Motion, Workingstep  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from zones.machinable_area import Form  # noqa: E402

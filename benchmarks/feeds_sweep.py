@@ -22,7 +22,7 @@ from schemas.setup import Setup
 from service.chain import cut_table
 from service.convert import parse_setup
 from service.materials import DEFAULT_MAX_FEED_MM_MIN, DEFAULT_MAX_RPM
-from toolpath.settings import CutData
+from toolpath.plan_settings import CutData
 
 PARTS = 300
 OTHERS = ("narrow", "leaning_pair", "three_walls", "wavy")

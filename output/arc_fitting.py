@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from output.program_grid import GRID, I64, PER_MM
 from output.workplan import Workplan
-from toolpath.motion import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 
 BOOL = NDArray[np.bool_]
 

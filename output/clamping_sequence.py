@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from output.program_grid import GRID, I64, grid_path, to_grid
 from output.program_grid import link as grid_link
 from output.workplan import Clamping, Frame, Workplan
-from toolpath.motion import Arc, Motion, Workingstep
+from toolpath.workingsteps import Arc, Motion, Workingstep
 
 TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a turn
 SPARE = 0.5  # mm, outside the ball, for what a turn of joints leaves its chords by

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 
 from geometry.tool_body import ToolBody
-from toolpath.motion import Workingstep
+from toolpath.workingsteps import Workingstep
 
 _PLAIN = str.maketrans({
     "ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "ø": "oe", "Ø": "Oe", "æ": "ae",

@@ -18,7 +18,7 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from output.workplan import Workplan
-from toolpath.motion import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 
 I64 = NDArray[np.int64]
 

@@ -10,7 +10,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.inverse_kinematics import RotaryMachine
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Motion, Trajectory, Workingstep
 
 FIRST_NUMBER = 1000
 """Of the first program of a job."""

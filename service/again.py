@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from service.sides import Look, Program, Side
 from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
-from toolpath.motion import Workingstep
+from toolpath.workingsteps import Workingstep
 from verify.model import Finding, FindingKind, Proof
 from zones.zoning.zones import ZoneArea
 

@@ -17,13 +17,13 @@ import numpy as np
 from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
-from toolpath.deflection import Bend
 from toolpath.finish import LEANING, ZonePlan, upright_way
 from toolpath.life import minutes_in_cut
-from toolpath.motion import Motion, Workingstep
+from toolpath.plan_settings import Leaned
 from toolpath.ramps import LEAST_RUN
-from toolpath.settings import Leaned
 from toolpath.strategies import led
+from toolpath.tool_deflection import Bend
+from toolpath.workingsteps import Motion, Workingstep
 from verify.model import Support
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall

@@ -56,14 +56,14 @@ from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces
 from service.viewdata import VIEW_NAME, plan_view, verification_view
-from toolpath.deflection import effective_diameter
 from toolpath.family import Target
 from toolpath.life import with_fresh_cutters, worn
 from toolpath.plan import Plan, plan_job
-from toolpath.settings import CutData, Leaned, Pattern, PlanSettings
+from toolpath.plan_checkpoint import Keeper
+from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
 from toolpath.stock import StockMap
+from toolpath.tool_deflection import effective_diameter
 from toolpath.trimmed_faces import Faces
-from toolpath.underway import Keeper
 from verify.dialects import dialect_of
 from verify.likeness import carried
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples

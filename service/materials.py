@@ -15,7 +15,7 @@ from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup
 from schemas.tools import Tool
-from toolpath.deflection import LAYER_LIMIT, LEAST_FEED, Bending, compliance, effective_diameter, left_by_layers
+from toolpath.tool_deflection import LAYER_LIMIT, LEAST_FEED, Bending, compliance, effective_diameter, left_by_layers
 from zones.lattice import lattice_step
 
 DEFAULT_MAX_RPM = 18000.0

@@ -20,12 +20,12 @@ import numpy as np
 
 from geometry.move_timing import Rates
 from toolpath.counterexamples import Counterexamples, HighWall
-from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan
-from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
+from toolpath.plan_checkpoint import FinishNow, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.stock import StockNow
-from toolpath.underway import FinishNow, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.tool_deflection import Bend
+from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
 from zones.lattice import Lattice
 

@@ -30,9 +30,9 @@ from service.sides import Look, Program, Side
 from service.stock import turned_box
 from service.trimmed import exact_faces
 from service.version import VERSION
-from toolpath.motion import Workingstep
-from toolpath.settings import Turning
+from toolpath.plan_settings import Turning
 from toolpath.trimmed_faces import Faces
+from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import View
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding

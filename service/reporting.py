@@ -17,10 +17,10 @@ from service.cautions import Caution
 from service.convert import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
-from toolpath.deflection import Bend
 from toolpath.finish import ZonePlan
-from toolpath.motion import Motion, Workingstep
 from toolpath.plan import Plan
+from toolpath.tool_deflection import Bend
+from toolpath.workingsteps import Motion, Workingstep
 from verify.model import Proof
 from zones.plan_view.regions import Labels
 from zones.remainder.remainder import Remainder, explain

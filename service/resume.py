@@ -39,8 +39,8 @@ from service.sides import Side
 from toolpath.counterexamples import Counterexamples
 from toolpath.family import Target
 from toolpath.plan import Plan
+from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
 from toolpath.stock import StockMap
-from toolpath.underway import NOTHING, Keeper, PlanNow
 from verify.model import NcProgram, Proof
 from zones.reach.access_view import View
 

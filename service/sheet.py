@@ -45,7 +45,7 @@ from service.sheettables import (
 )
 from service.sides import Look, Program
 from service.tooldrawing import draw_tool, svg_of
-from toolpath.motion import Workingstep
+from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (
     "A zone is what one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; SCZ: "

@@ -10,7 +10,7 @@ from output.arc_fitting import fitted
 from output.workplan import Frame, Workplan
 from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
 from toolpath.lines import thinned
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 
 HALF = 0.0025
 

@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import ToolBody
 from tests.hand_parts import RAMP, Case
-from toolpath.motion import Motion, Workingstep
+from toolpath.workingsteps import Motion, Workingstep
 from zones.reach.assembly import Clearances, discs_of
 
 PLUNGE_SHARE = 0.1  # of the diameter: what a descent steeper than the ramp may take off

@@ -11,7 +11,7 @@ from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import HolderSegment, ToolBody
 from output.inverse_kinematics import RotaryMachine
 from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.reach.access_view import access_rotation
 
 HOLDER = (HolderSegment(20.0, 20.0, 30.0),)

@@ -20,7 +20,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from toolpath.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
-from toolpath.roots import roots
+from toolpath.root_finding import roots
 
 OUTWARDS = 12  # steps along a normal until the envelope is passed
 

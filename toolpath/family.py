@@ -24,7 +24,7 @@ from geometry.mesh_queries.drop import drop_tips
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.follow import KINK, Limit, pieces
-from toolpath.roots import roots
+from toolpath.root_finding import roots
 
 I64 = NDArray[np.int64]
 

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.border import beyond
-from toolpath.deflection import left_by_layers
 from toolpath.engaged import UNBOUNDED
 from toolpath.family import Promise, Target
 from toolpath.isoparametric import Flank, side_step
@@ -29,20 +28,21 @@ from toolpath.leaning import TURN_S, Runs, Surroundings
 from toolpath.levels import serving
 from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking import Linker
-from toolpath.motion import Motion, Trajectory, Workingstep
 from toolpath.order import nearest_order
+from toolpath.plan_checkpoint import FinishNow
+from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.posed import enters
 from toolpath.poses import Blocked
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
-from toolpath.settings import CutData, Pattern, PlanSettings
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
+from toolpath.tool_deflection import left_by_layers
 from toolpath.travel import Motions
 from toolpath.trimmed_faces import Faces
-from toolpath.underway import FinishNow
 from toolpath.walked import Depths, Walked, still_to_walk
+from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea

@@ -20,13 +20,13 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.leads import arc_onto, radii
 from toolpath.lines import dense, true_runs
-from toolpath.motion import Motion, Trajectory
 from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.poses import Blocked, places_along
-from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.shell import shells
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
+from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.assembly import Clearances, Disc
 
 TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back

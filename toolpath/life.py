@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath.motion import Motion, Trajectory, Workingstep, trajectory_seconds
+from toolpath.workingsteps import Motion, Trajectory, Workingstep, trajectory_seconds
 
 AT_PLANE = 1e-9  # mm
 AS_FAST = 1.0 + 1e-9

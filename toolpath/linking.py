@@ -31,12 +31,12 @@ from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
 from toolpath.leads import arcs_along
 from toolpath.lines import Line, dense, pieces_where, thinned
-from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.travel import Motions, Travel
 from toolpath.walked import Depths, still_to_walk
+from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass

@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
-from toolpath.deflection import effective_diameter
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.family import Target
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.levels import dilated
 from toolpath.linking import FLUTE_SHARE, Linker
-from toolpath.motion import Workingstep
 from toolpath.order import nearest_order
 from toolpath.pacing import Pace
-from toolpath.settings import CutData, PlanSettings
+from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
+from toolpath.tool_deflection import effective_diameter
 from toolpath.trimmed_faces import Faces
-from toolpath.underway import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.walked import Depths, Walked
+from toolpath.workingsteps import Workingstep
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea

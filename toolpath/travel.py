@@ -17,9 +17,9 @@ from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
 from toolpath.lines import dense, stretch
-from toolpath.motion import Motion, Trajectory
 from toolpath.pacing import GUARD
 from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
+from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down

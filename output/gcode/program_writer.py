@@ -34,7 +34,7 @@ from output.gcode.dialects.base import Dialect
 from output.header_text import decimal, face_words, height_word, step_title, tool_name
 from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.workplan import FIRST_NUMBER, Clamping, Workplan
-from toolpath.motion import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 
 UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
 _PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts for fresh cutters

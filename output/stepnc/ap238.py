@@ -44,7 +44,7 @@ from output.stepnc.common import (
 )
 from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Ap238, Workplan
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Motion, Trajectory, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
 _TYPE = {

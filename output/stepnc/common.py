@@ -17,7 +17,7 @@ from output.inverse_kinematics import RotaryMachine
 from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
 from output.stepnc.part21 import Part21, real
 from output.workplan import Workplan
-from toolpath.motion import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Motion, Trajectory, Workingstep
 
 
 @dataclass(frozen=True, eq=False)

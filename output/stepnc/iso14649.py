@@ -45,7 +45,7 @@ from output.stepnc.common import (
 )
 from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Workplan
-from toolpath.motion import Motion, Workingstep
+from toolpath.workingsteps import Motion, Workingstep
 
 _TYPE = {
     Motion.RAPID: ".CONNECT.", Motion.APPROACH: ".APPROACH.", Motion.CUT: ".TRAJECTORY_PATH.",

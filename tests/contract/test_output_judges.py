@@ -18,7 +18,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 from verify.reader import read_program
 
 SHARED = Path(__file__).parents[2].parent / "shared"

@@ -12,7 +12,7 @@ from service import chain, programs
 from service.convert import parse_setup
 from tests.arc_plans import off
 from tests.step_files import write_step
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 from verify import motion
 from verify.reader import read_program
 

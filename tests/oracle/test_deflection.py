@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.tool_body import ToolBody
-from toolpath.deflection import CARBIDE, CORE, compliance, cutting_force, engaged_angle
+from toolpath.tool_deflection import CARBIDE, CORE, compliance, cutting_force, engaged_angle
 
 TOOLS = [
     ToolBody("T1", 1, 1.0, 0.5, 3.0, 0.9, 13.0, 4.0, 29.0),

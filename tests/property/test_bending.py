@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from schemas.materials import MATERIALS
 from service.chain import cut_table
 from service.convert import parse_setup
-from toolpath.deflection import LEAST_SHARE
+from toolpath.tool_deflection import LEAST_SHARE
 
 KINDS = st.sampled_from(["ball", "flat", "bull"])
 

@@ -38,7 +38,7 @@ from tests.plan_checks import (
     worst_meeting,
     worst_plunge,
 )
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 from zones.reach.tip_field import touchable
 
 

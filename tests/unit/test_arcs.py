@@ -21,7 +21,7 @@ from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, ro
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step
 from toolpath.leads import arc_onto
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 from verify.agree import check_agreement
 from verify.kinematics import Kinematics
 from verify.likeness import difference

@@ -13,7 +13,7 @@ from output.inverse_kinematics import RotaryMachine
 from output.linuxcnc import write_linuxcnc
 from output.stepnc.common import _curves
 from tests.synthetic_plan import clamped
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 from verify.kinematics import KINDS, Kinematics
 from verify.move_kinds import FEED
 from verify.reader import read_program

@@ -13,10 +13,10 @@ from toolpath.clearing import Clearing
 from toolpath.engaged import CLOSE, LOOK, angles
 from toolpath.lines import dense
 from toolpath.linking import Linker
-from toolpath.motion import Motion
 from toolpath.stock import StockMap
 from toolpath.travel import Motions
 from toolpath.walked import Depths
+from toolpath.workingsteps import Motion
 
 ALLOWANCE, Z = 0.2, 5.0
 MOST = math.radians(120.0)

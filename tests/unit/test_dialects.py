@@ -17,7 +17,7 @@ from output.linuxcnc import write_linuxcnc
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 from verify.dialects import DIALECTS as READ
 from verify.dialects import dialect_of
 from verify.kinematics import Kinematics

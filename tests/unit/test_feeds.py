@@ -18,8 +18,8 @@ from service.convert import parse_setup, tool_bodies
 from service.materials import MOST_THINNING, chip_thinning, cutting_data
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
-from toolpath.deflection import Bend, effective_diameter, left_by_layers
 from toolpath.plan import LATTICE_CARE
+from toolpath.tool_deflection import Bend, effective_diameter, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
 FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}

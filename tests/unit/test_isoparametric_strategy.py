@@ -13,7 +13,7 @@ from toolpath.family import Target
 from toolpath.finish import Finish, _Strategy
 from toolpath.isoparametric import Flank
 from toolpath.lines import Line
-from toolpath.settings import Pattern
+from toolpath.plan_settings import Pattern
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import course, laid
 from toolpath.trimmed_faces import TrimmedFace

@@ -14,12 +14,12 @@ from toolpath.leads import SIZES, arc_onto, radii
 from toolpath.leaning import Surroundings, with_ways
 from toolpath.lines import Line, dense
 from toolpath.linking import Linker
-from toolpath.motion import Motion
 from toolpath.piece import Piece
-from toolpath.settings import CutData, PlanSettings, Turning
+from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
 from toolpath.travel import Motions
 from toolpath.walked import Depths
+from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances
 
 

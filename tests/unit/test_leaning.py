@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.leaning import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
 from toolpath.piece import Piece
-from toolpath.settings import Turning
+from toolpath.plan_settings import Turning
 from toolpath.stock import StockMap
 from zones.reach.assembly import Clearances, Disc
 

@@ -16,14 +16,14 @@ from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
 from toolpath.family import Target
 from toolpath.leaning import SKIMMED, Surroundings, free_parts
-from toolpath.motion import Motion, Trajectory
 from toolpath.piece import Piece
+from toolpath.plan_settings import CutData, Leaned
 from toolpath.posed import enters
-from toolpath.settings import CutData, Leaned
 from toolpath.steering import Limits
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.trimmed_faces import TrimmedFace
+from toolpath.workingsteps import Motion, Trajectory
 from zones.machinable_area import Form
 from zones.reach.assembly import Clearances
 

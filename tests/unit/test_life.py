@@ -16,7 +16,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from service.cautions import lives_ended
 from tests import synthetic_plan as made
 from toolpath.life import minutes_in_cut, with_fresh_cutters, worn
-from toolpath.motion import Motion, Trajectory, trajectory_seconds
+from toolpath.workingsteps import Motion, Trajectory, trajectory_seconds
 
 CLEAR, FEED, AIR = made.CLEAR, 600.0, 3000.0
 

@@ -13,12 +13,12 @@ from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.lines import Line, dense
 from toolpath.linking import Linker
-from toolpath.motion import Motion
 from toolpath.order import nearest_order
 from toolpath.pacing import GUARD, Pace
 from toolpath.stock import SKIN, StockMap
 from toolpath.travel import OVER, Motions
 from toolpath.walked import Depths
+from toolpath.workingsteps import Motion
 
 TOP = 4.0
 

@@ -11,7 +11,7 @@ from geometry.errors import OutputError
 from output.linuxcnc import LINE, path_tolerance, write_linuxcnc
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, CLEAR, FLAT, line, long_plan, plan, step, tiny
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 
 WORD = re.compile(r"([A-Z])(-?\d+\.?\d*)")
 

@@ -12,13 +12,13 @@ from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_fie
 from tests.unit.test_matched import bowl, measured
 from toolpath.family import Target
 from toolpath.leaning import LAYER, THICK, Surroundings, _leads, lowered, with_ways
-from toolpath.motion import Motion
 from toolpath.piece import Piece
+from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.posed import enters
-from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.matched import matched, suits
 from toolpath.trimmed_faces import TrimmedFace
+from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0

@@ -13,8 +13,8 @@ from geometry.move_timing import Rates
 from service.packing import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall
-from toolpath.motion import Arc, Motion, Trajectory, Workingstep
 from toolpath.plan import Plan
+from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 from verify.model import Finding, FindingKind
 from zones.lattice import Lattice
 

@@ -14,12 +14,12 @@ from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.family import Target
 from toolpath.finish import Finish
 from toolpath.lines import Line
-from toolpath.motion import Motion
 from toolpath.plan import AGAIN_SHARE, plan_job
-from toolpath.settings import CutData, Pattern, PlanSettings
+from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies.layers import EVEN
 from toolpath.walked import OVERLAP, Depths, Walked
+from toolpath.workingsteps import Motion
 from zones.machinable_area import Form
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it

@@ -10,7 +10,7 @@ import pytest
 from service import reporting
 from tests.synthetic_plan import BALL, step
 from toolpath.finish import ZonePlan
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 
 
 def cut(length: float, feed: float) -> tuple[Trajectory, ...]:

@@ -22,8 +22,8 @@ from service.sides import Side
 from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.plan import Plan, plan_job
+from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
 from toolpath.stock import StockMap, StockNow
-from toolpath.underway import NOTHING, Keeper, PlanNow
 from verify.model import NcProgram, Proof, Spent
 from zones.lattice import Lattice
 

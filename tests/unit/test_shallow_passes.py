@@ -12,7 +12,7 @@ from tests.plan_checks import dense
 from toolpath.cutter import Cutter
 from toolpath.envelope import Envelope
 from toolpath.family import Promise, Target
-from toolpath.settings import Pattern
+from toolpath.plan_settings import Pattern
 from toolpath.strategies import zigzag
 from zones.reach.tip_field import touchable
 

@@ -24,7 +24,7 @@ from service.sheetpdf import latin, pdf_of
 from service.sides import Program
 from service.stock import blank_of
 from tests.synthetic_plan import plan, step
-from toolpath.motion import Workingstep
+from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import access_rotation, turned
 
 HOSTILE = "<script>alert('Ø')</script> & \"4711\""

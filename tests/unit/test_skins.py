@@ -13,8 +13,8 @@ from toolpath.finish import Finish
 from toolpath.kernels.skins import near
 from toolpath.leaning import LOADED, Surroundings, free_parts, in_turn
 from toolpath.piece import Piece
+from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.residual import ResidualMap
-from toolpath.settings import CutData, PlanSettings, Turning
 from toolpath.skins import Skins, behind
 from toolpath.stock import StockMap
 from zones.machinable_area import Form

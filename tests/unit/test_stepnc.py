@@ -15,7 +15,7 @@ from output.stepnc.part21 import quoted, real, time_stamp
 from output.workplan import Ap238, StockBox
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 
 WRITERS = {"tiny.arm.stpnc": write_stepnc_arm, "tiny.stpnc": write_stepnc_aim}
 both = pytest.mark.parametrize("write", WRITERS.values(), ids=["arm", "aim"])

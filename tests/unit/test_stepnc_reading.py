@@ -16,7 +16,7 @@ from output.stepnc.part21 import quoted
 from output.workplan import Ap238, StockBox
 from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
-from toolpath.motion import Motion, Trajectory
+from toolpath.workingsteps import Motion, Trajectory
 from verify.agree import check_agreement
 from verify.kinematics import KINDS, Kinematics
 from verify.model import NcProgram

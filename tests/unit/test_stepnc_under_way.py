@@ -13,7 +13,7 @@ from service.sides import Program
 from service.stepnc import stepnc_files, stepnc_under_way
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step
-from toolpath.motion import Motion
+from toolpath.workingsteps import Motion
 
 
 @pytest.fixture

@@ -20,9 +20,9 @@ from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.test_isoparametric_strategy import bowl
 from toolpath.family import Target
 from toolpath.plan import Plan, plan_job
-from toolpath.settings import CutData
+from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
+from toolpath.plan_settings import CutData
 from toolpath.stock import StockMap
-from toolpath.underway import Keeper, PlanNow, Ways
 from zones.reach.access_view import access_rotation
 
 Stock = Callable[[Case], StockMap]

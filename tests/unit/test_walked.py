@@ -12,9 +12,9 @@ from toolpath import finish
 from toolpath.counterexamples import NONE
 from toolpath.finish import Finish, _Strategy
 from toolpath.lines import Line, true_runs
-from toolpath.motion import Motion
 from toolpath.residual import ResidualMap
 from toolpath.walked import OVERLAP, Depths, Walked, still_to_walk
+from toolpath.workingsteps import Motion
 from verify.repeats import WINDOW
 from zones.lattice import Lattice
 

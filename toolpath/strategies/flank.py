@@ -18,7 +18,7 @@ from toolpath.family import Target
 from toolpath.flank import ALONG, UP, Wall, Wanted, bands
 from toolpath.leaning import UP_Z, Runs, Surroundings, in_turn
 from toolpath.piece import Piece
-from toolpath.settings import CutData, PlanSettings
+from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.trimmed_faces import Faces, leveller
 
 NAME = "flank"

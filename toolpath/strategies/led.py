@@ -22,9 +22,9 @@ from geometry.tool_body import ToolBody
 from toolpath.family import Target
 from toolpath.leaning import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.plan_settings import CutData, Leaned, PlanSettings
 from toolpath.posed import lead_and_tilt, posed
 from toolpath.poses import Axes, Blocked, places_along
-from toolpath.settings import CutData, Leaned, PlanSettings
 from toolpath.steering import Limits, Steered, steered
 from toolpath.strategies.isoparametric import Stretch, course
 from toolpath.trimmed_faces import Faces

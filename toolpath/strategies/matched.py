@@ -26,8 +26,8 @@ from toolpath.leaning import LOOK, TURN_S, Runs, Surroundings, in_turn
 from toolpath.matched import Matched, Strip, Wanted
 from toolpath.parted import parted
 from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
-from toolpath.settings import CutData, PlanSettings
 from toolpath.trimmed_faces import Faces
 
 NAME = "matched"

@@ -15,7 +15,7 @@ from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target
 from toolpath.levels import serving
 from toolpath.lines import Line, dense, pieces_where
-from toolpath.settings import Pattern
+from toolpath.plan_settings import Pattern
 from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled

@@ -12,7 +12,7 @@ import service.chain as chain
 import service.resume as resume
 from service.chain import verify_program, zones_only  # noqa: F401
 from toolpath.plan import plan_job
-from toolpath.underway import Keeper
+from toolpath.plan_checkpoint import Keeper
 
 PROVE = chain.prove
 ACTS = 3

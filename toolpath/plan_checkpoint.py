@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.motion import Workingstep
 from toolpath.stock import StockNow
+from toolpath.workingsteps import Workingstep
 
 T = TypeVar("T")
 

@@ -15,7 +15,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates, move_seconds
 from geometry.tool_body import ToolBody
-from toolpath.deflection import Bend
+from toolpath.tool_deflection import Bend
 
 
 class Motion(StrEnum):

@@ -14,7 +14,7 @@ from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.deflection import LEAST_FEED, Bend, Bending, effective_diameter
+from toolpath.tool_deflection import LEAST_FEED, Bend, Bending, effective_diameter
 
 
 class Pattern(StrEnum):
