@@ -22,7 +22,7 @@ import numpy as np  # noqa: E402
 from geometry.mesh import TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.mesh_queries.revolved_outline import Outline, heights  # noqa: E402
-from toolpath.cutter import Cutter  # noqa: E402
+from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_contacts, drop_cutter  # noqa: E402
 
 from surfaces import convex, impeller, slivers, walls, wavy  # noqa: E402 isort:skip

@@ -36,7 +36,7 @@ from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup, tool_bodies  # noqa: E402
 from service.prepare import clearances, placement_of, prepare  # noqa: E402
-from toolpath.cutter import Cutter  # noqa: E402
+from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402

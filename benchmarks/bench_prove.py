@@ -31,7 +31,7 @@ from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.part import FaceInfo, Part  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
-from toolpath.cutter import Cutter  # noqa: E402
+from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402

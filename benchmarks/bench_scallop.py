@@ -27,7 +27,7 @@ from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa:
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
 from toolpath.border import beyond  # noqa: E402
-from toolpath.cutter import Cutter  # noqa: E402
+from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.direction import best_direction  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402

@@ -11,7 +11,7 @@ from geometry.mesh import F64, I32, TriangleMesh
 from geometry.mesh_queries import drop, outline_drop, push
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.revolved_outline import Outline
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,8 @@ from geometry.kernels.outline import ARC
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
-from toolpath.cutter import Cutter
-from toolpath.envelope import Envelope
+from toolpath.cutter.cutter import Cutter
+from toolpath.cutter.swept_envelope import Envelope
 from toolpath.follow import KINK, Limit, pieces
 from toolpath.root_finding import roots
 

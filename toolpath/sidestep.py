@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.envelope import Envelope
+from toolpath.cutter.swept_envelope import Envelope
 from toolpath.family import FLOOR, I64, Family, Pass, strip_width
 
 TRIALS = 7

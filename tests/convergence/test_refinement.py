@@ -13,7 +13,7 @@ from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.family import Dragged, Promise, Swath, Target
 from toolpath.levels import contours
 from toolpath.lines import thinned

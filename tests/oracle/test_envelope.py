@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from toolpath.cutter import Cutter
-from toolpath.envelope import Envelope
+from toolpath.cutter.cutter import Cutter
+from toolpath.cutter.swept_envelope import Envelope
 
 CUTTERS = {
     "ball": (Cutter.ball(diameter=6.0, length=20.0), lambda rho: 3.0 - np.sqrt(9.0 - rho**2)),

@@ -17,7 +17,7 @@ from geometry.mesh_queries.drop import FEW, drop_tips
 from geometry.mesh_queries.outline_drop import drop_turned, turned_contacts
 from geometry.mesh_queries.revolved_outline import CHORD, Arc, Line, Outline, heights
 from geometry.tool_body import HolderSegment, ToolBody
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 
 TOOL = ToolBody("T1", 1, 2.0, 1.0, 3.0, 1.8, 8.0, 4.0, 12.0,

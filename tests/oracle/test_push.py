@@ -16,7 +16,7 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import FEW
 from geometry.mesh_queries.revolved_outline import heights
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_contacts, drop_cutter, push_contacts, push_cutter
 
 TOOLS = {name: Cutter(2.0 * r, c, 20.0) for name, (r, c) in CUTTERS.items()} | TURNED

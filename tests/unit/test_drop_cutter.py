@@ -10,7 +10,7 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many, drop_grid, drop_tips
 from geometry.tool_body import ToolBody
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 
 RAMP = TriangleMesh(np.array([[-50.0, -50, -50], [50, -50, 50], [0, 90, 0]]), np.array([[0, 1, 2]]))  # z = x

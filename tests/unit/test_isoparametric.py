@@ -11,8 +11,8 @@ from geometry.parameterization.quad_grid import Quad
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from tests.square_regions import region
-from toolpath.cutter import Cutter
-from toolpath.envelope import Envelope
+from toolpath.cutter.cutter import Cutter
+from toolpath.cutter.swept_envelope import Envelope
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
 from toolpath.kernels.beside import left_beside

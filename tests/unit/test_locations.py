@@ -7,7 +7,7 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 from toolpath.forward import Profile, steps
 from toolpath.locations import lifted, tips

@@ -9,8 +9,8 @@ from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
 from tests.hand_parts import SURFACES, ball, dome, field_of, terraces, tool
 from tests.plan_checks import dense
-from toolpath.cutter import Cutter
-from toolpath.envelope import Envelope
+from toolpath.cutter.cutter import Cutter
+from toolpath.cutter.swept_envelope import Envelope
 from toolpath.family import Promise, Target
 from toolpath.plan_settings import Pattern
 from toolpath.strategies import zigzag

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.direction import best_direction
 from toolpath.family import Dragged, Pass, Promise, Swath, Target
 from toolpath.levels import serving

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from toolpath.cutter import Cutter
+from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 from toolpath.root_finding import roots
 
