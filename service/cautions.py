@@ -17,8 +17,8 @@ import numpy as np
 from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
+from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.finish import LEANING, ZonePlan, upright_way
-from toolpath.life import minutes_in_cut
 from toolpath.plan_settings import Leaned
 from toolpath.ramps import LEAST_RUN
 from toolpath.strategies import led

@@ -57,7 +57,7 @@ from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces
 from service.viewdata import VIEW_NAME, plan_view, verification_view
 from toolpath.family import Target
-from toolpath.life import with_fresh_cutters, worn
+from toolpath.feeds.tool_life import with_fresh_cutters, worn
 from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import Keeper
 from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings

@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.engaged import UNBOUNDED, skims, within
+from toolpath.feeds.feed_scheduling import Pace, paced
 from toolpath.leads import arcs_along
 from toolpath.lines import Line, dense, pieces_where, thinned
-from toolpath.pacing import Pace, paced
 from toolpath.ramps import RAMP_SHARE, head_of, way_down
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.travel import Motions, Travel

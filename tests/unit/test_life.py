@@ -15,7 +15,7 @@ from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from service.cautions import lives_ended
 from tests import synthetic_plan as made
-from toolpath.life import minutes_in_cut, with_fresh_cutters, worn
+from toolpath.feeds.tool_life import minutes_in_cut, with_fresh_cutters, worn
 from toolpath.workingsteps import Motion, Trajectory, trajectory_seconds
 
 CLEAR, FEED, AIR = made.CLEAR, 600.0, 3000.0

@@ -11,10 +11,10 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
+from toolpath.feeds.feed_scheduling import GUARD, Pace
 from toolpath.lines import Line, dense
 from toolpath.linking import Linker
 from toolpath.order import nearest_order
-from toolpath.pacing import GUARD, Pace
 from toolpath.stock import SKIN, StockMap
 from toolpath.travel import OVER, Motions
 from toolpath.walked import Depths

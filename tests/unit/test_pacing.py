@@ -13,7 +13,7 @@ from service.chain import cut_table
 from service.convert import parse_setup, tool_bodies
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.engaged import SKIN_SHARE, angles
-from toolpath.pacing import ANGLE, GUARD, STEP, Pace, paced
+from toolpath.feeds.feed_scheduling import ANGLE, GUARD, STEP, Pace, paced
 from toolpath.stock import SURE_RIM, StockMap
 
 SLOT, FULL, AIR, LAYER = 100.0, 400.0, 3000.0, 1.0
