@@ -39,10 +39,10 @@ from service.prepare import clearances, placement_of, prepare  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
+from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402
 from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
 from toolpath.isoparametric import Flank, IsoSurface, lay_out  # noqa: E402
 from toolpath.locations import FREE, lifted, tips  # noqa: E402
-from toolpath.posed import enters, leaned, posed  # noqa: E402
 from toolpath.sidestep import lay_out as parallel  # noqa: E402
 from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves

@@ -39,12 +39,12 @@ from geometry.tool_body import ToolBody  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.convert import parse_setup  # noqa: E402
 from service.prepare import placement_of  # noqa: E402
+from toolpath.five_axis.curvature_matching import matching_tilt, strip_width  # noqa: E402
+from toolpath.five_axis.matched_passes import Matched, Wanted  # noqa: E402
+from toolpath.five_axis.surface_partition import Part, parted  # noqa: E402
 from toolpath.isoparametric import IsoSurface  # noqa: E402
 from toolpath.isoparametric import lay_out as ball_passes  # noqa: E402
 from toolpath.locations import tips  # noqa: E402
-from toolpath.matched import Matched, Wanted  # noqa: E402
-from toolpath.matching import matching_tilt, strip_width  # noqa: E402
-from toolpath.parted import Part, parted  # noqa: E402
 from toolpath.trimmed_faces import TrimmedFace  # noqa: E402
 from verify.moves import Moves  # noqa: E402
 from verify.removal import residual_on_normals  # noqa: E402

@@ -4,8 +4,8 @@ Run from the root of the checkout: ``python benchmarks/s_wall.py [--cost]``. The
 thick, each side ruled between two waves of different height, the upper shifted along: it leans out here and in there,
 by up to 11 degrees, and twice stands upright, where A and C of a table have their pole. Both sides are finished by
 
-- the flank of a bull nose (``toolpath.flank``): the ruling of every station looked for alone, or as it is planned;
-- a ball, its axis 65 degrees off the normal, as the wall has it, or led by ``toolpath.steering``: evenly, under a limit
+- the flank of a bull nose (``toolpath.five_axis.flank_milling``): the ruling of every station looked for alone, or as it is planned;
+- a ball, its axis 65 degrees off the normal, as the wall has it, or led by ``toolpath.five_axis.axis_smoothing``: evenly, under a limit
   of turning, and past a post that stands 32 mm before the wall. Where the tool is blocked passes break off.
 
 Rates are of the rotary axes of a table A/C by millimetre of tip; ``rough`` is the root mean square of how the tool axis
@@ -30,17 +30,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np  # noqa: E402
 from scipy.interpolate import make_interp_spline  # noqa: E402
 
-import toolpath.flank as flank  # noqa: E402
+import toolpath.five_axis.flank_milling as flank  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.parameterization.grid_map import GridMap  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
 from output.inverse_kinematics import RotaryMachine  # noqa: E402
+from toolpath.five_axis.axis_smoothing import Limits, steered  # noqa: E402
+from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, posed  # noqa: E402
 from toolpath.forward import Profile, steps  # noqa: E402
 from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
-from toolpath.posed import enters, lead_and_tilt, posed  # noqa: E402
-from toolpath.steering import Limits, steered  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402

@@ -23,15 +23,15 @@ from geometry.tool_body import ToolBody
 from toolpath.border import beyond
 from toolpath.engaged import UNBOUNDED
 from toolpath.family import Promise, Target
+from toolpath.five_axis.oriented_motion import TURN_S, Runs, Surroundings
+from toolpath.five_axis.oriented_pass import enters
 from toolpath.isoparametric import Flank, side_step
-from toolpath.leaning import TURN_S, Runs, Surroundings
 from toolpath.levels import serving
 from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking import Linker
 from toolpath.order import nearest_order
 from toolpath.plan_checkpoint import FinishNow
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
-from toolpath.posed import enters
 from toolpath.poses import Blocked
 from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap

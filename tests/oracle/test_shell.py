@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.leaning import CELLS, loaded
+from toolpath.five_axis.oriented_motion import CELLS, loaded
 from toolpath.shell import shells
 from toolpath.stock import StockMap
 from zones.reach.assembly import Clearances, Disc

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import toolpath.flank as flank
+import toolpath.five_axis.flank_milling as flank
 from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
-from toolpath.flank import Wall, Wanted, bands
-from toolpath.piece import Piece, thinned_poses
+from toolpath.five_axis.flank_milling import Wall, Wanted, bands
+from toolpath.five_axis.oriented_piece import Piece, thinned_poses
 from toolpath.residual import leaning_depths
 
 ASKED = Wanted(0.02, 0.002, 0.002)

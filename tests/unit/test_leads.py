@@ -10,11 +10,11 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
+from toolpath.five_axis.oriented_motion import Surroundings, with_ways
+from toolpath.five_axis.oriented_piece import Piece
 from toolpath.leads import SIZES, arc_onto, radii
-from toolpath.leaning import Surroundings, with_ways
 from toolpath.lines import Line, dense
 from toolpath.linking import Linker
-from toolpath.piece import Piece
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
 from toolpath.travel import Motions

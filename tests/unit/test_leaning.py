@@ -7,8 +7,8 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.leaning import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
-from toolpath.piece import Piece
+from toolpath.five_axis.oriented_motion import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
+from toolpath.five_axis.oriented_piece import Piece
 from toolpath.plan_settings import Turning
 from toolpath.stock import StockMap
 from zones.reach.assembly import Clearances, Disc

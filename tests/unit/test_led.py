@@ -15,11 +15,11 @@ from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
 from toolpath.family import Target
-from toolpath.leaning import SKIMMED, Surroundings, free_parts
-from toolpath.piece import Piece
+from toolpath.five_axis.axis_smoothing import Limits
+from toolpath.five_axis.oriented_motion import SKIMMED, Surroundings, free_parts
+from toolpath.five_axis.oriented_pass import enters
+from toolpath.five_axis.oriented_piece import Piece
 from toolpath.plan_settings import CutData, Leaned
-from toolpath.posed import enters
-from toolpath.steering import Limits
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.trimmed_faces import TrimmedFace

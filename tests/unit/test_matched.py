@@ -10,10 +10,10 @@ from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
+from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
+from toolpath.five_axis.matched_passes import Matched, Wanted
+from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
 from toolpath.isoparametric import IsoSurface
-from toolpath.matched import Matched, Wanted
-from toolpath.matching import matching_tilt, strip_width
-from toolpath.nose import Contacts, Nose, strip_edges
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes

@@ -10,11 +10,22 @@ from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from tests.unit.test_matched import bowl, measured, passes_along_y, random_surface
+from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
+from toolpath.five_axis.matched_passes import Matched, Wanted
+from toolpath.five_axis.surface_partition import (
+    CELLS,
+    FINE,
+    LAST,
+    Feed,
+    best_feeds,
+    cheapest,
+    feed_of,
+    parted,
+    price,
+    turned,
+)
+from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
 from toolpath.isoparametric import IsoSurface
-from toolpath.matched import Matched, Wanted
-from toolpath.matching import matching_tilt, strip_width
-from toolpath.nose import Contacts, Nose, strip_edges
-from toolpath.parted import CELLS, FINE, LAST, Feed, best_feeds, cheapest, feed_of, parted, price, turned
 
 ASKED = Wanted(0.0045, 0.001, 0.0, 0.0003)
 M = CELLS * FINE

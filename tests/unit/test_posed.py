@@ -10,9 +10,9 @@ from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
 from toolpath.family import Target
+from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import Flank, IsoSurface, lay_out
-from toolpath.posed import enters, lead_and_tilt, leaned, posed
 from toolpath.strategies.isoparametric import course
 from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves

@@ -6,12 +6,12 @@ import pytest
 from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import ball
 from tests.unit.test_posed import CHORD, SCALLOP, opposite, tree_of, wall
+from toolpath.five_axis.axis_smoothing import FAN, SPACING, Limits, fan, steered
+from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
 from toolpath.forward import Profile, steps
 from toolpath.isoparametric import IsoSurface
 from toolpath.locations import tips
-from toolpath.posed import enters, lead_and_tilt, leaned, posed
 from toolpath.poses import angles_between
-from toolpath.steering import FAN, SPACING, Limits, fan, steered
 from zones.reach.assembly import Clearances
 
 WIDE = Limits(np.radians(40.0), np.radians(6.0))

@@ -1,4 +1,4 @@
-"""What a rectangle of a surface costs, fed along its rows (``toolpath.parted``, whose words these are)."""
+"""What a rectangle of a surface costs, fed along its rows (``toolpath.five_axis.surface_partition``, whose words these are)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from geometry.kernels.options import KERNEL
 def price_rows(reach, length, a, b, c, d, lag):
     """Passes and mm of line of the places of columns a to b and rows c to d, and mm of its mean and shortest line.
 
-    reach, length : (m, m) float64, as ``toolpath.parted.Feed``
+    reach, length : (m, m) float64, as ``toolpath.five_axis.surface_partition.Feed``
     lag           : mm, by which a pass goes on over its end, where it is the neighbour that is cut
     """
     m = len(reach)

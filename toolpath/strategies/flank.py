@@ -1,4 +1,4 @@
-"""Walls finished by the flank of a tool that leans as they do (``toolpath.flank``), as motions with ways in and out.
+"""Walls finished by the flank of a tool that leans as they do (``toolpath.five_axis.flank_milling``), as motions with ways in and out.
 
 Where a pass would meet something, or the machine cannot take it, the wall is left to the usual passes.
 """
@@ -15,9 +15,9 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.tool_body import ToolBody
 from toolpath.family import Target
-from toolpath.flank import ALONG, UP, Wall, Wanted, bands
-from toolpath.leaning import UP_Z, Runs, Surroundings, in_turn
-from toolpath.piece import Piece
+from toolpath.five_axis.flank_milling import ALONG, UP, Wall, Wanted, bands
+from toolpath.five_axis.oriented_motion import UP_Z, Runs, Surroundings, in_turn
+from toolpath.five_axis.oriented_piece import Piece
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.trimmed_faces import Faces, leveller
 

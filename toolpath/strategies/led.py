@@ -2,7 +2,7 @@
 
 The axis wanted leans by a lead along the pass and a tilt aside of it, off the normal, so that the centre of the nose
 does not rub. Where the tool would meet something with it, or the machine cannot take it, the nearest axes that are free
-are taken, turning evenly along each pass and from one to the next (``toolpath.steering``); where there is none the
+are taken, turning evenly along each pass and from one to the next (``toolpath.five_axis.axis_smoothing``); where there is none the
 pass breaks off and the rest is left to others. Where the ends of neighbours are close, with nothing in between, the
 tool stays down and walks them to and fro.
 """
@@ -20,12 +20,12 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.family import Target
-from toolpath.leaning import LOOK, Runs, Surroundings, in_turn, layers_over
-from toolpath.piece import LEAST_PIECE, Piece
+from toolpath.five_axis.axis_smoothing import Limits, Steered, steered
+from toolpath.five_axis.oriented_motion import LOOK, Runs, Surroundings, in_turn, layers_over
+from toolpath.five_axis.oriented_pass import lead_and_tilt, posed
+from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
 from toolpath.plan_settings import CutData, Leaned, PlanSettings
-from toolpath.posed import lead_and_tilt, posed
 from toolpath.poses import Axes, Blocked, places_along
-from toolpath.steering import Limits, Steered, steered
 from toolpath.strategies.isoparametric import Stretch, course
 from toolpath.trimmed_faces import Faces
 from zones.machinable_area import Form

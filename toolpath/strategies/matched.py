@@ -1,6 +1,6 @@
-"""Faces finished by a tilted flat or bull-nose end whose nose has their curvature (``toolpath.matched``), as motions.
+"""Faces finished by a tilted flat or bull-nose end whose nose has their curvature (``toolpath.five_axis.matched_passes``), as motions.
 
-A face is laid out as a whole, or in the pieces that take less way (``toolpath.parted``), and each pass is walked where
+A face is laid out as a whole, or in the pieces that take less way (``toolpath.five_axis.surface_partition``), and each pass is walked where
 it serves what is wanted. Where the tool would meet something with the axis it needs there, or the machine cannot take
 that axis, the pass breaks off and the rest is left to others.
 """
@@ -21,11 +21,11 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.family import Target
+from toolpath.five_axis.matched_passes import Matched, Strip, Wanted
+from toolpath.five_axis.oriented_motion import LOOK, TURN_S, Runs, Surroundings, in_turn
+from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
+from toolpath.five_axis.surface_partition import parted
 from toolpath.isoparametric import IsoSurface, Laid
-from toolpath.leaning import LOOK, TURN_S, Runs, Surroundings, in_turn
-from toolpath.matched import Matched, Strip, Wanted
-from toolpath.parted import parted
-from toolpath.piece import LEAST_PIECE, Piece
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
 from toolpath.trimmed_faces import Faces

@@ -14,7 +14,7 @@ a = sin(eta) - R k_l and D = k_l - cos(eta)^2 k_f, the nose stands over a quadri
 
 so it is at the height h where q = R (1 - cos t) = (sqrt(a^2 + 2 D h) - a) / D, a half strip sqrt(2 R q - q^2) to
 either side. Contact is of second order at a = 0, of the first where no tilt gives that (plane, convex). All of this is
-second order; what truly stands is measured on the surface (``toolpath.nose``). Theory: docs/theory/matching.md.
+second order; what truly stands is measured on the surface (``toolpath.five_axis.tilted_end``). Theory: docs/theory/matching.md.
 """
 
 from __future__ import annotations

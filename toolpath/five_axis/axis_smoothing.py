@@ -31,10 +31,10 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.tool_body import ToolBody
+from toolpath.five_axis.oriented_pass import wanted_axes
 from toolpath.forward import Profile
 from toolpath.lines import true_runs
 from toolpath.locations import sides, tips
-from toolpath.posed import wanted_axes
 from toolpath.poses import Axes, Blocked, angles_between
 
 SPACING = 0.5  # mm between stations, at most
@@ -111,7 +111,7 @@ def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, li
     blocked : whether the tool enters something, or the machine cannot take the axis
     limits  : Limits
     before  : axes of the pass beside it, which these stay near to
-    off     : mm, that the tool may stand off along the normal (``toolpath.posed.posed``)
+    off     : mm, that the tool may stand off along the normal (``toolpath.five_axis.oriented_pass.posed``)
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Passes of a flat or bull-nose end, tilted until its nose matches the surface (papers/001, section 4, mended).
 
 Each pass is a line of one eta; its tool leans forward, by the least tilt with which no place of the nose enters the
-true surface (``toolpath.nose``), turned aside where that cuts a wider strip. Where the nose begins to stand higher than
+true surface (``toolpath.five_axis.tilted_end``), turned aside where that cuts a wider strip. Where the nose begins to stand higher than
 the scallop lie the edges of its strip. Strips are not as wide to the left as to the right, and the next pass is not
 known before its own strip is: passes are put as far apart as lets the edge of the next reach the edge of the last all
 along, solved for both together. A pass runs on over its end, on the surface as it would go on, by as much as the
@@ -20,9 +20,9 @@ from scipy.interpolate import PchipInterpolator
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
 from toolpath.isoparametric import IsoSurface
 from toolpath.locations import tips
-from toolpath.nose import Contacts, Nose, strip_edges
 
 STATIONS = 33  # along a pass from border to border, at which tilts are looked for; as close beyond
 SPARSE = 2  # stations on, at which turns are looked for

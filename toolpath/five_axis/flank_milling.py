@@ -33,9 +33,9 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.isoparametric import Laid
 from toolpath.lines import true_runs
-from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.poses import Blocked
 from toolpath.residual import leaning_depths
 

@@ -18,9 +18,9 @@ from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.leads import arc_onto, radii
 from toolpath.lines import dense, true_runs
-from toolpath.piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.poses import Blocked, places_along
 from toolpath.shell import shells

@@ -1,6 +1,6 @@
 """A flat or bull-nose end on a surface: how far its nose stands over it, how far it must tilt, how wide it cuts.
 
-Notation (with that of ``toolpath.matching``)
+Notation (with that of ``toolpath.five_axis.curvature_matching``)
     t, s     : way of the feed and the way to its left, n x t, both on the surface
     l        : tangent of the nose circle, cos(turn) s + sin(turn) t;  f = sin(turn) s - cos(turn) t
     axis     : cos(eta) n - sin(eta) f: leaned forward by eta, and aside where ``turn`` is not 0
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
-from toolpath.matching import clear_tilt, nose_radii
+from toolpath.five_axis.curvature_matching import clear_tilt, nose_radii
 
 ANGLES = 65  # places on each half of the nose
 TRIED = 33  # the same, when a tilt is looked for: between two of them it may be a third deeper than at them
