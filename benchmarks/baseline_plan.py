@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from toolpath.family import Target
 from toolpath.finish import Finish, motions_of, step_of, turned
 from toolpath.levels import dilated
-from toolpath.linking import Linker
+from toolpath.linking.linker import Linker
 from toolpath.order import nearest_order
 from toolpath.plan import Plan
 from toolpath.plan_settings import CutData, Pattern, PlanSettings

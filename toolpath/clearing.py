@@ -24,8 +24,8 @@ from toolpath.engaged import LOOK, SKIN_SHARE, SURE, over_limit
 from toolpath.inwards import NARROW, Inwards
 from toolpath.levels import moves_free
 from toolpath.lines import Line, dense, pieces_where, thinned
-from toolpath.linking import Linker
-from toolpath.ramps import RAMP_SHARE
+from toolpath.linking.linker import Linker
+from toolpath.linking.ramp_entry import RAMP_SHARE
 
 FINER = 4  # times the distance between lines is halved where too much of the cutter is in stock
 ASLANT = 2.0  # distances between lines: how far off a line begins on the one before

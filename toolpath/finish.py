@@ -28,18 +28,18 @@ from toolpath.five_axis.oriented_pass import enters
 from toolpath.isoparametric import Flank, side_step
 from toolpath.levels import serving
 from toolpath.lines import Line, thinned, true_runs
-from toolpath.linking import Linker
+from toolpath.linking.linker import Linker
+from toolpath.linking.ramp_entry import RAMP_SHARE
+from toolpath.linking.rapid_travel import Motions
 from toolpath.order import nearest_order
 from toolpath.plan_checkpoint import FinishNow
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.poses import Blocked
-from toolpath.ramps import RAMP_SHARE
 from toolpath.residual import ResidualMap
 from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
 from toolpath.tool_deflection import left_by_layers
-from toolpath.travel import Motions
 from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked, still_to_walk
 from toolpath.workingsteps import Motion, Trajectory, Workingstep

@@ -22,7 +22,7 @@ from toolpath.family import Target
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.levels import dilated
-from toolpath.linking import FLUTE_SHARE, Linker
+from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.order import nearest_order
 from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.plan_settings import CutData, PlanSettings

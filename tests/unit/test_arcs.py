@@ -20,7 +20,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, round_plan, turn
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step
-from toolpath.leads import arc_onto
+from toolpath.linking.lead_arcs import arc_onto
 from toolpath.workingsteps import Motion
 from verify.agree import check_agreement
 from verify.kinematics import Kinematics

@@ -12,9 +12,9 @@ from tests.hand_parts import RAMP, box_mesh, field_of, joined, tool
 from toolpath.clearing import Clearing
 from toolpath.engaged import CLOSE, LOOK, angles
 from toolpath.lines import dense
-from toolpath.linking import Linker
+from toolpath.linking.linker import Linker
+from toolpath.linking.rapid_travel import Motions
 from toolpath.stock import StockMap
-from toolpath.travel import Motions
 from toolpath.walked import Depths
 from toolpath.workingsteps import Motion
 

@@ -12,12 +12,12 @@ from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
 from toolpath.five_axis.oriented_motion import Surroundings, with_ways
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.leads import SIZES, arc_onto, radii
 from toolpath.lines import Line, dense
-from toolpath.linking import Linker
+from toolpath.linking.lead_arcs import SIZES, arc_onto, radii
+from toolpath.linking.linker import Linker
+from toolpath.linking.rapid_travel import Motions
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.stock import StockMap
-from toolpath.travel import Motions
 from toolpath.walked import Depths
 from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances

@@ -13,10 +13,10 @@ from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD, Pace
 from toolpath.lines import Line, dense
-from toolpath.linking import Linker
+from toolpath.linking.linker import Linker
+from toolpath.linking.rapid_travel import OVER, Motions
 from toolpath.order import nearest_order
 from toolpath.stock import SKIN, StockMap
-from toolpath.travel import OVER, Motions
 from toolpath.walked import Depths
 from toolpath.workingsteps import Motion
 

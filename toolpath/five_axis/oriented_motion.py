@@ -2,7 +2,7 @@
 
 A pass is one step of work: the tool comes down along its own axis beside the beginning, goes to it, along the pass, off
 it, and up along its axis again; where it turns to the next one it is outside of everything. On and off a wall that its
-flank cuts it goes on an arc where there is room (``toolpath.leads``). What it would meet of part, fixtures and stock is
+flank cuts it goes on an arc where there is room (``toolpath.linking.lead_arcs``). What it would meet of part, fixtures and stock is
 asked pose by pose.
 """
 
@@ -19,8 +19,8 @@ from scipy.ndimage import binary_dilation
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
-from toolpath.leads import arc_onto, radii
 from toolpath.lines import dense, true_runs
+from toolpath.linking.lead_arcs import arc_onto, radii
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.poses import Blocked, places_along
 from toolpath.shell import shells
