@@ -14,16 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.family import Target
 from toolpath.finish import Finish, motions_of, step_of, turned
-from toolpath.levels import dilated
 from toolpath.linking.linker import Linker
-from toolpath.order import nearest_order
+from toolpath.passes.contours import dilated
+from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_order import nearest_order
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan import Plan
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
-from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
 from toolpath.workingsteps import Workingstep
 from zones.reach.tip_field import TipField

@@ -38,13 +38,13 @@ from service.convert import parse_setup, tool_bodies  # noqa: E402
 from service.prepare import clearances, placement_of, prepare  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
-from toolpath.family import Dragged, Promise, Swath, Target  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402
-from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
-from toolpath.isoparametric import Flank, IsoSurface, lay_out  # noqa: E402
-from toolpath.locations import FREE, lifted, tips  # noqa: E402
-from toolpath.sidestep import lay_out as parallel  # noqa: E402
-from toolpath.trimmed_faces import TrimmedFace
+from toolpath.passes.cutter_locations import FREE, lifted, tips  # noqa: E402
+from toolpath.passes.forward_step import Profile, arc_rule, steps  # noqa: E402
+from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out  # noqa: E402
+from toolpath.passes.pass_family import Dragged, Promise, Swath, Target  # noqa: E402
+from toolpath.passes.side_step import lay_out as parallel  # noqa: E402
+from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402

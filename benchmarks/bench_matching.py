@@ -42,10 +42,10 @@ from service.prepare import placement_of  # noqa: E402
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width  # noqa: E402
 from toolpath.five_axis.matched_passes import Matched, Wanted  # noqa: E402
 from toolpath.five_axis.surface_partition import Part, parted  # noqa: E402
-from toolpath.isoparametric import IsoSurface  # noqa: E402
-from toolpath.isoparametric import lay_out as ball_passes  # noqa: E402
-from toolpath.locations import tips  # noqa: E402
-from toolpath.trimmed_faces import TrimmedFace  # noqa: E402
+from toolpath.passes.cutter_locations import tips  # noqa: E402
+from toolpath.passes.isoparametric_passes import IsoSurface  # noqa: E402
+from toolpath.passes.isoparametric_passes import lay_out as ball_passes  # noqa: E402
+from toolpath.passes.trimmed_faces import TrimmedFace  # noqa: E402
 from verify.moves import Moves  # noqa: E402
 from verify.removal import residual_on_normals  # noqa: E402
 from verify.toolaxes import ToolAxes  # noqa: E402

@@ -26,12 +26,12 @@ from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
-from toolpath.border import beyond  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
-from toolpath.direction import best_direction  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
-from toolpath.family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
-from toolpath.sidestep import lay_out  # noqa: E402
+from toolpath.passes.feed_direction import best_direction  # noqa: E402
+from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
+from toolpath.passes.reach_border import beyond  # noqa: E402
+from toolpath.passes.side_step import lay_out  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from zones.reach.assembly import Clearances

@@ -39,8 +39,8 @@ from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
 from output.inverse_kinematics import RotaryMachine  # noqa: E402
 from toolpath.five_axis.axis_smoothing import Limits, steered  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, posed  # noqa: E402
-from toolpath.forward import Profile, steps  # noqa: E402
-from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
+from toolpath.passes.forward_step import Profile, steps  # noqa: E402
+from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes  # noqa: E402

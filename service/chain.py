@@ -56,14 +56,14 @@ from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces
 from service.viewdata import VIEW_NAME, plan_view, verification_view
-from toolpath.family import Target
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import Keeper
 from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
 from toolpath.stock import StockMap
 from toolpath.tool_deflection import effective_diameter
-from toolpath.trimmed_faces import Faces
 from verify.dialects import dialect_of
 from verify.likeness import carried
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples

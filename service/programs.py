@@ -30,8 +30,8 @@ from service.sides import Look, Program, Side
 from service.stock import turned_box
 from service.trimmed import exact_faces
 from service.version import VERSION
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import Turning
-from toolpath.trimmed_faces import Faces
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import View
 

@@ -37,7 +37,7 @@ from service.packing import Known, pack, unpack
 from service.prepare import Prepared
 from service.sides import Side
 from toolpath.counterexamples import Counterexamples
-from toolpath.family import Target
+from toolpath.passes.pass_family import Target
 from toolpath.plan import Plan
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
 from toolpath.stock import StockMap

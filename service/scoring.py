@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.prepare import Prepared, machinable_triangles
-from toolpath.family import Target
+from toolpath.passes.pass_family import Target
 from toolpath.plan import Plan
 from zones.machinable_area import forms_of
 from zones.plan_view.regions import Labels

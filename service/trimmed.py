@@ -13,8 +13,8 @@ from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
 from service.prepare import Prepared, placement_of
+from toolpath.passes.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
-from toolpath.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from zones.machinable_area import Form
 
 TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one

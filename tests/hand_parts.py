@@ -15,11 +15,11 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.tool_body import HolderSegment, ToolBody
-from toolpath.family import Target
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan import Plan, plan_job
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap
-from toolpath.trimmed_faces import TrimmedFace
 from toolpath.workingsteps import Motion
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces

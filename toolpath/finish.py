@@ -20,18 +20,19 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.border import beyond
 from toolpath.engaged import UNBOUNDED
-from toolpath.family import Promise, Target
 from toolpath.five_axis.oriented_motion import TURN_S, Runs, Surroundings
 from toolpath.five_axis.oriented_pass import enters
-from toolpath.isoparametric import Flank, side_step
-from toolpath.levels import serving
 from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking.linker import Linker
 from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.linking.rapid_travel import Motions
-from toolpath.order import nearest_order
+from toolpath.passes.contours import serving
+from toolpath.passes.isoparametric_passes import Flank, side_step
+from toolpath.passes.pass_family import Promise, Target
+from toolpath.passes.pass_order import nearest_order
+from toolpath.passes.reach_border import beyond
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import FinishNow
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.poses import Blocked
@@ -40,7 +41,6 @@ from toolpath.skins import Skins
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
 from toolpath.tool_deflection import left_by_layers
-from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked, still_to_walk
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.machinable_area import Form

@@ -22,8 +22,8 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from toolpath.kernels.march import march, spread
-from toolpath.levels import dilated, lines_at
 from toolpath.lines import Line
+from toolpath.passes.contours import dilated, lines_at
 from toolpath.stock import StockMap
 from zones.reach.tip_field import TipField
 

@@ -18,18 +18,18 @@ from geometry.mesh import F64
 from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
-from toolpath.family import Target
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
-from toolpath.levels import dilated
 from toolpath.linking.linker import FLUTE_SHARE, Linker
-from toolpath.order import nearest_order
+from toolpath.passes.contours import dilated
+from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_order import nearest_order
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
 from toolpath.tool_deflection import effective_diameter
-from toolpath.trimmed_faces import Faces
 from toolpath.walked import Depths, Walked
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import Form

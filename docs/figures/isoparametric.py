@@ -16,8 +16,8 @@ import numpy as np  # noqa: E402
 from benchmarks.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
-from toolpath.forward import Profile, arc_rule, steps  # noqa: E402
-from toolpath.isoparametric import IsoSurface, lay_out  # noqa: E402
+from toolpath.passes.forward_step import Profile, arc_rule, steps  # noqa: E402
+from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 WIDTH, GAP = 420.0, 24.0

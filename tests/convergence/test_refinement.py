@@ -14,9 +14,9 @@ from geometry.sampling import sample_surface
 from tests.hand_parts import ball, field_of, slope_field, terraces
 from tests.plan_checks import dense
 from toolpath.cutter.cutter import Cutter
-from toolpath.family import Dragged, Promise, Swath, Target
-from toolpath.levels import contours
 from toolpath.lines import thinned
+from toolpath.passes.contours import contours
+from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
 
 RADIUS = 12.0
 SHAPES = {

@@ -7,7 +7,7 @@ import pytest
 
 from tests.hand_parts import ball, field_of, terraces, tool
 from tests.plan_checks import dense
-from toolpath.levels import contours
+from toolpath.passes.contours import contours
 
 shapely = pytest.importorskip("shapely")
 

@@ -12,10 +12,10 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import slope_field
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.direction import CANDIDATES, best_direction
 from toolpath.drop_cutter import drop_cutter
-from toolpath.family import Dragged, Promise, Swath, Target
-from toolpath.sidestep import lay_out
+from toolpath.passes.feed_direction import CANDIDATES, best_direction
+from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.side_step import lay_out
 from toolpath.strategies.spiral import Rings, spiralled
 
 R = 1.5

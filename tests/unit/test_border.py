@@ -10,8 +10,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import HolderSegment
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
-from toolpath.border import COARSEST, FAR, beyond
-from toolpath.family import Target
+from toolpath.passes.pass_family import Target
+from toolpath.passes.reach_border import COARSEST, FAR, beyond
 from zones.reach.tip_field import touchable
 
 LIFT, SPACING = 0.002, 0.2

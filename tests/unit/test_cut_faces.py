@@ -9,9 +9,9 @@ from geometry.step_import.reader import read_part
 from geometry.surfaces.foot_points import foot_points
 from geometry.trimming.trim import trim_faces
 from tests.hand_parts import ball
-from toolpath.forward import Profile, steps
-from toolpath.locations import lifted
-from toolpath.trimmed_faces import TrimmedFace
+from toolpath.passes.cutter_locations import lifted
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.plan_checks import dense
-from toolpath.follow import SMALLEST, STEEPEST, follow, pieces
+from toolpath.passes.dragged_path import SMALLEST, STEEPEST, follow, pieces
 
 
 def waves(xy):

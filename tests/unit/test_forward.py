@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from toolpath.forward import Profile, arc_rule, errors, steps
+from toolpath.passes.forward_step import Profile, arc_rule, errors, steps
 
 RADIUS = 5.0
 PROFILES = {

@@ -13,10 +13,10 @@ from tests.hand_parts import tool
 from tests.square_regions import region
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.forward import Profile, steps
-from toolpath.isoparametric import Flank, IsoSurface, lay_out, side_step
 from toolpath.kernels.beside import left_beside
-from toolpath.locations import lifted, tips
+from toolpath.passes.cutter_locations import lifted, tips
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out, side_step
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 

@@ -9,9 +9,9 @@ from geometry.parameterization.joined_faces import Joined
 from geometry.parameterization.square_patches import squared
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball
-from toolpath.forward import Profile, steps
-from toolpath.isoparametric import JoinedSurface, lay_out
-from toolpath.locations import lifted
+from toolpath.passes.cutter_locations import lifted
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.isoparametric_passes import JoinedSurface, lay_out
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 

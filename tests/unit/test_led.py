@@ -14,15 +14,15 @@ from service.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
-from toolpath.family import Target
 from toolpath.five_axis.axis_smoothing import Limits
 from toolpath.five_axis.oriented_motion import SKIMMED, Surroundings, free_parts
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.five_axis.oriented_piece import Piece
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Leaned
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies import led
-from toolpath.trimmed_faces import TrimmedFace
 from toolpath.workingsteps import Motion, Trajectory
 from zones.machinable_area import Form
 from zones.reach.assembly import Clearances

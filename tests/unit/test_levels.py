@@ -7,8 +7,8 @@ import pytest
 
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from tests.plan_checks import dense
-from toolpath.levels import contour_pieces, contours, dilated, free_pieces, moves_free, rings
 from toolpath.lines import Line, pieces_where, place_keys, thinned, true_runs
+from toolpath.passes.contours import contour_pieces, contours, dilated, free_pieces, moves_free, rings
 
 
 def circle(n=200, r=10.0, closed=True):

@@ -15,7 +15,7 @@ from toolpath.feeds.feed_scheduling import GUARD, Pace
 from toolpath.lines import Line, dense
 from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import OVER, Motions
-from toolpath.order import nearest_order
+from toolpath.passes.pass_order import nearest_order
 from toolpath.stock import SKIN, StockMap
 from toolpath.walked import Depths
 from toolpath.workingsteps import Motion

@@ -9,8 +9,8 @@ from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
-from toolpath.forward import Profile, steps
-from toolpath.locations import lifted, tips
+from toolpath.passes.cutter_locations import lifted, tips
+from toolpath.passes.forward_step import Profile, steps
 
 TOOLS = {name: ToolBody("T1", 1, 6.0, corner, 20.0, 6.0, 30.0, 6.0, 40.0)
          for name, corner in (("ball", 3.0), ("bull", 1.0), ("flat", 0.0))}

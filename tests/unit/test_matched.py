@@ -13,7 +13,7 @@ from tests.hand_parts import tool
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
 from toolpath.five_axis.matched_passes import Matched, Wanted
 from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
-from toolpath.isoparametric import IsoSurface
+from toolpath.passes.isoparametric_passes import IsoSurface
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes

@@ -10,14 +10,14 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
 from tests.unit.test_matched import bowl, measured
-from toolpath.family import Target
 from toolpath.five_axis.oriented_motion import LAYER, THICK, Surroundings, _leads, lowered, with_ways
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.five_axis.oriented_piece import Piece
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.stock import SKIN, StockMap
 from toolpath.strategies.matched import matched, suits
-from toolpath.trimmed_faces import TrimmedFace
 from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.hand_parts import ball, tool
 from toolpath.five_axis.curvature_matching import clear_tilt, gouge_depth, matching_tilt, mean_direction, strip_width
-from toolpath.locations import tips
+from toolpath.passes.cutter_locations import tips
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes

@@ -25,7 +25,7 @@ from toolpath.five_axis.surface_partition import (
     turned,
 )
 from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
-from toolpath.isoparametric import IsoSurface
+from toolpath.passes.isoparametric_passes import IsoSurface
 
 ASKED = Wanted(0.0045, 0.001, 0.0, 0.0003)
 M = CELLS * FINE

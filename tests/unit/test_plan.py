@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
-from toolpath.family import Target
 from toolpath.finish import Finish
 from toolpath.lines import Line
+from toolpath.passes.pass_family import Target
 from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.stock import StockMap

@@ -9,12 +9,12 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
-from toolpath.family import Target
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
-from toolpath.forward import Profile, steps
-from toolpath.isoparametric import Flank, IsoSurface, lay_out
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.strategies.isoparametric import course
-from toolpath.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from verify.toolaxes import ToolAxes

@@ -11,7 +11,7 @@ from tests.hand_parts import SURFACES, ball, dome, field_of, terraces, tool
 from tests.plan_checks import dense
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.family import Promise, Target
+from toolpath.passes.pass_family import Promise, Target
 from toolpath.plan_settings import Pattern
 from toolpath.strategies import zigzag
 from zones.reach.tip_field import touchable

@@ -8,9 +8,9 @@ from tests.hand_parts import ball
 from tests.unit.test_posed import CHORD, SCALLOP, opposite, tree_of, wall
 from toolpath.five_axis.axis_smoothing import FAN, SPACING, Limits, fan, steered
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
-from toolpath.forward import Profile, steps
-from toolpath.isoparametric import IsoSurface
-from toolpath.locations import tips
+from toolpath.passes.cutter_locations import tips
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.isoparametric_passes import IsoSurface
 from toolpath.poses import angles_between
 from zones.reach.assembly import Clearances
 

@@ -18,7 +18,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from service.packing import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.test_isoparametric_strategy import bowl
-from toolpath.family import Target
+from toolpath.passes.pass_family import Target
 from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
 from toolpath.plan_settings import CutData

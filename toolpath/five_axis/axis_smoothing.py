@@ -32,9 +32,9 @@ from geometry.mesh import F64
 from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.oriented_pass import wanted_axes
-from toolpath.forward import Profile
 from toolpath.lines import true_runs
-from toolpath.locations import sides, tips
+from toolpath.passes.cutter_locations import sides, tips
+from toolpath.passes.forward_step import Profile
 from toolpath.poses import Axes, Blocked, angles_between
 
 SPACING = 0.5  # mm between stations, at most

@@ -34,8 +34,8 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
-from toolpath.isoparametric import Laid
 from toolpath.lines import true_runs
+from toolpath.passes.isoparametric_passes import Laid
 from toolpath.poses import Blocked
 from toolpath.residual import leaning_depths
 

@@ -21,8 +21,8 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
-from toolpath.isoparametric import IsoSurface
-from toolpath.locations import tips
+from toolpath.passes.cutter_locations import tips
+from toolpath.passes.isoparametric_passes import IsoSurface
 
 STATIONS = 33  # along a pass from border to border, at which tilts are looked for; as close beyond
 SPARSE = 2  # stations on, at which turns are looked for

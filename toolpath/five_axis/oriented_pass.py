@@ -7,7 +7,7 @@ Notation
 Between two locations the control takes the tip straight and turns the axis on the great circle, by theta. The centre of
 a ball r then leaves the straight way between its ends by r (1 - cos(theta / 2)) at most, for the tip lags by r times
 what the arc of axes is off its chord. Locations are put in until that is a tenth of the chordal tolerance, so a pass
-keeps what ``toolpath.forward`` gave it. Where a field jumps, no number of locations is enough: there the pass ends.
+keeps what ``toolpath.passes.forward_step`` gave it. Where a field jumps, no number of locations is enough: there the pass ends.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
-from toolpath.forward import Profile
 from toolpath.lines import true_runs
-from toolpath.locations import LOOK, OFFS, chorded, contacts, sides, tips
+from toolpath.passes.cutter_locations import LOOK, OFFS, chorded, contacts, sides, tips
+from toolpath.passes.forward_step import Profile
 from toolpath.poses import Axes, Blocked, angles_between
 from zones.reach.approach_cones import assembly
 from zones.reach.assembly import Clearances

@@ -27,8 +27,8 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.curvature_matching import clear_tilt, mean_direction, strip_width
 from toolpath.five_axis.matched_passes import MOST_RUN_OUT, TURNS, Wanted, longest_lag
-from toolpath.isoparametric import IsoSurface
 from toolpath.kernels.parted import price_rows
+from toolpath.passes.isoparametric_passes import IsoSurface
 
 CELLS = 16  # each way, between which cuts lie
 FINE = 4  # places a cell, each way, at which strips are looked at

@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 
 from geometry.errors import GeometryError
 from geometry.tool_body import ToolBody
-from toolpath.family import Target
 from toolpath.five_axis.flank_milling import ALONG, UP, Wall, Wanted, bands
 from toolpath.five_axis.oriented_motion import UP_Z, Runs, Surroundings, in_turn
 from toolpath.five_axis.oriented_piece import Piece
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import Faces, leveller
 from toolpath.plan_settings import CutData, PlanSettings
-from toolpath.trimmed_faces import Faces, leveller
 
 NAME = "flank"
 LEAST_SERVED = 0.5  # of a wall's lattice: a wall of which less is wanted is left to others

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geometry.mesh import F64
-from toolpath.levels import contours, dilated, lines_at
 from toolpath.lines import Line, pieces_where, thinned
+from toolpath.passes.contours import contours, dilated, lines_at
 from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm

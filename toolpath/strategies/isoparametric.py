@@ -16,12 +16,12 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.family import Target
-from toolpath.forward import Profile, steps
-from toolpath.isoparametric import Flank, Laid
 from toolpath.lines import Line, true_runs
-from toolpath.locations import lifted
-from toolpath.trimmed_faces import Faces
+from toolpath.passes.cutter_locations import lifted
+from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.isoparametric_passes import Flank, Laid
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import Faces
 from zones.reach.tip_field import TipField
 
 NAME = "isoparametric"

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath.levels import contours, dilated, rings
 from toolpath.lines import Line, pieces_where
+from toolpath.passes.contours import contours, dilated, rings
 from toolpath.stock import SURE_RIM, StockMap
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 

@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.family import Target
 from toolpath.five_axis.axis_smoothing import Limits, Steered, steered
 from toolpath.five_axis.oriented_motion import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.five_axis.oriented_pass import lead_and_tilt, posed
 from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, Leaned, PlanSettings
 from toolpath.poses import Axes, Blocked, places_along
 from toolpath.strategies.isoparametric import Stretch, course
-from toolpath.trimmed_faces import Faces
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
 

@@ -20,15 +20,15 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.family import Target
 from toolpath.five_axis.matched_passes import Matched, Strip, Wanted
 from toolpath.five_axis.oriented_motion import LOOK, TURN_S, Runs, Surroundings, in_turn
 from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
 from toolpath.five_axis.surface_partition import parted
-from toolpath.isoparametric import IsoSurface, Laid
+from toolpath.passes.isoparametric_passes import IsoSurface, Laid
+from toolpath.passes.pass_family import Target
+from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
-from toolpath.trimmed_faces import Faces
 
 NAME = "matched"
 LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind

@@ -1,7 +1,7 @@
 """A spiral over shallow area: rings at growing distance from its border, joined turn by turn.
 
 Place across the passes is the distance of a tip from the border of all tips in plan, so a ring is a level line of
-that distance and ``toolpath.sidestep`` brackets from ring to ring as it does from line to line. Where one closed ring
+that distance and ``toolpath.passes.side_step`` brackets from ring to ring as it does from line to line. Where one closed ring
 follows the other, the way goes over from ring to ring along the whole turn, at equal shares of their lengths. On a
 round area turns are as far apart as the rings; beside a bay they may be a little farther, which measuring finds.
 """
@@ -14,9 +14,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
-from toolpath.family import Dragged, Family, Pass, Promise, Target, strip_width
-from toolpath.follow import pieces
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
+from toolpath.passes.dragged_path import pieces
+from toolpath.passes.pass_family import Dragged, Family, Pass, Promise, Target, strip_width
 from zones.lattice import Lattice
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.levels import moves_free
 from toolpath.lines import Line
+from toolpath.passes.contours import moves_free
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MOST = 400  # places; a zone with more has another problem than a missed spot

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.cutter.cutter import Cutter
-from toolpath.direction import best_direction
-from toolpath.family import Dragged, Pass, Promise, Swath, Target
-from toolpath.levels import serving
 from toolpath.lines import Line, dense, pieces_where
+from toolpath.passes.contours import serving
+from toolpath.passes.feed_direction import best_direction
+from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target
+from toolpath.passes.side_step import lay_out
 from toolpath.plan_settings import Pattern
-from toolpath.sidestep import lay_out
 from toolpath.stock import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach.tip_field import TipField

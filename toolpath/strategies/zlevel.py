@@ -8,8 +8,8 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.levels import contour_pieces, dilated
 from toolpath.lines import Line
+from toolpath.passes.contours import contour_pieces, dilated
 from zones.reach.tip_field import TipField
 
 LEAST_STEP = 0.02  # mm, levels are never closer

@@ -14,7 +14,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.parameterization.joined_faces import Joined
 from geometry.parameterization.square_patches import Squared, squared
 from geometry.surfaces.nurbs import NurbsSurface
-from toolpath.isoparametric import Flank, IsoSurface, JoinedSurface, Laid, lay_out
+from toolpath.passes.isoparametric_passes import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 
 LATTICE = 9  # places each way at which the rise of both families of passes is looked at
 LEVEL_GAIN = 0.5  # of the rise along the longer sides: what less there must be along the shorter to go there instead

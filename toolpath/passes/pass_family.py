@@ -23,7 +23,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.follow import KINK, Limit, pieces
+from toolpath.passes.dragged_path import KINK, Limit, pieces
 from toolpath.root_finding import roots
 
 I64 = NDArray[np.int64]

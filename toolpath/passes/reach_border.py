@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.drop import drop_contacts
-from toolpath.family import I64, Target
+from toolpath.passes.pass_family import I64, Target
 from zones.reach.tip_field import TipField, touchable
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them

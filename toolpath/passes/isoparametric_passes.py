@@ -28,8 +28,8 @@ from geometry.mesh import F64
 from geometry.parameterization.grid_map import GridMap
 from geometry.parameterization.joined_faces import Joined
 from geometry.surfaces.nurbs import NurbsSurface
-from toolpath.forward import Curve
 from toolpath.kernels.beside import left_beside
+from toolpath.passes.forward_step import Curve
 
 LEVEL = 1e-9  # 1/mm: what is less curved is level
 TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
@@ -74,7 +74,7 @@ class IsoSurface:
         return self.surface.points_and_normals(self._inside(self._uv(xi, eta)))
 
     def curve(self, eta: float, low: float = 0.0, high: float = 1.0) -> Curve:
-        """The pass at eta from one xi to another, as ``toolpath.forward`` takes it."""
+        """The pass at eta from one xi to another, as ``toolpath.passes.forward_step`` takes it."""
         return lambda t: self.contact(low + (high - low) * t, np.full(len(t), eta))
 
     def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:

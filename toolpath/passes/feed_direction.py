@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath.family import Dragged, Promise, Swath, Target
-from toolpath.sidestep import lay_out
+from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.side_step import lay_out
 
 COARSER = 3.0  # passes of the search lie about this many times farther apart than those of the plan
 CANDIDATES = tuple(math.radians(a) for a in range(0, 180, 30))

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.follow import STEEPEST, Limit
-from toolpath.forward import Profile
 from toolpath.lines import thinned, true_runs
+from toolpath.passes.dragged_path import STEEPEST, Limit
+from toolpath.passes.forward_step import Profile
 
 FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
 LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does
@@ -115,7 +115,7 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
     """The tips of a pass, upright, moved off the surface or raised where the part stands over them.
 
     profile   : Profile of the pass; ends (n,) float64, mm, the ways at which it is located
-    limit     : lowest tip heights over places in plan (``toolpath.follow``)
+    limit     : lowest tip heights over places in plan (``toolpath.passes.dragged_path``)
     tolerance : mm, of the raised way
     off       : mm, up to which a tip may stand off along the normal first: facets of a wall may stand over its surface,
                 and beside a wall the limit is its top

@@ -1,7 +1,7 @@
 """Distance between neighbouring passes, bracketed on what they truly leave.
 
 What is left between two passes grows with their distance, about with its square, so the widest step that keeps the
-promise is bracketed by a few trials, each a tip path on the true limit (``toolpath.family`` measures). Going on
+promise is bracketed by a few trials, each a tip path on the true limit (``toolpath.passes.pass_family`` measures). Going on
 greedily takes the fewest passes of a family: two neighbours answer for what is between them and for nothing else.
 
 Where one narrow spot would set the step for a whole pass (thesis, section 5.2.v) the step may be wider and the spot
@@ -18,7 +18,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.family import FLOOR, I64, Family, Pass, strip_width
+from toolpath.passes.pass_family import FLOOR, I64, Family, Pass, strip_width
 
 TRIALS = 7
 FULL = 0.97  # of what may be left: a step that leaves this much is wide enough
