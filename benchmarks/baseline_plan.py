@@ -14,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.mesh import F64
-from toolpath.finish import Finish, motions_of, step_of, turned
 from toolpath.linking.linker import Linker
 from toolpath.passes.contours import dilated
 from toolpath.passes.pass_family import Target
 from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan import Plan
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
+from toolpath.planning.job_plan import Plan
+from toolpath.planning.zone_finishing import Finish, motions_of, step_of, turned
 from toolpath.stock import StockMap
 from toolpath.strategies import layers
 from toolpath.walked import Depths, Walked
@@ -52,7 +52,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Callable[[float], None] | None = None, first_step: int = 1,
              trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
-    """Plan all zones, tool by tool; arguments as of ``toolpath.plan.plan_job``, ``trimmed`` is not looked at."""
+    """Plan all zones, tool by tool; arguments as of ``toolpath.planning.job_plan.plan_job``, ``trimmed`` is not looked at."""
     settings = replace(settings, turning=None, pattern=Pattern.ZIGZAG)
     steps: list[Workingstep] = []
     begun: list[Finish] = []

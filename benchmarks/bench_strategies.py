@@ -25,8 +25,8 @@ import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
 import service.chain as chain  # noqa: E402
-import toolpath.finish as finish  # noqa: E402
-import toolpath.plan as planner  # noqa: E402
+import toolpath.planning.job_plan as planner  # noqa: E402
+import toolpath.planning.zone_finishing as finish  # noqa: E402
 from examples.family import make_part  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402

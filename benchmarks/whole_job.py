@@ -59,7 +59,7 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
     from geometry.errors import CamError
     from schemas.setup import Setup
     from service import chain
-    from toolpath.plan import Plan, plan_job
+    from toolpath.planning.job_plan import Plan, plan_job
 
     if spacing is not None:
         usual = chain.proof_setup

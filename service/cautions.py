@@ -18,9 +18,9 @@ from schemas.setup import Setup
 from service.materials import cutting_data
 from service.prepare import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
-from toolpath.finish import LEANING, ZonePlan, upright_way
 from toolpath.linking.ramp_entry import LEAST_RUN
 from toolpath.plan_settings import Leaned
+from toolpath.planning.zone_finishing import LEANING, ZonePlan, upright_way
 from toolpath.strategies import led
 from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Motion, Workingstep

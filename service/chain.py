@@ -59,9 +59,9 @@ from service.viewdata import VIEW_NAME, plan_view, verification_view
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import Keeper
 from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
+from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock import StockMap
 from toolpath.tool_deflection import effective_diameter
 from verify.dialects import dialect_of

@@ -9,8 +9,8 @@ import numpy as np
 from service.cautions import MOST_RATIO, walls_to_cut
 from service.convert import rotary_machine
 from service.prepare import Prepared
-from toolpath.bands import largest_corner, planes
 from toolpath.counterexamples import HighWall
+from toolpath.planning.depth_bands import largest_corner, planes
 from verify.slender import thin_walls
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
@@ -32,7 +32,7 @@ def in_turn(ready: Prepared) -> bool:
 
 
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:
-    """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.bands``).
+    """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.planning.depth_bands``).
 
     They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor
     bend holds near by, as the proof asks it (``verify.slender``), down to what holds the lowest; what has single places

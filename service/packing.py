@@ -20,9 +20,9 @@ import numpy as np
 
 from geometry.move_timing import Rates
 from toolpath.counterexamples import Counterexamples, HighWall
-from toolpath.finish import ZonePlan
-from toolpath.plan import Plan
 from toolpath.plan_checkpoint import FinishNow, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.planning.job_plan import Plan
+from toolpath.planning.zone_finishing import ZonePlan
 from toolpath.stock import StockNow
 from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep

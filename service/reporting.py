@@ -17,8 +17,8 @@ from service.cautions import Caution
 from service.convert import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
-from toolpath.finish import ZonePlan
-from toolpath.plan import Plan
+from toolpath.planning.job_plan import Plan
+from toolpath.planning.zone_finishing import ZonePlan
 from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Motion, Workingstep
 from verify.model import Proof

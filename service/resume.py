@@ -38,8 +38,8 @@ from service.prepare import Prepared
 from service.sides import Side
 from toolpath.counterexamples import Counterexamples
 from toolpath.passes.pass_family import Target
-from toolpath.plan import Plan
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
+from toolpath.planning.job_plan import Plan
 from toolpath.stock import StockMap
 from verify.model import NcProgram, Proof
 from zones.reach.access_view import View

@@ -18,7 +18,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.prepare import Prepared, machinable_triangles
 from toolpath.passes.pass_family import Target
-from toolpath.plan import Plan
+from toolpath.planning.job_plan import Plan
 from zones.machinable_area import forms_of
 from zones.plan_view.regions import Labels
 from zones.reach.access_view import View, turned_samples

@@ -17,8 +17,8 @@ from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.tool_body import HolderSegment, ToolBody
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
-from toolpath.plan import Plan, plan_job
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
+from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock import StockMap
 from toolpath.workingsteps import Motion
 from zones.lattice import lattice_step

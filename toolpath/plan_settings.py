@@ -113,7 +113,7 @@ class PlanSettings:
     found           : what a proof found wrong with the plans before, in the frame of this one
     rates           : what the machine does, for times
     planes          : heights of contact, descending, above which all is finished before any tool goes below
-                      (``toolpath.bands``)
+                      (``toolpath.planning.depth_bands``)
     semi_finishing  : between the layers too, so that they leave even stock
     """
 

@@ -17,7 +17,7 @@ from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.lines import Line
-from toolpath.plan import plan_job
+from toolpath.planning.job_plan import plan_job
 from verify.model import Finding, FindingKind
 
 TOOL = SHORT_TOOLS["flat"]

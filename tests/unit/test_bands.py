@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolpath.bands import LEAST_DEPTH, planes
 from toolpath.counterexamples import HighWall
+from toolpath.planning.depth_bands import LEAST_DEPTH, planes
 
 
 def test_without_high_walls_there_is_no_plane():

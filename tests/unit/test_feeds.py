@@ -18,7 +18,7 @@ from service.convert import parse_setup, tool_bodies
 from service.materials import MOST_THINNING, chip_thinning, cutting_data
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
-from toolpath.plan import LATTICE_CARE
+from toolpath.planning.job_plan import LATTICE_CARE
 from toolpath.tool_deflection import Bend, effective_diameter, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
@@ -124,7 +124,7 @@ def test_the_sweep_notices_what_it_should(monkeypatch):
 
 
 def test_what_layers_leave_is_what_the_planner_leaves():
-    """``toolpath.plan`` computes it where it plans them."""
+    """``toolpath.planning.job_plan`` computes it where it plans them."""
     assert left_by_layers(1.2, 0.08) == max(0.1 * 1.2, LATTICE_CARE * 0.08) == LATTICE_CARE * 0.08
     assert left_by_layers(2.0, 0.1) == max(0.1 * 2.0, LATTICE_CARE * 0.1) == 0.2
 

@@ -9,12 +9,12 @@ from geometry.sampling import sample_surface
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, field_of, plan_part, slope_field, tool
 from toolpath.counterexamples import NONE
-from toolpath.finish import Finish, _Strategy
 from toolpath.lines import Line
 from toolpath.passes.isoparametric_passes import Flank
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import Pattern
+from toolpath.planning.zone_finishing import Finish, _Strategy
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import course, laid
 from toolpath.walked import Depths, Walked

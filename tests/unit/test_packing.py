@@ -13,7 +13,7 @@ from geometry.move_timing import Rates
 from service.packing import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall
-from toolpath.plan import Plan
+from toolpath.planning.job_plan import Plan
 from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 from verify.model import Finding, FindingKind
 from zones.lattice import Lattice

@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
-from toolpath.finish import Finish
 from toolpath.lines import Line
 from toolpath.passes.pass_family import Target
-from toolpath.plan import AGAIN_SHARE, plan_job
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
+from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
+from toolpath.planning.zone_finishing import Finish
 from toolpath.stock import StockMap
 from toolpath.strategies.layers import EVEN
 from toolpath.walked import OVERLAP, Depths, Walked

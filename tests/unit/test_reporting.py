@@ -9,7 +9,7 @@ import pytest
 
 from service import reporting
 from tests.synthetic_plan import BALL, step
-from toolpath.finish import ZonePlan
+from toolpath.planning.zone_finishing import ZonePlan
 from toolpath.workingsteps import Motion, Trajectory
 
 

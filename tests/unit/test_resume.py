@@ -21,8 +21,8 @@ from service.resume import Resumed
 from service.sides import Side
 from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
+from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock import StockMap, StockNow
 from verify.model import NcProgram, Proof, Spent
 from zones.lattice import Lattice

@@ -8,12 +8,12 @@ import shapely
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, low_walls, plan_part
-from toolpath.finish import Finish
 from toolpath.five_axis.oriented_motion import LOADED, Surroundings, free_parts, in_turn
 from toolpath.five_axis.oriented_piece import Piece
 from toolpath.kernels.skins import near
 from toolpath.passes.pass_family import Target
 from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.planning.zone_finishing import Finish
 from toolpath.residual import ResidualMap
 from toolpath.skins import Skins, behind
 from toolpath.stock import StockMap

@@ -19,9 +19,9 @@ from service.packing import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.test_isoparametric_strategy import bowl
 from toolpath.passes.pass_family import Target
-from toolpath.plan import Plan, plan_job
 from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
 from toolpath.plan_settings import CutData
+from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock import StockMap
 from zones.reach.access_view import access_rotation
 

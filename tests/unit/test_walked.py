@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
-from toolpath import finish
 from toolpath.counterexamples import NONE
-from toolpath.finish import Finish, _Strategy
 from toolpath.lines import Line, true_runs
+from toolpath.planning import zone_finishing
+from toolpath.planning.zone_finishing import Finish, _Strategy
 from toolpath.residual import ResidualMap
 from toolpath.walked import OVERLAP, Depths, Walked, still_to_walk
 from toolpath.workingsteps import Motion
@@ -71,7 +71,7 @@ def test_a_copy_is_added_to_on_its_own_until_it_is_taken_over():
 
 def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkeypatch):
     """Short tools in tall blocks, whose lines are cut and topped: what the plan measured, from its own cuts again."""
-    import toolpath.plan as planner
+    import toolpath.planning.job_plan as planner
 
     finishes = []
 
@@ -130,7 +130,7 @@ def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
 def test_of_a_layer_over_a_line_only_what_was_not_walked_before_is_walked(monkeypatch):
     """Turns of a spiral along one border have layers that share a stretch: seed 103 ran ten moves twice."""
     lower, layer = line(*range(31)), Line(line(*range(31)).points + [0.0, 0.0, 0.2], False)
-    monkeypatch.setattr(finish.zigzag, "skimmed", lambda *_: [layer, lower])
+    monkeypatch.setattr(zone_finishing.zigzag, "skimmed", lambda *_: [layer, lower])
     added = []
 
     class Stub(Finish):

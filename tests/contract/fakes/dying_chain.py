@@ -11,8 +11,8 @@ import signal
 import service.chain as chain
 import service.resume as resume
 from service.chain import verify_program, zones_only  # noqa: F401
-from toolpath.plan import plan_job
 from toolpath.plan_checkpoint import Keeper
+from toolpath.planning.job_plan import plan_job
 
 PROVE = chain.prove
 ACTS = 3

@@ -1,6 +1,6 @@
 """From zones to workingsteps: layers, then the finish of every zone, tool by tool, measured as it goes.
 
-Where stock was in the way of a finish (``toolpath.finish``) that is gone since, the zone gets another workingstep for
+Where stock was in the way of a finish (``toolpath.planning.zone_finishing``) that is gone since, the zone gets another workingstep for
 what it lacks: after the other zones of its tool, and, where more than the scallop is left, after the last tool.
 """
 
@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.bands import largest_corner
 from toolpath.clearing import Clearing
 from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.feeds.feed_scheduling import Pace
-from toolpath.finish import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.passes.contours import dilated
 from toolpath.passes.pass_family import Target
@@ -27,6 +25,8 @@ from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.plan_settings import CutData, PlanSettings
+from toolpath.planning.depth_bands import largest_corner
+from toolpath.planning.zone_finishing import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.stock import SURE_RIM, StockMap
 from toolpath.strategies import layers
 from toolpath.tool_deflection import effective_diameter
