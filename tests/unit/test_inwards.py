@@ -9,8 +9,8 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, field_of, joined, tool
-from toolpath.inwards import DISC, Inwards
 from toolpath.kernels.march import march, spread
+from toolpath.roughing.inward_fronts import DISC, Inwards
 from toolpath.stock import StockMap
 
 

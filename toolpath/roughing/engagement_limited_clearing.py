@@ -1,6 +1,6 @@
 """A level of stock taken off from the air inwards, so that no more than a given part of the cutter is in it.
 
-Borders of what is gone (``toolpath.inwards``) are walked one after the other; each takes a strip of what the one before
+Borders of what is gone (``toolpath.roughing.inward_fronts``) are walked one after the other; each takes a strip of what the one before
 left. They begin along one wall and end along the other, so the tool never goes straight ahead into stock. Where a line
 would put too much of the cutter into it, lines between are walked first. A line begins where the one before began, or
 aslant where that comes back to its beginning; between two the tool goes back in air. Places no way leads to from the
@@ -21,11 +21,11 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.engaged import LOOK, SKIN_SHARE, SURE, over_limit
-from toolpath.inwards import NARROW, Inwards
 from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.linking.linker import Linker
 from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.passes.contours import moves_free
+from toolpath.roughing.inward_fronts import NARROW, Inwards
 
 FINER = 4  # times the distance between lines is halved where too much of the cutter is in stock
 ASLANT = 2.0  # distances between lines: how far off a line begins on the one before

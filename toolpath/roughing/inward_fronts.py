@@ -7,7 +7,7 @@ Notation
 
 Borders of {when < t} move on by no more than the growth of t along the ways, as in trochoidal milling: in a channel
 they are arcs from wall to wall, not lines along it. ``D`` solves |grad D| = 1 on the lattice (``kernels.march``), to
-first order; lines between are put where that is too coarse (``toolpath.clearing``).
+first order; lines between are put where that is too coarse (``toolpath.roughing.engagement_limited_clearing``).
 """
 
 from __future__ import annotations
