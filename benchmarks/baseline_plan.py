@@ -22,9 +22,9 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import Finish, motions_of, step_of, turned
-from toolpath.stock import StockMap
+from toolpath.stock.cut_history import Depths, Walked
+from toolpath.stock.stock_map import StockMap
 from toolpath.strategies import layers
-from toolpath.walked import Depths, Walked
 from toolpath.workingsteps import Workingstep
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea

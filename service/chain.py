@@ -62,7 +62,7 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import Keeper
 from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from toolpath.tool_deflection import effective_diameter
 from verify.dialects import dialect_of
 from verify.likeness import carried

@@ -23,7 +23,7 @@ from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.plan_checkpoint import FinishNow, LayersNow, PlanNow, ToolNow, Ways
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
-from toolpath.stock import StockNow
+from toolpath.stock.stock_map import StockNow
 from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof

@@ -40,7 +40,7 @@ from toolpath.counterexamples import Counterexamples
 from toolpath.passes.pass_family import Target
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
 from toolpath.planning.job_plan import Plan
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from verify.model import NcProgram, Proof
 from zones.reach.access_view import View
 

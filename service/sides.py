@@ -13,7 +13,7 @@ from geometry.sampling import SurfaceSamples
 from output.workplan import Workplan
 from schemas.machine import DIALECT_ENDINGS
 from toolpath.planning.job_plan import Plan
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from verify.model import NcProgram, Proof
 from zones.reach.access_view import View, turned_samples
 

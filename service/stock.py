@@ -15,7 +15,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from schemas.setup import Setup
 from service.convert import no_stock_file
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from zones.reach.access_view import View, turned
 
 

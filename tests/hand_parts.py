@@ -19,7 +19,7 @@ from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import Motion
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces

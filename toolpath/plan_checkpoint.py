@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.stock import StockNow
+from toolpath.stock.stock_map import StockNow
 from toolpath.workingsteps import Workingstep
 
 T = TypeVar("T")

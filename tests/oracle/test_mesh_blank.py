@@ -9,7 +9,7 @@ from geometry.errors import VerificationError
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, terraces
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from verify.blank import stands_over_air, stock_bounds, stock_on_normals
 from verify.field import stock_field
 from verify.model import ProofSetup

@@ -7,7 +7,7 @@ import pytest
 
 from tests.hand_parts import ball, tool
 from tests.plan_checks import dense
-from toolpath.residual import UNTOUCHED, ResidualMap
+from toolpath.stock.residual_map import UNTOUCHED, ResidualMap
 
 SPACING = 0.004
 

@@ -8,8 +8,8 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.five_axis.oriented_motion import CELLS, loaded
-from toolpath.shell import shells
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
+from toolpath.stock.tool_shell import shells
 from zones.reach.assembly import Clearances, Disc
 
 STEP, DEEP = 0.1, 0.2

@@ -9,13 +9,13 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, box_mesh, field_of, joined, tool
-from toolpath.engaged import CLOSE, LOOK, angles
 from toolpath.lines import dense
 from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import Motions
 from toolpath.roughing.engagement_limited_clearing import Clearing
-from toolpath.stock import StockMap
-from toolpath.walked import Depths
+from toolpath.stock.cut_history import Depths
+from toolpath.stock.engagement import CLOSE, LOOK, angles
+from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import Motion
 
 ALLOWANCE, Z = 0.2, 5.0

@@ -10,10 +10,10 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
-from toolpath.engaged import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within
 from toolpath.kernels.engaged import SECTORS, engaged
 from toolpath.lines import Line, dense
-from toolpath.stock import StockMap
+from toolpath.stock.engagement import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within
+from toolpath.stock.stock_map import StockMap
 
 SECTOR = math.pi / SECTORS
 

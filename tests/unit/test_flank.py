@@ -10,7 +10,7 @@ from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
 from toolpath.five_axis.flank_milling import Wall, Wanted, bands
 from toolpath.five_axis.oriented_piece import Piece, thinned_poses
-from toolpath.residual import leaning_depths
+from toolpath.stock.residual_map import leaning_depths
 
 ASKED = Wanted(0.02, 0.002, 0.002)
 LENGTH, HEIGHT = 40.0, 8.0

@@ -11,7 +11,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, field_of, joined, tool
 from toolpath.kernels.march import march, spread
 from toolpath.roughing.inward_fronts import DISC, Inwards
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 
 
 def far_from(seed, inside, step):

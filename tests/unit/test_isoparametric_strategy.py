@@ -15,9 +15,9 @@ from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import Pattern
 from toolpath.planning.zone_finishing import Finish, _Strategy
+from toolpath.stock.cut_history import Depths, Walked
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import course, laid
-from toolpath.walked import Depths, Walked
 from verify.moves import Moves
 from verify.removal import residual_on_normals
 from zones.lattice import Lattice

@@ -17,8 +17,8 @@ from toolpath.linking.lead_arcs import SIZES, arc_onto, radii
 from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import Motions
 from toolpath.plan_settings import CutData, PlanSettings, Turning
-from toolpath.stock import StockMap
-from toolpath.walked import Depths
+from toolpath.stock.cut_history import Depths
+from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances
 

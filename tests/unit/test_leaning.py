@@ -10,7 +10,7 @@ from tests.hand_parts import ball, box_mesh, tool
 from toolpath.five_axis.oriented_motion import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
 from toolpath.five_axis.oriented_piece import Piece
 from toolpath.plan_settings import Turning
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from zones.reach.assembly import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0

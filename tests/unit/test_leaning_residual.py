@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
 from toolpath.kernels.leaning import TOLERANCE
-from toolpath.residual import UNTOUCHED, ResidualMap, leaning_depths
+from toolpath.stock.residual_map import UNTOUCHED, ResidualMap, leaning_depths
 
 BODIES = [ball(3.0), ball(6.0), tool(6.0, 1.0), tool(4.0, 0.0)]
 MARGIN = 0.5

@@ -21,7 +21,7 @@ from toolpath.five_axis.oriented_piece import Piece
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Leaned
-from toolpath.stock import SKIN, StockMap
+from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.strategies import led
 from toolpath.workingsteps import Motion, Trajectory
 from zones.machinable_area import Form

@@ -16,8 +16,8 @@ from toolpath.lines import Line, dense
 from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import OVER, Motions
 from toolpath.passes.pass_order import nearest_order
-from toolpath.stock import SKIN, StockMap
-from toolpath.walked import Depths
+from toolpath.stock.cut_history import Depths
+from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.workingsteps import Motion
 
 TOP = 4.0

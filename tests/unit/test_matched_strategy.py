@@ -16,7 +16,7 @@ from toolpath.five_axis.oriented_piece import Piece
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, PlanSettings, Turning
-from toolpath.stock import SKIN, StockMap
+from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.strategies.matched import matched, suits
 from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances

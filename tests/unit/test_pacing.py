@@ -12,9 +12,9 @@ from geometry.mesh_queries.bvh import TriangleTree
 from service.chain import cut_table
 from service.convert import parse_setup, tool_bodies
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.engaged import SKIN_SHARE, angles
 from toolpath.feeds.feed_scheduling import ANGLE, GUARD, STEP, Pace, paced
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock.engagement import SKIN_SHARE, angles
+from toolpath.stock.stock_map import SURE_RIM, StockMap
 
 SLOT, FULL, AIR, LAYER = 100.0, 400.0, 3000.0, 1.0
 MISSED = 2.0 * math.acos(1.0 - SURE_RIM * 0.1 / 2.0)  # what a row of nodes may leave out, on a radius of 2

@@ -16,9 +16,9 @@ from toolpath.passes.pass_family import Target
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
 from toolpath.planning.zone_finishing import Finish
-from toolpath.stock import StockMap
+from toolpath.stock.cut_history import OVERLAP, Depths, Walked
+from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.layers import EVEN
-from toolpath.walked import OVERLAP, Depths, Walked
 from toolpath.workingsteps import Motion
 from zones.machinable_area import Form
 

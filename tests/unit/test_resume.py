@@ -23,7 +23,7 @@ from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
 from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock import StockMap, StockNow
+from toolpath.stock.stock_map import StockMap, StockNow
 from verify.model import NcProgram, Proof, Spent
 from zones.lattice import Lattice
 

@@ -14,9 +14,9 @@ from toolpath.kernels.skins import near
 from toolpath.passes.pass_family import Target
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.planning.zone_finishing import Finish
-from toolpath.residual import ResidualMap
-from toolpath.skins import Skins, behind
-from toolpath.stock import StockMap
+from toolpath.stock.residual_map import ResidualMap
+from toolpath.stock.stock_map import StockMap
+from toolpath.stock.wall_skin import Skins, behind
 from zones.machinable_area import Form
 from zones.reach.assembly import Clearances, Disc
 

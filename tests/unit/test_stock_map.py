@@ -12,7 +12,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL
-from toolpath.stock import SKIN, StockMap
+from toolpath.stock.stock_map import SKIN, StockMap
 from zones.reach.access_view import access_rotation
 from zones.reach.assembly import Disc
 

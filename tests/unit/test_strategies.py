@@ -14,7 +14,7 @@ from geometry.mesh_queries.drop import drop_tips
 from tests.hand_parts import SURFACES, ball, box_mesh, corner, field_of, samples_of, slope_field, terraces, tool, walls
 from tests.plan_checks import dense
 from toolpath.lines import Line
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from toolpath.strategies import floor, layers, spot, zigzag, zlevel
 from zones.reach.tip_field import LEVEL_TOLERANCE, touchable
 

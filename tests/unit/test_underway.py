@@ -22,7 +22,7 @@ from toolpath.passes.pass_family import Target
 from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
 from toolpath.plan_settings import CutData
 from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from zones.reach.access_view import access_rotation
 
 Stock = Callable[[Case], StockMap]

@@ -12,8 +12,8 @@ from toolpath.counterexamples import NONE
 from toolpath.lines import Line, true_runs
 from toolpath.planning import zone_finishing
 from toolpath.planning.zone_finishing import Finish, _Strategy
-from toolpath.residual import ResidualMap
-from toolpath.walked import OVERLAP, Depths, Walked, still_to_walk
+from toolpath.stock.cut_history import OVERLAP, Depths, Walked, still_to_walk
+from toolpath.stock.residual_map import ResidualMap
 from toolpath.workingsteps import Motion
 from verify.repeats import WINDOW
 from zones.lattice import Lattice

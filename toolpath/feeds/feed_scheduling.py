@@ -17,9 +17,9 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.engaged import SKIN_SHARE, angles
 from toolpath.lines import stretch
-from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
+from toolpath.stock.engagement import SKIN_SHARE, angles
+from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 
 GUARD = 0.1  # of the diameter, and two lattice steps at least, before and after stock: as slow as in it
 ASKED = 4  # places on that way

@@ -37,7 +37,7 @@ from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, 
 from toolpath.lines import true_runs
 from toolpath.passes.isoparametric_passes import Laid
 from toolpath.poses import Blocked
-from toolpath.residual import leaning_depths
+from toolpath.stock.residual_map import leaning_depths
 
 STATIONS = 65  # along a wall, at which s is looked for
 ALONG, UP = 257, 33  # places of the wall that feet are looked for among, each way

@@ -23,9 +23,9 @@ from toolpath.lines import dense, true_runs
 from toolpath.linking.lead_arcs import arc_onto, radii
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.poses import Blocked, places_along
-from toolpath.shell import shells
-from toolpath.skins import Skins
-from toolpath.stock import SKIN, StockMap
+from toolpath.stock.stock_map import SKIN, StockMap
+from toolpath.stock.tool_shell import shells
+from toolpath.stock.wall_skin import Skins
 from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.assembly import Clearances, Disc
 
@@ -183,7 +183,7 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
 
     tips, axes : (n, 3) float64, mm and unit
 
-    Bodies are places on their shells (``toolpath.shell``); stock is what the nearest node shows, half a cell aside.
+    Bodies are places on their shells (``toolpath.stock.tool_shell``); stock is what the nearest node shows, half a cell aside.
     Less than 1.5 steps deep the cutting part is not asked: nodes in the wall are there. Where that is more than twice
     ``thick`` the lattice is too coarse to tell, and every pose counts as loaded.
     """

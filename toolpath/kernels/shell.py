@@ -59,7 +59,7 @@ def stands_in(heights, begins, ny, nx, x0, y0, step, tips, axes, first, second, 
     """Set out[k] where the node nearest to a place of the shell at pose k is higher than the place.
 
     tips, axes    : (n, 3) float64, mm and unit; first, second : (n, 3), unit, square to them and to each other
-    places, boxes, levels : as ``toolpath.shell.Shell`` has them
+    places, boxes, levels : as ``toolpath.stock.tool_shell.Shell`` has them
     """
     stack_level, stack_box = np.empty(STACK, np.int64), np.empty(STACK, np.int64)
     top = len(levels) - 2

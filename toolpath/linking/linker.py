@@ -11,7 +11,7 @@ just fits layer by layer. Then, in this order of trying
    top is in air or just above where the tool has been, or a free place close beside it is.
 A pass with none of these is left out. One along a wall begins and ends on an arc (``toolpath.linking.lead_arcs``) where the tool is
 free on it and clear of stock at its far end, and is come to by ways 1 and 2 there. To where ways 2 and 3 begin the tool
-gets as ``toolpath.linking.rapid_travel`` says. Where the engaged angle has a limit (``toolpath.engaged``) ways in keep it, and where
+gets as ``toolpath.linking.rapid_travel`` says. Where the engaged angle has a limit (``toolpath.stock.engagement``) ways in keep it, and where
 a pass would not it is first walked in skims above that.
 """
 
@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.engaged import UNBOUNDED, skims, within
 from toolpath.feeds.feed_scheduling import Pace, paced
 from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.linking.lead_arcs import arcs_along
 from toolpath.linking.ramp_entry import RAMP_SHARE, head_of, way_down
 from toolpath.linking.rapid_travel import Motions, Travel
-from toolpath.stock import SURE_RIM, StockMap
-from toolpath.walked import Depths, still_to_walk
+from toolpath.stock.cut_history import Depths, still_to_walk
+from toolpath.stock.engagement import UNBOUNDED, skims, within
+from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 

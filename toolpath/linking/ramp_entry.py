@@ -13,7 +13,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.ramp import ease
-from toolpath.stock import SKIN
+from toolpath.stock.stock_map import SKIN
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of the same, for one move that catches up

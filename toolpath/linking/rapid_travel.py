@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter1d
 from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import GUARD
 from toolpath.lines import dense, stretch
-from toolpath.stock import AIR_TOLERANCE, SURE_RIM, StockMap
+from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.workingsteps import Motion, Trajectory
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.engaged import SKIN_SHARE, UNBOUNDED
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.passes.contours import dilated
@@ -27,10 +26,11 @@ from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
 from toolpath.planning.zone_finishing import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.roughing.engagement_limited_clearing import Clearing
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock.cut_history import Depths, Walked
+from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
+from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import layers
 from toolpath.tool_deflection import effective_diameter
-from toolpath.walked import Depths, Walked
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.engaged import UNBOUNDED
 from toolpath.five_axis.oriented_motion import TURN_S, Runs, Surroundings
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.lines import Line, thinned, true_runs
@@ -36,12 +35,13 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import FinishNow
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.poses import Blocked
-from toolpath.residual import ResidualMap
-from toolpath.skins import Skins
-from toolpath.stock import SKIN, StockMap
+from toolpath.stock.cut_history import Depths, Walked, still_to_walk
+from toolpath.stock.engagement import UNBOUNDED
+from toolpath.stock.residual_map import ResidualMap
+from toolpath.stock.stock_map import SKIN, StockMap
+from toolpath.stock.wall_skin import Skins
 from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
 from toolpath.tool_deflection import left_by_layers
-from toolpath.walked import Depths, Walked, still_to_walk
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField

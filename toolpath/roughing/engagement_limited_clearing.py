@@ -20,12 +20,12 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.engaged import LOOK, SKIN_SHARE, SURE, over_limit
 from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.linking.linker import Linker
 from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.passes.contours import moves_free
 from toolpath.roughing.inward_fronts import NARROW, Inwards
+from toolpath.stock.engagement import LOOK, SKIN_SHARE, SURE, over_limit
 
 FINER = 4  # times the distance between lines is halved where too much of the cutter is in stock
 ASLANT = 2.0  # distances between lines: how far off a line begins on the one before

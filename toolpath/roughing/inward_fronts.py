@@ -24,7 +24,7 @@ from geometry.mesh import F64
 from toolpath.kernels.march import march, spread
 from toolpath.lines import Line
 from toolpath.passes.contours import dilated, lines_at
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from zones.reach.tip_field import TipField
 
 AROUND = 2.0  # mm, and two diameters: how far round an area the tool looks for air

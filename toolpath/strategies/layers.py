@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from toolpath.lines import Line, pieces_where
 from toolpath.passes.contours import contours, dilated, rings
-from toolpath.stock import SURE_RIM, StockMap
+from toolpath.stock.stock_map import SURE_RIM, StockMap
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass

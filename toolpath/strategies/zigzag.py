@@ -17,7 +17,7 @@ from toolpath.passes.feed_direction import best_direction
 from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target
 from toolpath.passes.side_step import lay_out
 from toolpath.plan_settings import Pattern
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach.tip_field import TipField
 

@@ -17,7 +17,7 @@ from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.engaged import engaged
 from toolpath.lines import Line, dense, pieces_where
-from toolpath.stock import StockMap
+from toolpath.stock.stock_map import StockMap
 
 UNBOUNDED = math.pi  # rad: the whole front half may be in stock
 SKIN_SHARE = 0.05  # of the radius: stock that thin over the cutter is no engagement

@@ -21,7 +21,7 @@ from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.poses import between, places_along
-from toolpath.shell import Shell
+from toolpath.stock.tool_shell import Shell
 from zones.lattice import Lattice
 from zones.reach.assembly import Disc
 
