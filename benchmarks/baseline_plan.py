@@ -24,7 +24,7 @@ from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import Finish, motions_of, step_of, turned
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.stock_map import StockMap
-from toolpath.strategies import layers
+from toolpath.strategies import depth_layers
 from toolpath.workingsteps import Workingstep
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
@@ -82,7 +82,7 @@ def _levels(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     linker = Retracting(field, stock, motions_of(cut, settings), depths, settings.found)
     step, allowance = 0.85 * cut.step_down, max(0.1 * cut.step_down, 1.5 * lat.step)
     bottom, top = float(tips[:, 2].min()) + allowance, stock.highest
-    heights = layers.layer_heights(top, bottom, step) if top > bottom else []
+    heights = depth_layers.layer_heights(top, bottom, step) if top > bottom else []
     for k, z in enumerate(heights):
         area = np.zeros((lat.ny, lat.nx), np.bool_)
         for low in heights[k:]:  # where the tool, or what stands over it, comes when it is deeper
@@ -91,11 +91,11 @@ def _levels(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
                 wide = 0.5 * tool.radius if disc is None else field.disc_radius(disc, 0.0)
                 if here.any() and (disc is None or low + disc.height < z + step):
                     area |= dilated(here, max(wide / lat.step, 1.5))
-        for lines in layers.layer(field, stock, z, area, allowance, 0.8 * tool.radius):
+        for lines in depth_layers.layer(field, stock, z, area, allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), 0.1 * lat.step)
         unseen = np.zeros((lat.ny, lat.nx), np.bool_)
-        for line in nearest_order(layers.rim(field, stock, z, area, unseen, allowance,
+        for line in nearest_order(depth_layers.rim(field, stock, z, area, unseen, allowance,
                                              0.5 * settings.chordal_tolerance, False), linker.at, False):
             linker.add(turned(line, settings))
     if not linker.passes:

@@ -21,7 +21,7 @@ from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.linking.ramp_entry import LEAST_RUN
 from toolpath.plan_settings import Leaned
 from toolpath.planning.zone_finishing import LEANING, ZonePlan, upright_way
-from toolpath.strategies import led
+from toolpath.strategies import inclined_axis
 from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Motion, Workingstep
 from verify.model import Support
@@ -110,10 +110,10 @@ def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Wor
     out = []
     for z in zones:
         mine = [s for s in steps if s.zone == z.zone.id]
-        if led.asked(asked, z.zone.form, z.zone.tool) is None or not mine:  # where layers leave nothing there are none
+        if inclined_axis.asked(asked, z.zone.form, z.zone.tool) is None or not mine:  # where layers leave nothing there are none
             continue
         way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is Motion.CUT)
-        told = [str(r["reason"]) for r in z.rejected if r["strategy"] == led.NAME]
+        told = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]
         if z.strategy not in LEANING:
             found, without = "stays upright", "it is finished in bands, or no pass lies on it"
         elif way > MOSTLY * whole:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh_queries.drop import drop_tips
 from tests.hand_parts import box_mesh, field_of, joined, tool
 from tests.plan_checks import dense
-from toolpath.strategies import floor
+from toolpath.strategies import planar_floor
 from zones.reach.tip_field import INSIDE, touchable
 
 LIFT, CHORD = 0.002, 0.002
@@ -97,8 +97,8 @@ def test_level_passes_touch_all_that_is_in_reach(opening, turn, body):
     flat = body.radius - body.corner_radius
     left = np.arange(len(points))
     counts = []
-    for finer in range(floor.MOST_FINER + 1):
-        lines = [line for group in floor.planes(field, tips[left], CHORD, finer) for line in group]
+    for finer in range(planar_floor.MOST_FINER + 1):
+        lines = [line for group in planar_floor.planes(field, tips[left], CHORD, finer) for line in group]
         walked = np.vstack([dense(line.points, SPACING) for line in lines])
         assert np.ptp(walked[:, 2]) == 0.0  # level, whatever stands beside it
         low = drop_tips(field.tree, walked[:, :2], body.radius - 2 * INSIDE, max(body.corner_radius - 2 * INSIDE, 0.0))

@@ -22,7 +22,7 @@ from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Leaned
 from toolpath.stock.stock_map import SKIN, StockMap
-from toolpath.strategies import led
+from toolpath.strategies import inclined_axis
 from toolpath.workingsteps import Motion, Trajectory
 from zones.machinable_area import Form
 from zones.reach.assembly import Clearances
@@ -39,9 +39,9 @@ def found(leaned=TILTED, mesh=HOLLOW, allowance=0.0, turning=FREE, body=BALL, ma
     target = Target(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
     around = Surroundings(enters(tree, body, clear, allowance - LIFT), turning,
                           StockMap.around(tree, HOLLOW.bounds, margin, 0.25), (), clear)
-    wider = replace(clear, neck=clear.neck + led.WARY, shank=clear.shank + led.WARY)
+    wider = replace(clear, neck=clear.neck + inclined_axis.WARY, shank=clear.shank + inclined_axis.WARY)
     cut = CutData(10_000, FEED, 200, 3000, 3.6)
-    return led.led([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, SimpleNamespace(tool=body, allowance=allowance),
+    return inclined_axis.led([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, SimpleNamespace(tool=body, allowance=allowance),
                    cut, settings_of(turning), around, enters(tree, body, wider, allowance - LIFT), leaned), around
 
 
@@ -114,7 +114,7 @@ def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
     tree = TriangleTree(mesh)
     around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
     faces = [TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)]
-    runs = led.led(faces, Target(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
+    runs = inclined_axis.led(faces, Target(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
                    CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around, enters(tree, BALL, clear),
                    Leaned(0.0, np.radians(65.0), np.radians(65.0)))
     tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
@@ -160,7 +160,7 @@ def test_it_goes_round_a_post_and_never_into_it(past_a_post):
     lean = np.degrees(np.arccos(np.clip((axes * normals).sum(axis=1), -1.0, 1.0)))
     assert np.median(lean) == pytest.approx(15.0, abs=0.1)
     assert lean.max() > 17.0  # somewhere another axis than the one wanted is the nearest that is free
-    assert lean.max() < 15.0 + np.degrees(led.LIMITS.cone) + 1.0
+    assert lean.max() < 15.0 + np.degrees(inclined_axis.LIMITS.cone) + 1.0
 
 
 def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monkeypatch):
@@ -170,7 +170,7 @@ def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monk
         outside = np.maximum(np.abs(x - 6.5), np.abs(y - 6.5)).ravel() > 2.5 + BALL.radius
         return int((measured(SURFACE, BALL, cuts(runs))[outside] > SCALLOP).sum())
 
-    monkeypatch.setattr(led, "LIMITS", Limits(1e-4, led.LIMITS.per_mm))
+    monkeypatch.setattr(inclined_axis, "LIMITS", Limits(1e-4, inclined_axis.LIMITS.per_mm))
     assert uncut(past_a_post[0]) < 0.5 * uncut(found(mesh=POST)[0])
 
 
@@ -181,17 +181,17 @@ def test_what_the_machine_cannot_take_is_left_with_the_reason():
 
 def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
     asked = Leaned(0.1, 0.2, walls=1.0)
-    assert led.asked(None, Form.SHALLOW, BALL) is None
-    assert led.asked(asked, Form.LEVEL, BALL) is None and led.asked(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
-    assert led.asked(asked, Form.SHALLOW, BALL) == asked
-    assert led.asked(asked, Form.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
-    assert led.asked(TILTED, Form.STEEP, BALL) is None
+    assert inclined_axis.asked(None, Form.SHALLOW, BALL) is None
+    assert inclined_axis.asked(asked, Form.LEVEL, BALL) is None and inclined_axis.asked(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
+    assert inclined_axis.asked(asked, Form.SHALLOW, BALL) == asked
+    assert inclined_axis.asked(asked, Form.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
+    assert inclined_axis.asked(TILTED, Form.STEEP, BALL) is None
 
 
 def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
     def zone(name, form, strategy, *reasons, body=BALL):
         return SimpleNamespace(zone=SimpleNamespace(id=name, form=form, tool=body), strategy=strategy, step="S01",
-                               rejected=tuple({"strategy": led.NAME, "reason": r} for r in reasons))
+                               rejected=tuple({"strategy": inclined_axis.NAME, "reason": r} for r in reasons))
 
     def step(name, strategy, way=30.0):
         points = np.array([[0.0, 0, 0], [way, 0, 0], [way, 0, 9.0]])

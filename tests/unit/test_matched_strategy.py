@@ -17,7 +17,7 @@ from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, PlanSettings, Turning
 from toolpath.stock.stock_map import SKIN, StockMap
-from toolpath.strategies.matched import matched, suits
+from toolpath.strategies.curvature_matched import matched, suits
 from toolpath.workingsteps import Motion
 from zones.reach.assembly import Clearances
 

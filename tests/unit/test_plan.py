@@ -18,7 +18,7 @@ from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
 from toolpath.planning.zone_finishing import Finish
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked
 from toolpath.stock.stock_map import StockMap
-from toolpath.strategies.layers import EVEN
+from toolpath.strategies.depth_layers import EVEN
 from toolpath.workingsteps import Motion
 from zones.machinable_area import Form
 

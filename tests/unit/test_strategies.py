@@ -15,7 +15,7 @@ from tests.hand_parts import SURFACES, ball, box_mesh, corner, field_of, samples
 from tests.plan_checks import dense
 from toolpath.lines import Line
 from toolpath.stock.stock_map import StockMap
-from toolpath.strategies import floor, layers, spot, zigzag, zlevel
+from toolpath.strategies import depth_layers, planar_floor, touch_points, waterline, zigzag
 from zones.reach.tip_field import LEVEL_TOLERANCE, touchable
 
 CHORD = 0.003
@@ -80,7 +80,7 @@ def cusp_on_wall(body, nz, dz):
                                           (tool(4.0, 0.0), 0.05), (tool(4.0, 0.0), 0.1), (tool(4.0, 0.02), 0.04)])
 def test_levels_leave_the_cusp_asked_for_and_not_much_less(body, nz):
     cusp = 0.012
-    step = zlevel.level_step(body, leaning(nz, 50), cusp, 9.0)
+    step = waterline.level_step(body, leaning(nz, 50), cusp, 9.0)
     left = cusp_on_wall(body, nz, step)
     assert left <= cusp * (1.0 + cusp / max(body.corner_radius, 1.0)) + 1e-4
     assert left >= 0.9 * cusp
@@ -89,25 +89,25 @@ def test_levels_leave_the_cusp_asked_for_and_not_much_less(body, nz):
 def test_level_steps_by_corner_by_flank_and_their_limits():
     r, cusp = 2.0, 0.01
     by_corner = math.sqrt(8 * cusp * r * (1 - 0.36))
-    assert zlevel.level_step(ball(2 * r), leaning(0.6), cusp, 9.0) == pytest.approx(by_corner)
-    assert zlevel.level_step(ball(2 * r), leaning(-0.6), cusp, 9.0) == pytest.approx(by_corner)
-    assert zlevel.level_step(tool(4.0, 0.0), leaning(0.02), cusp, 9.0) == pytest.approx(0.5)
+    assert waterline.level_step(ball(2 * r), leaning(0.6), cusp, 9.0) == pytest.approx(by_corner)
+    assert waterline.level_step(ball(2 * r), leaning(-0.6), cusp, 9.0) == pytest.approx(by_corner)
+    assert waterline.level_step(tool(4.0, 0.0), leaning(0.02), cusp, 9.0) == pytest.approx(0.5)
     # an upright wall is left clean by the flank: only the step down limits it
-    assert zlevel.level_step(ball(2 * r), leaning(0.0), cusp, 1.3) == 1.3
-    assert zlevel.level_step(tool(4.0, 0.0), leaning(0.9), cusp, 9.0) == zlevel.LEAST_STEP
-    assert zlevel.level_step(ball(4.0), np.zeros((0, 3)), cusp, 0.7) == 0.7
+    assert waterline.level_step(ball(2 * r), leaning(0.0), cusp, 1.3) == 1.3
+    assert waterline.level_step(tool(4.0, 0.0), leaning(0.9), cusp, 9.0) == waterline.LEAST_STEP
+    assert waterline.level_step(ball(4.0), np.zeros((0, 3)), cusp, 0.7) == 0.7
     # what a tenth of the area needs is kept, what a fiftieth needs is left to measuring
     flat_part, steep_part = leaning(0.95, 10), leaning(0.1, 90)
-    assert zlevel.level_step(ball(4.0), np.vstack([flat_part, steep_part]), cusp, 9.0) == pytest.approx(
+    assert waterline.level_step(ball(4.0), np.vstack([flat_part, steep_part]), cusp, 9.0) == pytest.approx(
         math.sqrt(8 * cusp * r * (1 - 0.95**2)))
-    assert zlevel.level_step(ball(4.0), np.vstack([flat_part[:2], steep_part]), cusp, 9.0) == pytest.approx(
+    assert waterline.level_step(ball(4.0), np.vstack([flat_part[:2], steep_part]), cusp, 9.0) == pytest.approx(
         math.sqrt(8 * cusp * r * 0.99))
 
 
 @pytest.mark.parametrize(("top", "bottom", "step"),
                          [(5.0, 1.0, 0.3), (5.0, 1.0, 0.5), (2.0, 1.9, 4.0), (3.0, 3.0, 1.0)])
 def test_heights_hold_both_ends_and_go_down_by_no_more_than_a_step(top, bottom, step):
-    z = zlevel.heights(top, bottom, step)
+    z = waterline.heights(top, bottom, step)
     assert z[0] == top and z[-1] == bottom
     drop = -np.diff(z)
     assert (drop > 0).all() and (drop <= step + 1e-9).all()
@@ -118,13 +118,13 @@ def test_heights_hold_both_ends_and_go_down_by_no_more_than_a_step(top, bottom, 
 def test_the_lowest_of_groups_serve_every_height_with_the_fewest_levels(seed):
     rng = np.random.default_rng(seed)
     z, window = rng.choice([rng.uniform(0, 3, 40), np.round(rng.uniform(0, 3, 40), 1)]), 0.25
-    levels = zlevel.lowest_of_groups(z, window)
+    levels = waterline.lowest_of_groups(z, window)
     assert (np.diff(levels) < 0).all() and np.isin(levels, z).all()
     above = z[:, None] - levels
     assert ((above >= 0) & (above <= window)).any(axis=1).all()
     # no two of them could be one: heights more than a window apart need a level each
     assert (-np.diff(levels) > window).all()
-    assert len(zlevel.lowest_of_groups(np.zeros(0), 1.0)) == 0
+    assert len(waterline.lowest_of_groups(np.zeros(0), 1.0)) == 0
 
 
 def on_wall_sides(s):
@@ -136,13 +136,13 @@ def test_waterlines_touch_the_walls_and_have_them_on_the_right(body):
     mesh = walls()
     field = field_of(mesh, body)
     points, tips = reached(field, mesh, on_wall_sides)
-    levels = zlevel.heights(8.0, 3.5, 1.5)
-    got = zlevel.waterlines(field, tips, levels, 0.8, CHORD)
+    levels = waterline.heights(8.0, 3.5, 1.5)
+    got = waterline.waterlines(field, tips, levels, 0.8, CHORD)
     assert len(got) == len(levels)
     for z, lines in zip(levels, got, strict=True):
         p = np.vstack([dense(line.points, 0.03) for line in lines])
         assert np.ptp(p[:, 2]) == 0.0
-        assert p[0, 2] == pytest.approx(z - (zlevel.SHARP_DIP if body.corner_radius == 0 else 0.0), abs=1e-12)
+        assert p[0, 2] == pytest.approx(z - (waterline.SHARP_DIP if body.corner_radius == 0 else 0.0), abs=1e-12)
         assert np.abs(from_walls(p[:, :2]) - body.radius).max() <= CHORD + 1e-3 * field.lattice.step
         # every sample the level serves has the line over its tip
         served = np.abs(tips[:, 2] - z) <= 0.8
@@ -161,7 +161,7 @@ def test_waterlines_keep_to_the_area_and_leave_levels_without_samples_empty():
     mesh, body = walls(), ball(3.0)
     field = field_of(mesh, body)
     _, tips = reached(field, mesh, lambda s: on_wall_sides(s) & (s.points[:, 0] < 5.001) & (s.points[:, 2] > 7.0))
-    got = zlevel.waterlines(field, tips, np.array([8.0, 6.0, 3.5]), 0.5, CHORD)
+    got = waterline.waterlines(field, tips, np.array([8.0, 6.0, 3.5]), 0.5, CHORD)
     assert got[2] == [] and len(got[0]) == len(got[1]) == 1
     for (line,) in got[:2]:
         assert not line.closed and line.points[:, 0].max() < 6.0
@@ -175,8 +175,8 @@ def test_waterlines_lie_on_the_offset_of_a_leaning_wall(body):
     normal = np.array([-2.0, 0.0, 1.0]) / math.sqrt(5.0)
     _, tips = reached(field, mesh, lambda s: (s.face == 2) & (np.abs(s.points[:, 1]) < 2.0)
                       & (np.abs(s.points[:, 0]) < 1.0))
-    levels = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), 0.7)
-    for (line,) in zlevel.waterlines(field, tips, levels, 0.7, CHORD):
+    levels = waterline.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), 0.7)
+    for (line,) in waterline.waterlines(field, tips, levels, 0.7, CHORD):
         p = dense(line.points, 0.05)
         p = p[np.abs(p[:, 1]) < 2.0]
         assert len(p) > 50
@@ -298,9 +298,9 @@ def test_beside_a_wall_only_what_is_under_the_end_of_a_pass_that_goes_down_is_sk
 
 def test_plane_heights_are_grouped_and_go_down():
     z = np.array([3.0, 3.0002, 1.0, 2.9999, 1.0004, 5.0])
-    got = floor.plane_heights(np.column_stack([np.zeros((6, 2)), z]))
+    got = planar_floor.plane_heights(np.column_stack([np.zeros((6, 2)), z]))
     assert got == pytest.approx([5.0, 3.0, 1.0002])
-    assert floor.plane_heights(np.zeros((0, 3))) == []
+    assert planar_floor.plane_heights(np.zeros((0, 3))) == []
 
 
 @pytest.mark.parametrize("body", [tool(4.0, 0.0), tool(4.0, 0.5), tool(6.0, 0.0)],
@@ -310,8 +310,8 @@ def test_planes_cover_a_level_area_but_for_islands_in_sharp_turns(shape, body):
     mesh = shape()
     field = field_of(mesh, body)
     points, tips = reached(field, mesh, lambda s: s.normals[:, 2] > 1 - 1e-6, 25.0)
-    groups = floor.planes(field, tips, CHORD)
-    heights = floor.plane_heights(tips)
+    groups = planar_floor.planes(field, tips, CHORD)
+    heights = planar_floor.plane_heights(tips)
     assert len(groups) == len(heights) == 2  # the plate and the tops of the walls
     flat = body.radius - body.corner_radius
     for z, lines in zip(heights, groups, strict=True):
@@ -332,7 +332,7 @@ def test_planes_cover_a_level_area_but_for_islands_in_sharp_turns(shape, body):
 
 @pytest.mark.parametrize(("top", "bottom", "step"), [(10.0, 3.2, 1.0), (5.0, 4.9, 1.0), (4.0, 3.0, 0.3)])
 def test_layers_end_at_the_bottom_and_are_no_deeper_than_a_step_and_a_quarter(top, bottom, step):
-    z = layers.layer_heights(top, bottom, step)
+    z = depth_layers.layer_heights(top, bottom, step)
     assert z[-1] == bottom
     drop = -np.diff([top, *z])
     assert (drop > 0).all() and (drop[:-1] <= step + 1e-9).all() and drop[-1] <= 1.25 * step + 1e-9
@@ -363,7 +363,7 @@ def rough(shape, body, z, allowance, near_net, above=0.8):
     (x0, y0), (x1, y1) = mesh.bounds[:, :2]
     lo, hi = lat.cells(np.array([[x0, y0], [x1, y1]]))
     area[lo[0]:lo[1] + 1, hi[0]:hi[1] + 1] = True
-    groups = list(layers.layer(field, stock, z, area, allowance, 0.8 * body.radius))
+    groups = list(depth_layers.layer(field, stock, z, area, allowance, 0.8 * body.radius))
     for lines in groups:
         for line in lines:
             stock.cut(line.points, body)
@@ -379,7 +379,7 @@ def test_a_layer_leaves_no_stock_above_it_but_the_allowance(shape, near_net):
     must, x, y = clear(field, z, allowance + 1.5 * field.lattice.step)
     at = stock.lattice.cells(np.column_stack([x[must & area], y[must & area]]))
     assert must[area].mean() > 0.5
-    assert (stock.top[at] > z + layers.STOCK_WORTH).mean() <= 0.002
+    assert (stock.top[at] > z + depth_layers.STOCK_WORTH).mean() <= 0.002
     # and no line comes nearer to a wall than the allowance, to a step of the lattice
     p = np.vstack([dense(line.points, 0.1) for lines in groups for line in lines])
     p = p[(drop_tips(field.tree, p[:, :2], body.radius + allowance - 1.5 * field.lattice.step, 0.0) > z + 1e-6)]
@@ -394,7 +394,7 @@ def test_a_layer_comes_from_the_side_away_from_the_walls():
     assert len(first_sweep) > 2 and (np.diff(first_sweep) < 0).all()
     # a second time over cut stock there is nothing to do
     _, stock, area, _ = rough(walls, body, z, 0.3, False)
-    again = [line for lines in layers.layer(field, stock, z, area, 0.3, 1.2) for line in lines]
+    again = [line for lines in depth_layers.layer(field, stock, z, area, 0.3, 1.2) for line in lines]
     assert sum(line.length for line in again) < 0.02 * sum(line.length for lines in groups for line in lines)
 
 
@@ -404,7 +404,7 @@ def test_the_rim_pass_leaves_nothing_at_a_wall(body):
     field, stock, area, _ = rough(walls, body, z, 0.3, True, 2.5)
     before = stock.top.copy()
     none = np.zeros_like(area)
-    lines = layers.rim(field, stock, z, area, none, 0.3, CHORD, False)
+    lines = depth_layers.rim(field, stock, z, area, none, 0.3, CHORD, False)
     for line in lines:
         assert np.abs(from_walls(dense(line.points, 0.05)[:, :2]) - body.radius).max() <= CHORD + 0.001
         stock.cut(line.points, body)
@@ -425,15 +425,15 @@ def test_the_rim_pass_is_for_walls_nobody_finishes_or_for_all_once_a_flute():
     one = np.zeros_like(area)
     x = lat.x0 + lat.step * np.arange(lat.nx)
     one[:, x < 11.0] = True  # a finish follows the wall at x = 5..7, none the other
-    everything = layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False)
-    other = layers.rim(field, stock, z, area, one, 0.3, CHORD, False)
+    everything = depth_layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False)
+    other = depth_layers.rim(field, stock, z, area, one, 0.3, CHORD, False)
     assert min(line.points[:, 0].min() for line in everything) < 5.0
     assert other and min(line.points[:, 0].min() for line in other) > 10.0
-    assert layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, False) == []
-    unseen = layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, True)
+    assert depth_layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, False) == []
+    unseen = depth_layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, True)
     assert sum(q.length for q in unseen) >= 0.99 * sum(q.length for q in everything)
     stock.top[:] = -5.0
-    assert layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False) == []
+    assert depth_layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False) == []
 
 
 def test_what_a_finish_leaves_on_a_steep_wall_is_no_rim():
@@ -450,7 +450,7 @@ def test_what_a_finish_leaves_on_a_steep_wall_is_no_rim():
         high = np.clip((y + thick) / rise, 0.0, 6.0)
         stock.become(StockMap(stock.lattice, high, high.copy(), stock.part))
         for thin in (0.0, 0.08):
-            lines = layers.rim(field, stock, z, area, np.zeros_like(area), 0.2, CHORD, False, thin)
+            lines = depth_layers.rim(field, stock, z, area, np.zeros_like(area), 0.2, CHORD, False, thin)
             lengths.append(sum(line.length for line in lines))
     assert lengths[1] == 0.0 and min(lengths[0], *lengths[2:]) > 5.0
 
@@ -464,16 +464,16 @@ def test_touches_end_on_every_tip_asked_for(name):
     field = field_of(mesh, body)
     _, tips = reached(field, mesh, lambda s: s.normals[:, 2] > -0.01, 0.6)
     tips = tips[:300]
-    got = spot.touches(field, tips)
+    got = touch_points.touches(field, tips)
     ends = np.array([line.points[-1] for line in got])
     away, which = cKDTree(ends).query(tips)
-    assert away.max() <= math.sqrt(3.0) * spot.APART
+    assert away.max() <= math.sqrt(3.0) * touch_points.APART
     assert np.isclose(cKDTree(tips).query(ends)[0], 0.0).all()  # nowhere else
-    same = {tuple(t) for t in np.round(tips / spot.APART).astype(int).tolist()}
+    same = {tuple(t) for t in np.round(tips / touch_points.APART).astype(int).tolist()}
     assert len(got) == len(same)
     p = np.vstack([line.points for line in got])
     assert not field.blocked_by_cutter(p + [0.0, 0.0, 2 * LEVEL_TOLERANCE]).any()
-    assert all(line.length == pytest.approx(spot.SHORT) and np.ptp(line.points[:, 2]) < 1e-12 for line in got)
+    assert all(line.length == pytest.approx(touch_points.SHORT) and np.ptp(line.points[:, 2]) < 1e-12 for line in got)
 
 
 def test_touches_are_few_and_leave_out_what_has_no_free_direction():
@@ -481,8 +481,8 @@ def test_touches_are_few_and_leave_out_what_has_no_free_direction():
     field = field_of(mesh, ball(3.0))
     pit, top = np.array([[5.51, 5.51, 3.0]]), np.array([[2.0, 2.0, 8.0]])
     assert not field.blocked_by_cutter(pit).any()
-    got = spot.touches(field, np.vstack([pit, top]))
+    got = touch_points.touches(field, np.vstack([pit, top]))
     assert len(got) == 1 and got[0].points[-1].tolist() == top[0].tolist()
-    assert len(spot.touches(field_of(mesh, ball(2.0)), pit)) == 1
+    assert len(touch_points.touches(field_of(mesh, ball(2.0)), pit)) == 1
     many = np.column_stack([np.linspace(0, 99, 600), np.full(600, 5.0), np.full(600, 9.0)])
-    assert len(spot.touches(field, many)) == spot.MOST
+    assert len(touch_points.touches(field, many)) == touch_points.MOST

@@ -29,7 +29,7 @@ from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
-from toolpath.strategies import layers
+from toolpath.strategies import depth_layers
 from toolpath.tool_deflection import effective_diameter
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import Form
@@ -253,7 +253,7 @@ class _Layers:
         self.left: list[tuple[float, NDArray[np.bool_]]] = []
         if top <= bottom or now is not None and not now.left:
             return
-        heights = layers.layer_heights(top, bottom, step)
+        heights = depth_layers.layer_heights(top, bottom, step)
         also = [f.bottom + low for f in zones if f.form is Form.LEVEL] if self.bounded else []
         also += [plane - under for plane in settings.planes]
         if also:
@@ -276,13 +276,13 @@ class _Layers:
         while self.left and self.left[0][0] >= lowest - 1e-9:
             z, below = self.left.pop(0)
             self.stock.settle()
-            between.extend(layers.between(self.above, z, cut.step_down))
+            between.extend(depth_layers.between(self.above, z, cut.step_down))
             self.above = z
             self._walk(linker, z, below)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
-            rims = layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
+            rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
                               min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0)
             deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
             usual, linker.pace = linker.pace, self._rim_pace(deep)
@@ -317,7 +317,7 @@ class _Layers:
 
     def _thinner(self) -> CutData:
         """The cut of what stands between layers: a slot at most, a part of a layer deep."""
-        depth = layers.EVEN * self.cut.step_down
+        depth = depth_layers.EVEN * self.cut.step_down
         return self.cut.under(depth, 0.5 * effective_diameter(self.field.tool.diameter, self.field.tool.corner_radius,
                                                               depth))
 
@@ -331,9 +331,9 @@ class _Layers:
         """Go over the stock that stands above a height, mm, in an area, down to it."""
         settings, side, fine = self.settings, 0.8 * self.field.tool.radius, 0.1 * self.field.lattice.step
         if self.bounded:
-            Clearing(linker, z, area, self.allowance, side, settings.climb, settings.either_way, layers.STOCK_WORTH,
+            Clearing(linker, z, area, self.allowance, side, settings.climb, settings.either_way, depth_layers.STOCK_WORTH,
                      fine).walk()
-        for lines in layers.layer(self.field, self.stock, z, area, self.allowance, side):
+        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
 

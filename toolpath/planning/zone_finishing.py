@@ -40,7 +40,16 @@ from toolpath.stock.engagement import UNBOUNDED
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.stock.wall_skin import Skins
-from toolpath.strategies import flank, floor, isoparametric, led, matched, spot, zigzag, zlevel
+from toolpath.strategies import (
+    curvature_matched,
+    flank,
+    inclined_axis,
+    isoparametric,
+    planar_floor,
+    touch_points,
+    waterline,
+    zigzag,
+)
 from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.machinable_area import Form
@@ -52,7 +61,7 @@ CUSP_SHARE = 0.55  # of the allowed scallop, given to the distance between passe
 LINK_S = 1.2  # what going up, over and down again takes: links of the demo part, seconds each
 PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
-LEANING = frozenset((flank.NAME, matched.NAME, led.NAME))  # strategies of a tool that leans
+LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
 UPRIGHT = 10  # of a zone asked to lean that is walked upright, of so many parts: which strategy leaves fewest
 LEAST_AGAIN = 4  # moves of a line that it walks a second time, to be left out
 AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
@@ -175,7 +184,7 @@ class Finish:
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
         most = self._aims(self.settings.scallop_height)[:self.given]
         left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
-        asked = leans and led.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
+        asked = leans and inclined_axis.asked(self.settings.leaned, self.zone.form, self.field.tool) is not None
         way = [upright_way(steps) if asked else 0.0 for steps in made]
         upright = [0 if not asked else round(UPRIGHT * w / max(*way, 1e-9)) if t.begun_with else UPRIGHT + 1
                    for t, w in zip(tries, way, strict=True)]
@@ -211,13 +220,13 @@ class Finish:
         found: list[tuple[str, Runs]] = []
         if self.zone.form is Form.STEEP:
             found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)))
-        if self.zone.form is not Form.LEVEL and matched.suits(self.field.tool):
+        if self.zone.form is not Form.LEVEL and curvature_matched.suits(self.field.tool):
             curved = [face for face in alone if not face.flat]
-            found.append((matched.NAME, matched.matched(curved, *given, self._surroundings(), self.field.allowance,
+            found.append((curvature_matched.NAME, curvature_matched.matched(curved, *given, self._surroundings(), self.field.allowance,
                                                         most)))
-        if (leaned := led.asked(self.settings.leaned, self.zone.form, self.field.tool)) is not None:
-            found.append((led.NAME, led.led(self.faces, self.checks, self.field, self.cut, self.settings,
-                                            self._surroundings(), self._enters(led.WARY), leaned)))
+        if (leaned := inclined_axis.asked(self.settings.leaned, self.zone.form, self.field.tool)) is not None:
+            found.append((inclined_axis.NAME, inclined_axis.led(self.faces, self.checks, self.field, self.cut, self.settings,
+                                            self._surroundings(), self._enters(inclined_axis.WARY), leaned)))
         return [(name, runs.runs) for name, runs in found if runs.runs], tuple(
             {"strategy": name, "reason": reason} for name, runs in found for reason in runs.refused)
 
@@ -354,13 +363,13 @@ class Finish:
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
-            return [spot.touches(self.field, self.checks.tips[failing])]
+            return [touch_points.touches(self.field, self.checks.tips[failing])]
         return self.strategy.rounds(k, failing)
 
     def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
         """Walk lines of round k and measure them."""
         tool, settings = self.field.tool, self.settings
-        thin = min(0.5 * settings.chordal_tolerance, floor.EXACT) if self.strategy.name == "floor" else None
+        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if self.strategy.name == "floor" else None
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:
@@ -452,22 +461,22 @@ def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
     tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
     cusp = CUSP_SHARE * settings.scallop_height
     if zone.form is Form.STEEP:
-        step = zlevel.level_step(tool, normals, cusp, cut.step_down)
+        step = waterline.level_step(tool, normals, cusp, cut.step_down)
 
         def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
             tips = checks.tips[failing]
             if k == 0:
-                levels, window = zlevel.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
+                levels, window = waterline.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
             else:
                 window = step / 2.0 ** k
-                levels = zlevel.lowest_of_groups(tips[:, 2], window)
-            return zlevel.waterlines(field, tips, levels, 1.001 * window, chord)
+                levels = waterline.lowest_of_groups(tips[:, 2], window)
+            return waterline.waterlines(field, tips, levels, 1.001 * window, chord)
 
         return _Strategy("zlevel", step, waterlines, False)
     if _has_floor(zone, tool):
 
         def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            return floor.planes(field, checks.tips[failing], chord, k) if k <= floor.MOST_FINER else []
+            return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MOST_FINER else []
 
         return _Strategy("floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
