@@ -47,7 +47,7 @@ from toolpath.passes.side_step import lay_out as parallel  # noqa: E402
 from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes  # noqa: E402
+from verify.tool_axes import ToolAxes  # noqa: E402
 
 RADIUS, SCALLOP = 5.0, 0.5
 SIZE = 200.0  # mm

@@ -48,7 +48,7 @@ from toolpath.passes.isoparametric_passes import lay_out as ball_passes  # noqa:
 from toolpath.passes.trimmed_faces import TrimmedFace  # noqa: E402
 from verify.moves import Moves  # noqa: E402
 from verify.removal import residual_on_normals  # noqa: E402
-from verify.toolaxes import ToolAxes  # noqa: E402
+from verify.tool_axes import ToolAxes  # noqa: E402
 
 Poses = tuple[F64, F64]
 """A pass: tips (k, 3), mm, and axes (k, 3), unit."""

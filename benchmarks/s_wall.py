@@ -43,7 +43,7 @@ from toolpath.passes.forward_step import Profile, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes  # noqa: E402
+from verify.tool_axes import ToolAxes  # noqa: E402
 from zones.reach.assembly import Clearances
 
 LENGTH, HIGH, THICK, WAVE, LESS, SHIFT = 160.0, 30.0, 3.0, 25.0, 4.0, 7.0  # mm

@@ -20,7 +20,7 @@ from verify.field import Field
 from verify.material import machined
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 from .hand_parts import box_mesh
 

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from verify.bodies import Bodies
 from verify.kernels.clash import clash_chunk
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.pointtree import PointTree
 from verify.stockpass import event_table, free_rapids, gather, noted
 from verify.tiles import run_tiles
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
+from verify.tool_bodies import Bodies
 
 FIXTURE_SPACING = 0.25
 DIP = 0.005  # mm a ball may be in a fixture, between its points, before it meets one

@@ -15,7 +15,7 @@ from geometry.mesh import F64
 from verify.findings import Source
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 STILL = 1e-9
 SHARE = 4.0

@@ -15,7 +15,7 @@ from verify.kernels.engaged import FRONT, window_angles
 from verify.model import Engagement, Finding, FindingKind
 from verify.moves import Moves
 from verify.stockpass import parts
-from verify.toolaxes import sector_frames
+from verify.tool_axes import sector_frames
 
 RESOLUTION = 2 * math.pi / FRONT
 """rad: sectors at both ends of an engaged arc are counted whole."""

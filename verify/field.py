@@ -19,7 +19,6 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.tool_body import ToolBody
 from verify.blank import blank_cylinder, blank_mesh, stock_bounds
-from verify.bodies import Bodies
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
@@ -37,7 +36,8 @@ from verify.stockpass import (
     tables_for,
 )
 from verify.tiles import run_tiles
-from verify.toolaxes import ToolAxes, sector_frames
+from verify.tool_axes import ToolAxes, sector_frames
+from verify.tool_bodies import Bodies
 
 F32 = NDArray[np.float32]
 MOST_NODES = 24_000_000

@@ -21,7 +21,7 @@ from verify.moves import Moves
 from verify.progress import Report, Stages
 from verify.stock import blank, run_bodies, run_stock
 from verify.stockpass import StockPass, end_radii, free_rapids, parts
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
 

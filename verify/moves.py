@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 Progress = Callable[[float], None]
 BOW = 5e-4

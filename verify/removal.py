@@ -20,7 +20,7 @@ from verify.kernels.turned import cut_chunk
 from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.pointtree import PointTree
 from verify.tiles import CellGrid, run_tiles
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 """mm, how far a turning tool may be from where the pieces of its moves take it to be."""
 

@@ -21,7 +21,7 @@ from verify.moves import Moves
 from verify.progress import Report, Stages
 from verify.reader import FEED, Program, read_program
 from verify.stepnc import is_stepnc, read_stepnc
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
 BLEND_SHARE = 0.1

@@ -30,7 +30,6 @@ import numpy as np
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.blank import blank_cylinder, blank_mesh, stock_bounds
-from verify.bodies import Bodies
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import stock_tile
@@ -50,6 +49,7 @@ from verify.stockpass import (
     ways_before,
 )
 from verify.tiles import CellGrid, run_tiles
+from verify.tool_bodies import Bodies
 
 MAX_LINES = 6_000_000
 BLOCK = 32

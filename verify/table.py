@@ -16,9 +16,9 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from verify.bodies import Bodies
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program import Program
+from verify.tool_bodies import Bodies
 
 BOW = 1.0 / 800.0  # of the distance from the tip
 UPRIGHT = 1e-9  # of an axis that leans

@@ -29,7 +29,7 @@ from verify.model import FindingKind, ScoredSamples
 from verify.moves import Moves
 from verify.prove import Proof, prove
 from verify.support import supported
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 PART = wall_part()
 SCORED = scored(PART)

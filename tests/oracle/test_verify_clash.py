@@ -7,14 +7,14 @@ import pytest
 
 from geometry.tool_body import HolderSegment, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
-from verify.bodies import Bodies
 from verify.clash import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
+from verify.tool_bodies import Bodies
 
 TOOL = ToolBody("T1", 1, 4.0, 2.0, 5.0, 3.6, 9.0, 5.0, 14.0, (HolderSegment(10.0, 14.0, 5.0),))
 BULL = replace(TOOL, diameter=5.0, corner_radius=1.0, neck_diameter=5.0)

@@ -14,7 +14,7 @@ from verify.model import FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove
 from verify.repeats import _runs
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 PART = block()
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])

@@ -12,7 +12,7 @@ from verify.kernels.profile import FINE, carried, standing
 from verify.moves import BOW, Moves
 from verify.pointtree import CHUNK, PointTree, curve_keys
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes, square_to
+from verify.tool_axes import ToolAxes, square_to
 
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}
 

@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.moves import Moves
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 FAR = 12.0
 """mm along a ray that is looked at, either way."""

@@ -16,7 +16,7 @@ from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
 from toolpath.passes.isoparametric_passes import IsoSurface
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 HALF = 20.0
 

@@ -10,7 +10,7 @@ from toolpath.five_axis.curvature_matching import clear_tilt, gouge_depth, match
 from toolpath.passes.cutter_locations import tips
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 H = 0.005
 # R, r, radii of curvature across and along the feed; match in degrees; strips at the match, one and three degrees more

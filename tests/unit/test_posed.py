@@ -17,7 +17,7 @@ from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.strategies.isoparametric import course
 from verify.moves import Moves
 from verify.removal import residual_on_normals
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
 

@@ -14,7 +14,7 @@ from verify.model import FindingKind, ProofSetup, StockKind
 from verify.moves import Moves
 from verify.prove import prove
 from verify.stock import blank, run_stock
-from verify.toolaxes import ToolAxes
+from verify.tool_axes import ToolAxes
 
 PART = block()
 BLANK = ProofSetup(StockKind.BOX, stock_box=np.array([[-20.0, -15, -10], [20, 15, 0.5]]))

@@ -1,6 +1,6 @@
 """Which part of a cutter is in stock, as bits of sectors all round it, and how much of its front that is.
 
-The edge of a tool is a circle of 64 sectors, numbered from the X of a frame square to its axis (``verify.toolaxes``)
+The edge of a tool is a circle of 64 sectors, numbered from the X of a frame square to its axis (``verify.tool_axes``)
 towards its Y. A place at signed distance b beside the way D, where the profile has radius rho at the height of the
 stock, comes to the edge at the angle asin(b / rho) off D. Stock is known on lines or nodes a step apart, so each stands
 for a strip as wide, and beside the flank the last one for all up to the side of the edge: a slot of a flat is never

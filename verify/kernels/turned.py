@@ -77,7 +77,7 @@ def cut_chunk(chunk, b0, b1, b2, b3, points, normals, residual, mover, starts, e
 
     b0..b3          : (k, 4) float64 balls of 8, 64, 512, 4096 samples
     points, normals : (n, 3) float64 in the order of the tree; residual, mover (n,) float64 and int32, changed in place
-    starts, ends    : (m, 3) float64 tips; axis, about, angle : as ``verify.toolaxes.ToolAxes``; feeds (m,) bool
+    starts, ends    : (m, 3) float64 tips; axis, about, angle : as ``verify.tool_axes.ToolAxes``; feeds (m,) bool
     tool            : (m,) int32, row of cutters (k, 3) float64 radius, corner radius, flute length
     reach           : (k,) float64, mm, how far the cutting part reaches from the tip; bow : mm
     """
