@@ -19,7 +19,7 @@ from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.convert import face_numbers
 from service.stock import Blank
-from verify.blank import stock_on_normals
+from verify.blank.blank import stock_on_normals
 from verify.model import ProofSetup
 from zones.machinable_area import SEEN, SEEN_SHARE
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.mesh import F64
-from verify.blank import stock_bounds
+from verify.blank.blank import stock_bounds
 from verify.model import ProofSetup
 from verify.program import Program
 

@@ -18,7 +18,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.tool_body import ToolBody
-from verify.blank import blank_cylinder, blank_mesh, stock_bounds
+from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE

@@ -16,7 +16,7 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
-from verify.blank import stock_bounds
+from verify.blank.blank import stock_bounds
 from verify.duration import minutes_of
 from verify.field import Field, run_field, stock_field
 from verify.material import machined

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
-from verify.blank import stands_over_air
+from verify.blank.blank import stands_over_air
 from verify.clash import fixture_points, run_clashes
 from verify.clear_height import top_of_all
 from verify.dogleg import spread

@@ -13,7 +13,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
-from verify.blank import stock_on_normals
+from verify.blank.blank import stock_on_normals
 from verify.clash import DIP
 from verify.dogleg import box_findings
 from verify.duration import minutes_of, spent

@@ -12,7 +12,7 @@ from geometry.errors import VerificationError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.blank import stock_bounds
+from verify.blank.blank import stock_bounds
 from verify.clear_height import from_above, top_of_all
 from verify.findings import Source
 from verify.fitness import limit_findings, notes_on, way_findings

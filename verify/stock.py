@@ -29,7 +29,7 @@ import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
-from verify.blank import blank_cylinder, blank_mesh, stock_bounds
+from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import stock_tile

@@ -19,7 +19,7 @@ from scipy.spatial.distance import cdist
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
-from verify.blank import stock_on_normals
+from verify.blank.blank import stock_on_normals
 from verify.findings import Source
 from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support
 from verify.moves import Moves

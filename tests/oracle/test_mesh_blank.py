@@ -10,11 +10,11 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import box_mesh, terraces
 from toolpath.stock.stock_map import StockMap
-from verify.blank import stands_over_air, stock_bounds, stock_on_normals
+from verify.blank.blank import stands_over_air, stock_bounds, stock_on_normals
+from verify.blank.mesh_blank_exit import way_out_of_mesh
 from verify.field import stock_field
 from verify.model import ProofSetup
 from verify.stock import blank
-from verify.ways import way_out_of_mesh
 from zones.reach.access_view import access_rotation
 
 XS, YS, HEIGHTS = [0.0, 3.0, 5.0, 9.0], [0.0, 2.0, 6.0], [[2.0, 6.0, 3.0], [4.0, 1.0, 5.0]]

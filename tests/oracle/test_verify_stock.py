@@ -9,7 +9,7 @@ from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.pocket_case import TOOL, block
-from verify.blank import stock_on_normals
+from verify.blank.blank import stock_on_normals
 from verify.guard import convex_edges, gouge_depths
 from verify.kernels.heights import lowest
 from verify.model import ProofSetup, StockKind

@@ -11,7 +11,7 @@ from service.stock import blank_of
 from tests.hand_parts import box_mesh
 from tests.pocket_case import block
 from toolpath.stock.stock_map import StockMap
-from verify.blank import BlankCylinder, blank_cylinder, stands_over_air, stock_bounds, stock_on_normals
+from verify.blank.blank import BlankCylinder, blank_cylinder, stands_over_air, stock_bounds, stock_on_normals
 from verify.model import ProofSetup
 from zones.reach.access_view import access_rotation
 

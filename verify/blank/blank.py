@@ -9,8 +9,8 @@ import numpy as np
 from geometry.errors import VerificationError
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
+from verify.blank.mesh_blank_exit import way_out_of_mesh
 from verify.model import ProofSetup, StockKind
-from verify.ways import way_out_of_mesh
 
 UPRIGHT = 1e-9  # of a unit axis: aside, or up, by so little does not count
 
