@@ -213,7 +213,7 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
 
     Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its
     place, h cos(lean) above the tip; that is radius cos(lean) above the centre. While an axis swings the proof takes
-    1/800 of the distance from the tip off that (``verify.table``), and so it is here.
+    1/800 of the distance from the tip off that (``verify.checks.table_clearance``), and so it is here.
     """
     angles = np.linspace(0.0, leans, max(2, int(np.ceil(np.degrees(leans))) + 1))
     up, aside = np.cos(angles), np.sin(angles)

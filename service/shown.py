@@ -16,10 +16,10 @@ from geometry.sampling import SurfaceSamples
 from geometry.stl import stl_bytes
 from geometry.tool_body import ToolBody
 from service.deviation import COLOURS, Mark, Measured, draw_deviation
+from verify.checks.program_sequence import Given
 from verify.machined import check_step, machined_stock, surface_error
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 from verify.progress import Report
-from verify.sequence import Given
 
 MESH_NAME, MAP_NAME = "machined.stl", "deviation.png"
 MOST_GOUGES = 4

@@ -27,8 +27,8 @@ from output.workplan import Workplan
 from service.delivery import Files
 from service.sides import Program
 from verify.agree import check_agreement
+from verify.checks.program_sequence import read_all
 from verify.model import NcProgram, ProofSetup
-from verify.sequence import read_all
 
 Stream = Callable[[Workplan, Callable[[str], object]], None]
 FORMS: tuple[tuple[str, str, Stream], ...] = (

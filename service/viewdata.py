@@ -25,8 +25,8 @@ from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chun
 from service.viewpaths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
 from service.viewpaths import GRID as PATH_GRID
 from service.viewstock import stock_chunk
+from verify.checks.program_sequence import Reading, read_all
 from verify.model import NcProgram, Proof, ProofSetup
-from verify.sequence import Reading, read_all
 from zones.reach.access_view import turned_samples
 from zones.remainder.remainder import Remainder
 

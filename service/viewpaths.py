@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from service.viewfile import Chunk, Column
+from verify.checks.program_sequence import Reading
 from verify.duration import minutes_of
 from verify.model import NcProgram
 from verify.reader import FEED
-from verify.sequence import Reading
 
 GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: places, and how far a drawn way may be off in the two levels
 COARSE = 0.25  # mm, grid and thinning of what is not proved
@@ -94,7 +94,7 @@ def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation:
            planned: Sequence[dict[str, Any]] = ()) -> Way:
     """The way of the tool through programs.
 
-    readings : of the programs, as ``verify.sequence.read_all`` gives them
+    readings : of the programs, as ``verify.checks.program_sequence.read_all`` gives them
     rotation : (3, 3) float64, from the setup frame to that of the proof, no unit
     planned  : the steps of the report, whose ids stand in comments of the programs; without, a step is a tool
     """

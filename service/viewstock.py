@@ -14,9 +14,9 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from service.sides import Look
 from service.viewfile import Chunk, Column
+from verify.checks.program_sequence import Reading
 from verify.machined import LEVELS, stock_in_time
 from verify.model import ProofSetup
-from verify.sequence import Reading
 
 NODES, STRETCHES = 200_000, 32
 

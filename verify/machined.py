@@ -17,13 +17,13 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.blank.blank import stock_bounds
+from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all
 from verify.duration import minutes_of
 from verify.field import Field, run_field, stock_field
 from verify.material import machined
 from verify.model import ProofSetup, StockKind
 from verify.moves import BOW
 from verify.progress import Stages
-from verify.sequence import Given, Reading, check_numbers, moves_of, read_all
 
 LEAST_STEP = 0.002
 MOST_STEP = 5.0
@@ -64,7 +64,7 @@ def stock_in_time(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody]
                   stretches: int, nodes: int, threads: int | None = None) -> StockInTime:
     """The stock from the blank on, stretch by stretch of the programs, to be looked at.
 
-    read     : the programs, as ``verify.sequence.read_all`` reads them; part, tools, setup : as it took them
+    read     : the programs, as ``verify.checks.program_sequence.read_all`` reads them; part, tools, setup : as it took them
     stretches : most there are; each has as much of the time and of the moves together as any other
     nodes    : about how many the grid has
     threads  : as ``machined_stock``

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stands_over_air
+from verify.checks.clear_height import top_of_all
 from verify.clash import fixture_points, run_clashes
-from verify.clear_height import top_of_all
 from verify.dogleg import spread
 from verify.field import Field, run_field, stock_field
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK

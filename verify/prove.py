@@ -14,6 +14,9 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.blank.blank import stock_on_normals
+from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
+from verify.checks.repeated_passes import repeat_findings
+from verify.checks.table_clearance import table_findings
 from verify.clash import DIP
 from verify.dogleg import box_findings
 from verify.duration import minutes_of, spent
@@ -51,12 +54,9 @@ from verify.moves import BOW, Moves
 from verify.progress import Report, Stages
 from verify.reader import Program
 from verify.removal import residual_on_normals
-from verify.repeats import repeat_findings
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
-from verify.sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.stockpass import StockPass
 from verify.support import supported
-from verify.table import table_findings
 
 LEAST_REACH = 1.0
 READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known

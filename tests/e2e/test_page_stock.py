@@ -19,10 +19,10 @@ from service.viewpaths import AXIS_UNIT, path_chunks, way_of
 from service.viewstock import stock_chunk
 from tests.e2e.test_page import ROOT, node
 from tests.pocket_case import SETUP, block
+from verify.checks.program_sequence import read_all
 from verify.kinematics import Kinematics
 from verify.machined import stock_in_time
 from verify.model import NcProgram
-from verify.sequence import read_all
 
 pytestmark = pytest.mark.timeout(300)
 PART = block()

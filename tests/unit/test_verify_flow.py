@@ -8,7 +8,7 @@ import pytest
 
 from geometry.errors import CamError, ProgramError, VerificationError
 from verify import flow
-from verify.fitness import notes_on
+from verify.checks.machine_limits import notes_on
 from verify.flow import has_flow
 from verify.lines import is_plain
 from verify.model import ProofSetup

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verify.fitness import limit_findings, notes_on
+from verify.checks.machine_limits import limit_findings, notes_on
 from verify.kinematics import Kinematics
 from verify.model import FindingKind, ProofSetup
 from verify.reader import read_program

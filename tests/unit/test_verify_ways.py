@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.tool_body import HolderSegment, ToolBody
-from verify.fitness import way_findings
+from verify.checks.machine_limits import way_findings
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
 from verify.reader import read_program

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from geometry.tool_body import ToolBody
 from service.viewpaths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
 from tests.hand_parts import as_part, box_mesh
+from verify.checks.program_sequence import read_all
 from verify.model import NcProgram, ProofSetup
-from verify.sequence import read_all
 
 TEXT = """G21 G17 G90 G94 G64 P0.001
 G54

@@ -15,7 +15,7 @@ from toolpath.planning.zone_finishing import Finish, _Strategy
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked, still_to_walk
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.workingsteps import Motion
-from verify.repeats import WINDOW
+from verify.checks.repeated_passes import WINDOW
 from zones.lattice import Lattice
 
 

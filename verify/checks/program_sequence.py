@@ -13,9 +13,9 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_bounds
-from verify.clear_height import from_above, top_of_all
+from verify.checks.clear_height import from_above, top_of_all
+from verify.checks.machine_limits import limit_findings, notes_on, way_findings
 from verify.findings import Source
-from verify.fitness import limit_findings, notes_on, way_findings
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
 from verify.progress import Report, Stages
