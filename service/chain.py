@@ -64,8 +64,8 @@ from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
 from toolpath.tool_deflection import effective_diameter
+from verify.comparison.program_equivalence import carried
 from verify.dialects import dialect_of
-from verify.likeness import carried
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.reach.access_view import View

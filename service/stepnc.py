@@ -26,8 +26,8 @@ from output.stepnc.iso14649 import stream_stepnc_arm
 from output.workplan import Workplan
 from service.delivery import Files
 from service.sides import Program
-from verify.agree import check_agreement
 from verify.checks.program_sequence import read_all
+from verify.comparison.stepnc_agreement import check_agreement
 from verify.model import NcProgram, ProofSetup
 
 Stream = Callable[[Workplan, Callable[[str], object]], None]

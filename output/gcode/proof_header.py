@@ -3,7 +3,7 @@
 A program is proved as text, so its figures cannot stand in the text that is proved. Lines are kept free for them: the
 program is written and proved with comments that say so (``AWAITED``), and delivered with other words in these comments
 (``filled``). No other line changes and none moves, so that lines that findings, notes and pictures name stay where
-they are. Whoever delivers it reads both texts and holds them against one another (``verify.likeness.carried``).
+they are. Whoever delivers it reads both texts and holds them against one another (``verify.comparison.program_equivalence.carried``).
 """
 
 from __future__ import annotations

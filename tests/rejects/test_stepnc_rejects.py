@@ -17,7 +17,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from tests.broken_stepnc import broken
 from tests.synthetic_plan import clamped, shaped, tiny
 from verify import stepnc_aim, stepnc_arm
-from verify.agree import check_agreement
+from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
 from verify.part21 import Part21
 from verify.program import Program

@@ -22,9 +22,9 @@ from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step
 from toolpath.linking.lead_arcs import arc_onto
 from toolpath.workingsteps import Motion
-from verify.agree import check_agreement
+from verify.comparison.program_equivalence import difference
+from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
-from verify.likeness import difference
 from verify.reader import read_program
 from verify.stepnc import read_stepnc
 

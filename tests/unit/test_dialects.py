@@ -18,10 +18,10 @@ from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny
 from toolpath.workingsteps import Motion
+from verify.comparison.program_equivalence import difference
 from verify.dialects import DIALECTS as READ
 from verify.dialects import dialect_of
 from verify.kinematics import Kinematics
-from verify.likeness import difference
 from verify.reader import read_program
 
 OTHERS = ("fanuc", "haas", "siemens", "heidenhain")

@@ -11,11 +11,11 @@ from output.gcode.program_writer import write_program
 from output.linuxcnc import write_linuxcnc
 from tests.arc_plans import round_plan
 from tests.synthetic_plan import clamped, plan
+from verify.comparison.program_equivalence import difference
 from verify.dialects import CONTROLS
 from verify.dialects import __name__ as home
 from verify.dialects.base import BlockError, Control
 from verify.kinematics import Kinematics
-from verify.likeness import difference
 from verify.reader import read_program
 
 

@@ -17,7 +17,7 @@ from output.workplan import Ap238
 from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken
 from verify import stepnc_aim, stepnc_arm
-from verify.agree import check_agreement
+from verify.comparison.stepnc_agreement import check_agreement
 from verify.part21 import Part21
 from verify.reader import read_program
 from verify.stepnc import read_moves, read_stepnc

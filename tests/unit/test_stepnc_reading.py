@@ -17,7 +17,7 @@ from output.workplan import Ap238, StockBox
 from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
 from toolpath.workingsteps import Motion, Trajectory
-from verify.agree import check_agreement
+from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import KINDS, Kinematics
 from verify.model import NcProgram
 from verify.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
