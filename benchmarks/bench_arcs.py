@@ -41,9 +41,9 @@ from service.convert import parse_setup  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
 from toolpath.workingsteps import Motion  # noqa: E402
-from verify import motion  # noqa: E402
+from verify.gcode import block_motion  # noqa: E402
+from verify.gcode.reader import read_program  # noqa: E402
 from verify.program import Program  # noqa: E402
-from verify.reader import read_program  # noqa: E402
 
 _MOVE = re.compile(r"^(?:G[0123] )?[XYZ][-0-9.]", re.MULTILINE)
 
@@ -58,11 +58,11 @@ def deviation(work: Workplan, made: Workplan, text: str) -> float:
 
     made : the plan with arcs, which tells how many blocks each trajectory has
     """
-    kept, motion.CHORD = motion.CHORD, 1e-6
+    kept, block_motion.CHORD = block_motion.CHORD, 1e-6
     try:
         p = read_program(text)
     finally:
-        motion.CHORD = kept
+        block_motion.CHORD = kept
     feeds = np.flatnonzero(~np.isnan(p.feed) & (p.start != p.end).any(axis=1))
     begins = np.append(np.flatnonzero(np.append(True, p.line[feeds][1:] != p.line[feeds][:-1])), len(feeds))
     at, worst = 0, 0.0

@@ -38,10 +38,10 @@ from service.convert import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402
 from verify.blank.blank import stock_bounds  # noqa: E402
 from verify.field import Field  # noqa: E402
+from verify.gcode.reader import FEED, read_program  # noqa: E402
 from verify.material import machined  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402
 from verify.moves import Moves
-from verify.reader import FEED, read_program  # noqa: E402
 
 
 @dataclass(frozen=True, eq=False)

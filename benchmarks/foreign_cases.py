@@ -21,10 +21,10 @@ from benchmarks.foreign_twin import SPACING, envelope
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.tool_body import HolderSegment, ToolBody
+from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
 from verify.program import Program
-from verify.reader import FEED, read_program
 
 MARGIN = 0.01
 MACHINE = Kinematics("table-table-AC", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))

@@ -24,9 +24,9 @@ sys.path.insert(0, str(ROOT))
 import numpy as np  # noqa: E402
 
 from verify.duration import minutes_of  # noqa: E402
+from verify.gcode.reader import read_program  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
 from verify.model import ProofSetup  # noqa: E402
-from verify.reader import read_program  # noqa: E402
 
 CONTROLLER = ROOT.parent / "shared" / "tools" / "linuxcnc_run.sh"
 BEGIN = "%\nG21 G17 G90 G94 G40 G49 G80 G64 P0.001\nG54\nT1 M6\nG43 H1\nG0 X0 Y0 Z5\nG1 Z0 F3000\n"

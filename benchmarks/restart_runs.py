@@ -52,7 +52,7 @@ from schemas.setup import Setup  # noqa: E402
 from service import chain  # noqa: E402
 from service.convert import machine_kinematics, parse_setup  # noqa: E402
 from service.programs import gauge_lengths  # noqa: E402
-from verify.reader import RAPID, read_program  # noqa: E402
+from verify.gcode.reader import RAPID, read_program  # noqa: E402
 
 JOBS = {"bar on a table A/C": ("bar", "table-AC", 4.0), "bar on a table B/C": ("bar", "table-BC", 4.0),
         "twisted wall on a table A/C": ("wall", "table-AC", 1.0)}

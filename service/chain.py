@@ -65,7 +65,7 @@ from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
 from toolpath.tool_deflection import effective_diameter
 from verify.comparison.program_equivalence import carried
-from verify.dialects import dialect_of
+from verify.gcode.dialects import dialect_of
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.reach.access_view import View
@@ -283,7 +283,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     mesh : the machined part is wanted too; it is written into ``out``
     blank_path : as ``plan``
     dialect : whose words the program has; None: by its own marks, by ``ending`` of its file name or by the controls of
-        the machine (``verify.dialects.dialect_of``)
+        the machine (``verify.gcode.dialects.dialect_of``)
 
     Raises
     ------

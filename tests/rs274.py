@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from verify.arcs import arc_points
-from verify.reader import FEED, RAPID
+from verify.gcode.reader import FEED, RAPID
 
 RS274 = shutil.which("rs274")
 ABSENT = "LinuxCNC's interpreter rs274 is not installed"

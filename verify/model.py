@@ -113,7 +113,7 @@ class NcProgram:
     name, text  : of the program
     turn        : (3, 3) float64, from the frame of the proof to that of the program (another side up); None: the same
     work_offset : the one that is the zero of its frame; None: that of the setup
-    dialect     : whose words its text has (``verify.dialects``)
+    dialect     : whose words its text has (``verify.gcode.dialects``)
     """
 
     name: str

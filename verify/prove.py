@@ -28,6 +28,7 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
+from verify.gcode.reader import Program
 from verify.guard import (
     CLOSER_SHARE,
     SURE,
@@ -52,7 +53,6 @@ from verify.model import (
 )
 from verify.moves import BOW, Moves
 from verify.progress import Report, Stages
-from verify.reader import Program
 from verify.removal import residual_on_normals
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.stockpass import StockPass

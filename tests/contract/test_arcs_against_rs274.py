@@ -11,7 +11,7 @@ from output.arc_fitting import fitted
 from output.linuxcnc import write_linuxcnc
 from tests import rs274
 from tests.arc_plans import HALF, round_clamped, round_plan
-from verify.reader import read_program
+from verify.gcode.reader import read_program
 
 CHECK = Path(__file__).resolve().parents[3] / "shared" / "tools" / "gcode_check.sh"
 JOBS = {"three axes": round_plan, "restart points": lambda: replace(round_plan(), restart=True)}

@@ -19,7 +19,7 @@ from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
 from toolpath.workingsteps import Motion
-from verify.reader import read_program
+from verify.gcode.reader import read_program
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 CHECK = SHARED / "stepnc" / "p21check.py"

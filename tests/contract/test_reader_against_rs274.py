@@ -10,7 +10,7 @@ import pytest
 from geometry.errors import ProgramError
 from tests.random_programs import RandomProgram, expression
 from tests.rs274 import ABSENT, RS274, difference, judge
-from verify.reader import read_program
+from verify.gcode.reader import read_program
 
 pytestmark = pytest.mark.skipif(RS274 is None, reason=ABSENT)
 PREFIX = Path(RS274).resolve().parents[1] if RS274 else Path()

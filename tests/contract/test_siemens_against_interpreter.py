@@ -14,8 +14,8 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import write_program
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.synthetic_plan import clamped, plan, tiny
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 interpreter = pytest.importorskip("nc_gcode_interpreter")
 

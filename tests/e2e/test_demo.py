@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from service.cli import app
-from verify.reader import read_program
+from verify.gcode.reader import read_program
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 CHECK = SHARED / "stepnc" / "p21check.py"

@@ -18,7 +18,7 @@ from service.artifacts import clear_results
 from service.cli import app
 from service.convert import parse_setup
 from tests.step_files import write_step
-from verify.dialects import DIALECTS as READ
+from verify.gcode.dialects import DIALECTS as READ
 
 cq = pytest.importorskip("cadquery")
 

@@ -15,8 +15,8 @@ from service import chain
 from service.convert import parse_setup
 from service.prepare import prepare
 from service.programs import turning_of
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 cq = pytest.importorskip("cadquery")
 

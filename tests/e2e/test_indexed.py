@@ -13,8 +13,8 @@ from schemas.setup import Setup
 from service import chain
 from service.convert import parse_setup
 from service.prepare import prepare
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 cq = pytest.importorskip("cadquery")
 

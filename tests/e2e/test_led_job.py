@@ -12,8 +12,8 @@ import pytest
 from geometry.mesh import F64
 from service import chain
 from service.convert import parse_setup
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 cq = pytest.importorskip("cadquery")
 

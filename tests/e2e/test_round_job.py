@@ -13,8 +13,8 @@ from service.convert import parse_setup
 from tests.arc_plans import off
 from tests.step_files import write_step
 from toolpath.workingsteps import Motion
-from verify import motion
-from verify.reader import read_program
+from verify.gcode import block_motion
+from verify.gcode.reader import read_program
 
 cq = pytest.importorskip("cadquery")
 
@@ -61,7 +61,7 @@ def test_it_is_proved_and_delivered(job):
 def test_the_program_is_within_its_share_of_the_plan(job, monkeypatch):
     """As the reader simulates it, with chords too fine to count: from the plan to it and back."""
     _, out, work = job
-    monkeypatch.setattr(motion, "CHORD", 1e-6)
+    monkeypatch.setattr(block_motion, "CHORD", 1e-6)
     p = read_program((out / "program.linuxcnc.ngc").read_text())
     most = 0.5 * CHORDAL + 2e-4  # and the grid
     for step in work.steps:

@@ -57,7 +57,7 @@ def test_the_demo_part_is_shown_as_its_report_has_it(demo_job):
 
 
 def test_the_way_is_that_of_the_program(demo_job):
-    from verify.reader import read_program
+    from verify.gcode.reader import read_program
 
     head, chunks = read_view((demo_job.out / "view.bin").read_bytes())
     text = (demo_job.out / "program.linuxcnc.ngc").read_text()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import VerificationError
+from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
-from verify.reader import read_program
 
 ZERO = (0.0, 0.0, 0.0)
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),

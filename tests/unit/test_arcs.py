@@ -24,8 +24,8 @@ from toolpath.linking.lead_arcs import arc_onto
 from toolpath.workingsteps import Motion
 from verify.comparison.program_equivalence import difference
 from verify.comparison.stepnc_agreement import check_agreement
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 from verify.stepnc import read_stepnc
 
 GRAIN = 2.0e-4  # mm, of the grid: of a point, and of a centre

@@ -14,9 +14,9 @@ from output.linuxcnc import write_linuxcnc
 from output.stepnc.common import _curves
 from tests.synthetic_plan import clamped
 from toolpath.workingsteps import Motion, Trajectory
+from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
 from verify.move_kinds import FEED
-from verify.reader import read_program
 
 
 def read(plan):

@@ -19,10 +19,10 @@ from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny
 from toolpath.workingsteps import Motion
 from verify.comparison.program_equivalence import difference
-from verify.dialects import DIALECTS as READ
-from verify.dialects import dialect_of
+from verify.gcode.dialects import DIALECTS as READ
+from verify.gcode.dialects import dialect_of
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 OTHERS = ("fanuc", "haas", "siemens", "heidenhain")
 SHOPS = {"plain": Switches(), "fast": Switches(high_speed=True, haas_tcp="G43.4"),

@@ -12,7 +12,7 @@ from output.gcode.program_writer import write_program
 from output.gcode.proof_header import AWAITED, LINES, WIDE, filled
 from service.programs import figures_of
 from tests.synthetic_plan import clamped, plan
-from verify.reader import read_program
+from verify.gcode.reader import read_program
 
 JOBS = {"three axes": lambda: plan(), "restart": lambda: plan(restart=True), "five axes": lambda: clamped()}
 REPORT = {"zones": [{"scallop_mm": {"p99": 0.01234}}, {"scallop_mm": {"p99": None}}], "coverage": 1.0,

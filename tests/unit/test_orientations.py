@@ -12,9 +12,9 @@ from output.inverse_kinematics import RotaryMachine
 from service.programs import room_to_turn
 from tests.hand_parts import box_mesh, joined
 from verify.checks.table_clearance import table_findings
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup
-from verify.reader import read_program
 from zones.reach.approach_cones import directions_over_hemisphere
 from zones.reach.assembly import Clearances
 from zones.reach.index_orientations import Gatherer, _chosen, orientations

@@ -9,8 +9,8 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_splitting import parts_of
 from output.gcode.program_writer import write_program
 from tests.synthetic_plan import clamped, plan
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 ALL = [d(Switches()) for d in DIALECTS.values()]
 

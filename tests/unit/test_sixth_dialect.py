@@ -12,11 +12,11 @@ from output.linuxcnc import write_linuxcnc
 from tests.arc_plans import round_plan
 from tests.synthetic_plan import clamped, plan
 from verify.comparison.program_equivalence import difference
-from verify.dialects import CONTROLS
-from verify.dialects import __name__ as home
-from verify.dialects.base import BlockError, Control
+from verify.gcode.dialects import CONTROLS
+from verify.gcode.dialects import __name__ as home
+from verify.gcode.dialects.base import BlockError, Control
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 
 class Sixth(Dialect):
@@ -61,7 +61,7 @@ class SixthReader(Control):
 def test_a_sixth_control_is_written_read_and_held_against_the_first(work, monkeypatch):
     monkeypatch.setitem(CONTROLS, "sixth", SixthReader)
     monkeypatch.setattr(f"{home}.DIALECTS", ("linuxcnc", *CONTROLS))
-    monkeypatch.setattr("verify.reader.DIALECTS", ("linuxcnc", *CONTROLS))
+    monkeypatch.setattr("verify.gcode.reader.DIALECTS", ("linuxcnc", *CONTROLS))
     machine = Kinematics(work.clamping.machine.kind, work.clamping.machine.pivots) if work.clamping else None
     first = read_program(write_linuxcnc(work), kinematics=machine)
     text = write_program(work, Sixth(Switches()))

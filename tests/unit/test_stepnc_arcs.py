@@ -18,8 +18,8 @@ from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken
 from verify import stepnc_aim, stepnc_arm
 from verify.comparison.stepnc_agreement import check_agreement
+from verify.gcode.reader import read_program
 from verify.part21 import Part21
-from verify.reader import read_program
 from verify.stepnc import read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "first edition": lambda p: write_stepnc_aim(replace(p, ap238=Ap238.INTEGRATED_CNC)),

@@ -18,11 +18,11 @@ from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored,
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
 from toolpath.workingsteps import Motion, Trajectory
 from verify.comparison.stepnc_agreement import check_agreement
+from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
 from verify.model import NcProgram
 from verify.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
 from verify.prove import prove
-from verify.reader import read_program
 from verify.stepnc import is_stepnc, read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "arm": write_stepnc_arm}

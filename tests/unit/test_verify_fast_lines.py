@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.reader import read_program
 
 HEAD = "%\nG21 G90 G17 G94 G54\nT1 M6\nS1000 M3\n{control}\nG0 {a}0 C0\nX0 Y0\nZ60\nF500\n"
 ZERO = (0.0, 0.0, 0.0)

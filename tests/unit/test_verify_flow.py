@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from geometry.errors import CamError, ProgramError, VerificationError
-from verify import flow
 from verify.checks.machine_limits import notes_on
-from verify.flow import has_flow
-from verify.lines import is_plain
+from verify.gcode import control_flow
+from verify.gcode.control_flow import has_flow
+from verify.gcode.o_words import find_structure
+from verify.gcode.parametric_lines import is_plain
+from verify.gcode.reader import FEED, RAPID, read_program
 from verify.model import ProofSetup
-from verify.reader import FEED, RAPID, read_program
-from verify.structure import find_structure
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\nG1 F100\n"
 TAIL = "M30\n%\n"
@@ -191,7 +191,7 @@ def test_the_stage_before_changes_nothing_of_plain_blocks():
 
 
 def test_a_loop_without_end(monkeypatch):
-    monkeypatch.setattr(flow, "MOST_BLOCKS", 1000)
+    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 1000)
     with pytest.raises(VerificationError) as caught:
         read("o1 while [1]\no1 endwhile\n")
     error = caught.value
@@ -213,7 +213,7 @@ def test_structure_pairs_what_belongs_together():
 
 def test_any_pieces_give_a_program_or_an_error_with_a_line(monkeypatch):
     """A reading of random pieces ends in finite moves or names a line; nothing else escapes."""
-    monkeypatch.setattr(flow, "MOST_BLOCKS", 2000)
+    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 2000)
     r = random.Random(5)
     pieces = ("# [ ] #1 #2 #<a> #<_x> 1 2 -3 0.5 + - * / ** MOD EQ AND = = o1 o2 o<f> sub endsub if else endif while "
               "do endwhile repeat endrepeat call return break continue [1] [0] [#1] X Y1 G1 G0 F50 ATAN SIN[ LN "

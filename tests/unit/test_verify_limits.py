@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from verify.checks.machine_limits import limit_findings, notes_on
+from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import FindingKind, ProofSetup
-from verify.reader import read_program
 
 ZERO = (0.0, 0.0, 0.0)
 HEAD = "%\nG21 G90 G17 G94 G54\nT1 M6\nS1000 M3\nG43 H1\nM428\nG0 A0 C0\nX0 Y0\nZ10\n"

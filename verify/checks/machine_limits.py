@@ -12,7 +12,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.checks.clear_height import UP, Z_AXIS, _top_along, top_of_all
 from verify.checks.table_clearance import UPRIGHT, lowest_places
-from verify.dialects import LINUXCNC
+from verify.gcode.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.move_kinds import FEED
 from verify.program import Program

@@ -16,10 +16,10 @@ from verify.blank.blank import stock_bounds
 from verify.checks.clear_height import from_above, top_of_all
 from verify.checks.machine_limits import limit_findings, notes_on, way_findings
 from verify.findings import Source
+from verify.gcode.reader import FEED, Program, read_program
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
 from verify.progress import Report, Stages
-from verify.reader import FEED, Program, read_program
 from verify.stepnc import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 

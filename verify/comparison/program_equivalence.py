@@ -22,7 +22,7 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.arcs import CHORD
 from verify.checks.program_sequence import read_all
-from verify.dialects import CONTROLS
+from verify.gcode.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
 from verify.program import Pause, Program
 from verify.progress import Report, Stages, silent

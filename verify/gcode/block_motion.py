@@ -8,14 +8,14 @@ import math
 import numpy as np
 
 from verify.arcs import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
-from verify.cycles import Hole, Out, hole_moves
 from verify.dividing import TIP
+from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
+from verify.gcode.drilling_cycles import Hole, Out, hole_moves
+from verify.gcode.rotary_words import between
+from verify.gcode.work_offsets import Origins
 from verify.log import MOST_MOVES_A_BLOCK
 from verify.move_kinds import FEED, RAPID
-from verify.origins import Origins
 from verify.program import NAN
-from verify.rotary import between
-from verify.words import CYCLES, SHIFTS, Block, whole
 
 
 class Motion(Origins):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from verify.served import NAMES, is_served
-from verify.words import BlockError
+from verify.gcode.block_words import BlockError
+from verify.gcode.system_parameters import NAMES, is_served
 
 LOCAL = 30
 LAST = 5000

@@ -21,16 +21,16 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
-from verify.dialects import DIALECTS, LINUXCNC, spelt
-from verify.flow import Flow, has_flow
+from verify.gcode.block_motion import Motion
+from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
+from verify.gcode.control_flow import Flow, has_flow
+from verify.gcode.dialects import DIALECTS, LINUXCNC, spelt
+from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.log import MAX_ERRORS, Log
-from verify.motion import Motion
 from verify.move_kinds import FEED, RAPID
 from verify.program import NAN, Program, Remark
 from verify.progress import Report, silent
-from verify.served import served
-from verify.words import Block, BlockError, parse_block, straight, used_letters
 
 BLEND_LIMIT = 0.01
 TOLD = 4096  # lines between two reports of how far the reading is
@@ -70,7 +70,7 @@ class Reader(Motion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves)
 
     def served(self, key: int | str) -> float:
-        """A parameter that the control keeps by itself (``verify.served``)."""
+        """A parameter that the control keeps by itself (``verify.gcode.system_parameters``)."""
         return served(self.s, key)
 
     def enter(self) -> None:
@@ -191,7 +191,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                   tool centre point control
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     report      : called with the share read, 0 to 1, every 4096 lines; what it raises ends the reading
-    dialect     : whose words they are, one of ``verify.dialects.DIALECTS``
+    dialect     : whose words they are, one of ``verify.gcode.dialects.DIALECTS``
 
     Returns
     -------

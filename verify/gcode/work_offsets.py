@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from verify.modes import Modes
-from verify.words import MOTION_CODES, WORK_OFFSETS, Block, BlockError, whole
+from verify.gcode.block_words import MOTION_CODES, WORK_OFFSETS, Block, BlockError, whole
+from verify.gcode.modal_state import Modes
 
 Axes = list[float | None]
 

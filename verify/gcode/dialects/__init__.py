@@ -1,6 +1,6 @@
 """Programs of other controls, block by block in the words the one reader knows.
 
-``verify.reader`` runs one modal machine, whose words are those of LinuxCNC. A control with other words has a file here
+``verify.gcode.reader`` runs one modal machine, whose words are those of LinuxCNC. A control with other words has a file here
 that spells each of its blocks in them, and refuses by name what it does not know or what would be read in two ways:
 nothing is dropped but what has no effect on a move. Lines keep their numbers.
 """
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from verify.dialects.base import Control
-from verify.dialects.fanuc import Fanuc
-from verify.dialects.haas import Haas
-from verify.dialects.heidenhain import Heidenhain, is_conversational
-from verify.dialects.siemens import Siemens, is_siemens
+from verify.gcode.block_words import BlockError
+from verify.gcode.dialects.base import Control
+from verify.gcode.dialects.fanuc import Fanuc
+from verify.gcode.dialects.haas import Haas
+from verify.gcode.dialects.heidenhain import Heidenhain, is_conversational
+from verify.gcode.dialects.siemens import Siemens, is_siemens
 from verify.log import MAX_ERRORS, Log
-from verify.words import BlockError
 
 LINUXCNC = "linuxcnc"
 CONTROLS: dict[str, type[Control]] = {"fanuc": Fanuc, "haas": Haas, "siemens": Siemens, "heidenhain": Heidenhain}

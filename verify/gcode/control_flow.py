@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from geometry.errors import VerificationError
-from verify.expressions import Value
-from verify.lines import Line, read_line
+from verify.gcode.block_words import BlockError
+from verify.gcode.expressions import Value
+from verify.gcode.o_words import Step, Structure, StructureError, find_structure
+from verify.gcode.parameters import LOCAL, Frame, Parameters
+from verify.gcode.parametric_lines import Line, read_line
 from verify.log import Log
-from verify.parameters import LOCAL, Frame, Parameters
-from verify.structure import Step, Structure, StructureError, find_structure
-from verify.words import BlockError
 
 MOST_BLOCKS = 5_000_000
 MOST_CALLS = 9

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 
-from verify.dialects.base import NUMBER, BlockError, Control, zero_word
-from verify.words import bare
+from verify.gcode.block_words import bare
+from verify.gcode.dialects.base import NUMBER, BlockError, Control, zero_word
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from geometry.mesh import F64
-from verify.words import BlockError
+from verify.gcode.block_words import BlockError
 
 
 def turn(axis: int, angle: float) -> F64:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from verify.gcode.block_words import BlockError
 from verify.program import NAN, State
-from verify.words import BlockError
 
 _FIELDS = ("plane", "scale", "relative", "centre_absolute", "feed_mode", "feed", "speed", "spindle", "offset",
            "work_offset", "retract_to_r")

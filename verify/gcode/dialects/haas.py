@@ -6,8 +6,8 @@ length of the tool up.
 
 from __future__ import annotations
 
-from verify.dialects.base import BlockError
-from verify.dialects.fanuc import Fanuc
+from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.fanuc import Fanuc
 
 
 class Haas(Fanuc):

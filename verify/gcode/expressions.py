@@ -12,8 +12,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from verify.parameters import Parameters
-from verify.words import NUMBER, BlockError
+from verify.gcode.block_words import NUMBER, BlockError
+from verify.gcode.parameters import Parameters
 
 Value = Callable[[Parameters], float]
 

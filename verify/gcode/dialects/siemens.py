@@ -13,8 +13,8 @@ import math
 import re
 
 from geometry.mesh import F64
-from verify.dialects.base import NUMBER, ZEROS, BlockError, Control, zero_word
-from verify.dialects.planes import placed, turn
+from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Control, zero_word
+from verify.gcode.dialects.tilted_planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 _PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{_NUM} ?)*(?:F{_NUM} ?)?\r?")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from verify.lines import OWord, is_plain, read_o_word
-from verify.words import BlockError
+from verify.gcode.block_words import BlockError
+from verify.gcode.parametric_lines import OWord, is_plain, read_o_word
 
 _OPENS = frozenset({"sub", "if", "while", "do", "repeat"})
 _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}

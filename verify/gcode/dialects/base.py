@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from verify.words import NUMBER, WORK_OFFSETS, BlockError
+from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
 
 ZEROS = tuple(WORK_OFFSETS.values())
 """The zeros of a control from the first on, as setups name them."""
@@ -36,7 +36,7 @@ class Control:
         self.unbounded = self._free
 
     def blocks(self, raw: str) -> list[str]:
-        """The blocks one line stands for, in the words of ``verify.words``; none for a line without effect.
+        """The blocks one line stands for, in the words of ``verify.gcode.block_words``; none for a line without effect.
 
         Raises BlockError where the line cannot be read, or could be read in two ways.
         """

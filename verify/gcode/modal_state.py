@@ -7,12 +7,12 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from verify.gcode.block_words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
+from verify.gcode.rotary_words import Rotary
+from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
 from verify.log import Log
 from verify.program import NAN, Pause, Stop
-from verify.rotary import Rotary
-from verify.saved import SavedModes
-from verify.words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
 
 INCH = 25.4
 
