@@ -37,9 +37,9 @@ from geometry.tool_body import ToolBody  # noqa: E402
 from service.convert import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402
 from verify.blank.blank import stock_bounds  # noqa: E402
-from verify.field import Field  # noqa: E402
 from verify.gcode.reader import FEED, read_program  # noqa: E402
-from verify.material import machined  # noqa: E402
+from verify.material.material import machined  # noqa: E402
+from verify.material.stock_field import Field  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402
 from verify.moves import Moves
 

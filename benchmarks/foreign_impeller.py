@@ -36,7 +36,7 @@ from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.stl import write_stl  # noqa: E402
 from service.camera import Camera  # noqa: E402
 from service.scene import lit  # noqa: E402
-from verify.machined import machined_stock  # noqa: E402
+from verify.material.machined_part import machined_stock  # noqa: E402
 from verify.model import Finding, FindingKind, Proof  # noqa: E402
 
 LONG = next(c for c in CASES if c.name.startswith("impeller"))

@@ -40,7 +40,7 @@ from benchmarks.foreign_twin import SPACING, upright  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
-from verify.machined import machined_stock  # noqa: E402
+from verify.material.machined_part import machined_stock  # noqa: E402
 from verify.model import Finding, FindingKind, Proof, ScoredSamples  # noqa: E402
 from verify.prove import prove  # noqa: E402
 

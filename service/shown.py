@@ -17,7 +17,7 @@ from geometry.stl import stl_bytes
 from geometry.tool_body import ToolBody
 from service.deviation import COLOURS, Mark, Measured, draw_deviation
 from verify.checks.program_sequence import Given
-from verify.machined import check_step, machined_stock, surface_error
+from verify.material.machined_part import check_step, machined_stock, surface_error
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 from verify.progress import Report
 
@@ -61,7 +61,7 @@ def machined_part(wish: MeshWish, programs: Sequence[Given], part: Part, tools: 
                   setup: ProofSetup, progress: Report, *, spindle_tool: int = 0) -> tuple[dict[str, Any], bytes]:
     """The machined part as figures for the report, file and access left out, and as a binary STL file.
 
-    programs, part, tools, setup, spindle_tool : as ``verify.machined.machined_stock`` takes them, and errors as it
+    programs, part, tools, setup, spindle_tool : as ``verify.material.machined_part.machined_stock`` takes them, and errors as it
         raises them; ``nothing_stands`` (InputError) where the window holds no stock
     """
     field = machined_stock(programs, part, tools, setup, wish.step, box=wish.box, spindle_tool=spindle_tool,

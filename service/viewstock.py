@@ -15,7 +15,7 @@ from geometry.tool_body import ToolBody
 from service.sides import Look
 from service.viewfile import Chunk, Column
 from verify.checks.program_sequence import Reading
-from verify.machined import LEVELS, stock_in_time
+from verify.material.machined_part import LEVELS, stock_in_time
 from verify.model import ProofSetup
 
 NODES, STRETCHES = 200_000, 32

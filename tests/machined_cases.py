@@ -16,8 +16,8 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from verify.field import Field
-from verify.material import machined
+from verify.material.material import machined
+from verify.material.stock_field import Field
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes

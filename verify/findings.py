@@ -52,7 +52,7 @@ def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
 
 def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance: float,
                      skins: F64) -> list[Finding]:
-    """Findings of the events of ``verify.stock``; skins (m,) float64 is the plunge limit of each move, mm."""
+    """Findings of the events of ``verify.material.stock_lines``; skins (m,) float64 is the plunge limit of each move, mm."""
     if len(events) == 0:
         return []
     move, code, feed = events[:, 0].astype(np.int64), events[:, 1].astype(np.int32), moves.feed

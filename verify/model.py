@@ -50,7 +50,7 @@ class ProofSetup:
     clearance_*   : radial; the part, its stock and fixtures nearer than this are rubbing, in a rapid a finding
     scallop_height, gouge_tolerance, stock_allowance : the budget -gouge <= residual - allowance <= scallop
     ramp_angle    : rad, steepest descent into stock
-    plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.stock``)
+    plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.material.stock_lines``)
     rapid_feed    : mm/min
     acceleration  : mm/s², for times
     travel        : (3,) float64 mm, what the moves of a program may span in X, Y and Z, or None

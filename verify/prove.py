@@ -17,10 +17,7 @@ from verify.blank.blank import stock_on_normals
 from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
-from verify.clash import DIP
-from verify.dogleg import box_findings
 from verify.duration import minutes_of, spent
-from verify.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.findings import (
     Source,
     contact_findings,
@@ -39,7 +36,11 @@ from verify.guard import (
     guard_notes,
     guard_samples,
 )
-from verify.material import contacts, dogleg_limits, unseen
+from verify.material.collision import DIP
+from verify.material.dogleg_rapids import box_findings
+from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
+from verify.material.material import contacts, dogleg_limits, unseen
+from verify.material.stock_pass import StockPass
 from verify.model import (
     Engagement,
     FaceProof,
@@ -55,7 +56,6 @@ from verify.moves import BOW, Moves
 from verify.progress import Report, Stages
 from verify.removal import residual_on_normals
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
-from verify.stockpass import StockPass
 from verify.support import supported
 
 LEAST_REACH = 1.0

@@ -17,9 +17,9 @@ from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
 from verify.kernels.rays import cut_tile
 from verify.kernels.turned import cut_chunk
+from verify.material.point_tree import PointTree
+from verify.material.tiles import CellGrid, run_tiles
 from verify.moves import BOW, Moves, Progress, cutter_table
-from verify.pointtree import PointTree
-from verify.tiles import CellGrid, run_tiles
 from verify.tool_axes import ToolAxes
 
 """mm, how far a turning tool may be from where the pieces of its moves take it to be."""

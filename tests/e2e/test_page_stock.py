@@ -21,7 +21,7 @@ from tests.e2e.test_page import ROOT, node
 from tests.pocket_case import SETUP, block
 from verify.checks.program_sequence import read_all
 from verify.kinematics import Kinematics
-from verify.machined import stock_in_time
+from verify.material.machined_part import stock_in_time
 from verify.model import NcProgram
 
 pytestmark = pytest.mark.timeout(300)

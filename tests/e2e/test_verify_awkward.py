@@ -7,11 +7,11 @@ import pytest
 
 from geometry.tool_body import HolderSegment, ToolBody
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
-from verify.clash import run_clashes
+from verify.material.collision import run_clashes
+from verify.material.stock_lines import run_bodies
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove
-from verify.stock import run_bodies
 
 PART = block()
 NOBODY = ScoredSamples(scored(PART).samples, np.zeros(len(scored(PART).zone), np.int32))

@@ -12,9 +12,9 @@ from tests.hand_parts import box_mesh, terraces
 from toolpath.stock.stock_map import StockMap
 from verify.blank.blank import stands_over_air, stock_bounds, stock_on_normals
 from verify.blank.mesh_blank_exit import way_out_of_mesh
-from verify.field import stock_field
+from verify.material.stock_field import stock_field
+from verify.material.stock_lines import blank
 from verify.model import ProofSetup
-from verify.stock import blank
 from zones.reach.access_view import access_rotation
 
 XS, YS, HEIGHTS = [0.0, 3.0, 5.0, 9.0], [0.0, 2.0, 6.0], [[2.0, 6.0, 3.0], [4.0, 1.0, 5.0]]

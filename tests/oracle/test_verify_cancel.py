@@ -7,9 +7,9 @@ import pytest
 
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program, scored, text
 from verify.guard import gouge_depths
-from verify.machined import machined_stock
+from verify.material.machined_part import machined_stock
+from verify.material.tiles import run_tiles
 from verify.prove import prove
-from verify.tiles import run_tiles
 
 PART = block()
 SCORED = scored(PART)

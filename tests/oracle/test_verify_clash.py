@@ -7,10 +7,10 @@ import pytest
 
 from geometry.tool_body import HolderSegment, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
-from verify.clash import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
+from verify.material.collision import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes

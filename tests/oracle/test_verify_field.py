@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-import verify.field
+import verify.material.stock_field
 from geometry.mesh import TriangleMesh
 from tests.hand_parts import box_mesh
 from tests.machined_cases import BOX, LEFT, block, mill, path
 from tests.oracle.turning_twin import least_distance, random_moves
 from tests.pocket_case import block as pocket_block
-from verify.field import Field, run_field, stock_field
 from verify.kernels.field import brick_tops
 from verify.kernels.grid import cross_columns
 from verify.kernels.stock import CUTTER, HOLDER, NECK, PLUNGE, SHANK
+from verify.material.stock_field import Field, run_field, stock_field
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 
@@ -101,7 +101,7 @@ def test_tiles_and_threads_change_no_byte(monkeypatch, tile, threads):
     moves = Moves(moves.start, moves.end, np.arange(30) % 3 > 0, moves.tool, moves.axes)
 
     def cut(size, count):
-        monkeypatch.setattr(verify.field, "TILE", size)
+        monkeypatch.setattr(verify.material.stock_field, "TILE", size)
         field = stock_field(MESH, block(), 0.3, threads=count)
         run = run_field(field, moves, [tool], block(), threads=count)
         deepest = {}
@@ -200,7 +200,7 @@ def test_a_cylinder_blank_is_as_wide_as_asked():
 
 
 def test_steps_are_widened_where_nodes_would_be_too_many(monkeypatch):
-    monkeypatch.setattr(verify.field, "MOST_NODES", 20_000)
+    monkeypatch.setattr(verify.material.stock_field, "MOST_NODES", 20_000)
     field = stock_field(MESH, block(), 0.05)
     assert field.values.size < 30_000 and field.step > 0.3
     assert field.volume == pytest.approx(LEFT, rel=0.01)

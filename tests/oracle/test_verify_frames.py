@@ -8,9 +8,9 @@ import pytest
 from geometry.sampling import SurfaceSamples
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
 from verify.checks.repeated_passes import _runs
-from verify.dogleg import box_findings, spread
 from verify.findings import Source
 from verify.kinematics import Kinematics
+from verify.material.dogleg_rapids import box_findings, spread
 from verify.model import FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove

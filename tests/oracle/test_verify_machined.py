@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import InputError
 from geometry.tool_body import ToolBody
 from tests.pocket_case import SETUP, TOOL, block, program, text
-from verify.machined import clipped, machined_stock, surface_error
+from verify.material.machined_part import clipped, machined_stock, surface_error
 from verify.model import ProofSetup
 
 PART = block()

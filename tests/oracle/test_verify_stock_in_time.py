@@ -6,7 +6,7 @@ import pytest
 from tests.pocket_case import SETUP, TOOL, block, program, text
 from verify.checks.program_sequence import read_all
 from verify.duration import minutes_of
-from verify.machined import LEVELS, machined_stock, stock_in_time
+from verify.material.machined_part import LEVELS, machined_stock, stock_in_time
 from verify.model import NcProgram
 
 PART = block()

@@ -9,8 +9,8 @@ from tests.machined_cases import mill
 from tests.oracle.turning_twin import least_left, random_moves, random_rays, seen, signed
 from verify.kernels.pose import MOST_ANGLE, PIECE, fill_piece, near_segment2, pieces, turned, view
 from verify.kernels.profile import FINE, carried, standing
+from verify.material.point_tree import CHUNK, PointTree, curve_keys
 from verify.moves import BOW, Moves
-from verify.pointtree import CHUNK, PointTree, curve_keys
 from verify.removal import residual_on_normals
 from verify.tool_axes import ToolAxes, square_to
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from tests.pocket_case import OTHER, SETUP, TOOL, block, program, scored, text
-from verify.engagement import RESOLUTION, engaged_angles, engagements, in_parts
-from verify.field import run_field, stock_field
 from verify.kernels.engaged import SECTORS, sector_bits
+from verify.material.engagement import RESOLUTION, engaged_angles, engagements, in_parts
+from verify.material.stock_field import run_field, stock_field
+from verify.material.stock_lines import blank, run_stock
 from verify.model import FindingKind, ProofSetup, StockKind
 from verify.moves import Moves
 from verify.prove import prove
-from verify.stock import blank, run_stock
 from verify.tool_axes import ToolAxes
 
 PART = block()

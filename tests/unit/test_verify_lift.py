@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from verify.kernels.clash import is_lift
+from verify.material.stock_pass import free_rapids
 from verify.moves import Moves
-from verify.stockpass import free_rapids
 
 AXIS = np.array([np.sin(0.7) * np.cos(0.3), np.sin(0.7) * np.sin(0.3), np.cos(0.7)])
 START = np.array([1.234, -5.678, 9.012])

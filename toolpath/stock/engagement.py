@@ -1,7 +1,7 @@
 """How much of a cutter is in stock as the planner knows it, and what is walked before a pass that has too much in it.
 
 The engaged angle is that of the front half of the cutter, 180 degrees in a slot. Stock no deeper than a twentieth of
-the radius is skimmed and counts as none (``verify.engagement`` counts alike, with a model of its own). So where a pass
+the radius is skimmed and counts as none (``verify.material.engagement`` counts alike, with a model of its own). So where a pass
 would have too much of the cutter in stock, its way is gone before in skims from the top down, only there.
 """
 

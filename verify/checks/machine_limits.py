@@ -64,7 +64,7 @@ def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> 
 
 
 def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
-    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.dogleg``).
+    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.material.dogleg_rapids``).
 
     low : (m,) float64, mm, the lowest places of tools
     """

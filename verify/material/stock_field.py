@@ -1,6 +1,6 @@
 """The stock in process where tools lean or turn: signed distances on a grid, cut in place.
 
-Where the axis never leaves Z, vertical lines of one height do (``verify.stock``); a tool that leans cuts under what
+Where the axis never leaves Z, vertical lines of one height do (``verify.material.stock_lines``); a tool that leans cuts under what
 stands above it. The error is that of the grid (``verify.kernels.field``): nothing is taken for stock that is gone, and
 what stands between nodes is seen unless it is thinner than their distance. Residuals on the part do not come from here.
 """
@@ -22,9 +22,7 @@ from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.field import VOLUME_UNITS, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
-from verify.model import ProofSetup, StockKind
-from verify.moves import BOW, Moves, Progress, cutter_table
-from verify.stockpass import (
+from verify.material.stock_pass import (
     StockPass,
     descents,
     end_radii,
@@ -35,7 +33,9 @@ from verify.stockpass import (
     parts,
     tables_for,
 )
-from verify.tiles import run_tiles
+from verify.material.tiles import run_tiles
+from verify.model import ProofSetup, StockKind
+from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.tool_axes import ToolAxes, sector_frames
 from verify.tool_bodies import Bodies
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.kernels.clash import clash_chunk
+from verify.material.point_tree import PointTree
+from verify.material.stock_pass import event_table, free_rapids, gather, noted
+from verify.material.tiles import run_tiles
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves, Progress, cutter_table
-from verify.pointtree import PointTree
-from verify.stockpass import event_table, free_rapids, gather, noted
-from verify.tiles import run_tiles
 from verify.tool_axes import ToolAxes
 from verify.tool_bodies import Bodies
 

@@ -12,9 +12,9 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.findings import Source, chains, worst_of
 from verify.kernels.engaged import FRONT, window_angles
+from verify.material.stock_pass import parts
 from verify.model import Engagement, Finding, FindingKind
 from verify.moves import Moves
-from verify.stockpass import parts
 from verify.tool_axes import sector_frames
 
 RESOLUTION = 2 * math.pi / FRONT
@@ -22,7 +22,7 @@ RESOLUTION = 2 * math.pi / FRONT
 
 
 def in_parts(moves: Moves, tools: Sequence[ToolBody]) -> tuple[Moves, NDArray[np.int64]]:
-    """Moves cut up as ``verify.stockpass.parts`` has them, p in all, and the row (p,) of the move each is of."""
+    """Moves cut up as ``verify.material.stock_pass.parts`` has them, p in all, and the row (p,) of the move each is of."""
     first = parts(moves, tools)
     count = np.diff(first)
     of = np.repeat(np.arange(len(moves)), count)

@@ -12,15 +12,15 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stands_over_air
 from verify.checks.clear_height import top_of_all
-from verify.clash import fixture_points, run_clashes
-from verify.dogleg import spread
-from verify.field import Field, run_field, stock_field
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
+from verify.material.collision import fixture_points, run_clashes
+from verify.material.dogleg_rapids import spread
+from verify.material.stock_field import Field, run_field, stock_field
+from verify.material.stock_lines import blank, run_bodies, run_stock
+from verify.material.stock_pass import StockPass, end_radii, free_rapids, parts
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.progress import Report, Stages
-from verify.stock import blank, run_bodies, run_stock
-from verify.stockpass import StockPass, end_radii, free_rapids, parts
 from verify.tool_axes import ToolAxes
 
 LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
@@ -47,9 +47,9 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     """Run all moves through the stock and past the part.
 
     mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
-    slides       : where the linear axes point, move by move (``verify.dogleg``); only used where rapids are doglegs
+    slides       : where the linear axes point, move by move (``verify.material.dogleg_rapids``); only used where rapids are doglegs
 
-    Lines of one height serve tools along Z, a field of distances those that lean (``verify.stock``, ``verify.field``)
+    Lines of one height serve tools along Z, a field of distances those that lean (``verify.material.stock_lines``, ``verify.material.stock_field``)
     and those whose flutes cut under what stands.
     """
     stages, given, origin = Stages(progress), moves, None

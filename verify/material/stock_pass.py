@@ -89,7 +89,7 @@ class StockPass:
 
 
 def end_radii(tools: Sequence[ToolBody]) -> F64:
-    """(k,) float64, mm: radius of the region that cuts when the tool goes straight down (see ``verify.stock``)."""
+    """(k,) float64, mm: radius of the region that cuts when the tool goes straight down (see ``verify.material.stock_lines``)."""
     share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
              "bull": lambda t: t.radius - 0.5 * t.corner_radius}
     return np.array([share[t.kind](t) for t in tools])

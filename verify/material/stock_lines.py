@@ -33,10 +33,7 @@ from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import stock_tile
-from verify.model import ProofSetup, StockKind
-from verify.moves import Moves, Progress, cutter_table
-from verify.progress import Stages
-from verify.stockpass import (
+from verify.material.stock_pass import (
     StockPass,
     descents,
     end_radii,
@@ -48,7 +45,10 @@ from verify.stockpass import (
     tables_for,
     ways_before,
 )
-from verify.tiles import CellGrid, run_tiles
+from verify.material.tiles import CellGrid, run_tiles
+from verify.model import ProofSetup, StockKind
+from verify.moves import Moves, Progress, cutter_table
+from verify.progress import Stages
 from verify.tool_bodies import Bodies
 
 MAX_LINES = 6_000_000

@@ -19,8 +19,8 @@ from verify.arcs import CHORD
 from verify.blank.blank import stock_bounds
 from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all
 from verify.duration import minutes_of
-from verify.field import Field, run_field, stock_field
-from verify.material import machined
+from verify.material.material import machined
+from verify.material.stock_field import Field, run_field, stock_field
 from verify.model import ProofSetup, StockKind
 from verify.moves import BOW
 from verify.progress import Stages
