@@ -43,7 +43,7 @@ from toolpath.lines import thinned  # noqa: E402
 from toolpath.workingsteps import Motion  # noqa: E402
 from verify.gcode import block_motion  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
-from verify.program import Program  # noqa: E402
+from verify.program.program import Program  # noqa: E402
 
 _MOVE = re.compile(r"^(?:G[0123] )?[XYZ][-0-9.]", re.MULTILINE)
 

@@ -46,7 +46,7 @@ from service import chain  # noqa: E402
 from service.convert import machine_kinematics, parse_setup  # noqa: E402
 from service.programs import gauge_lengths  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
-from verify.program import Program  # noqa: E402
+from verify.program.program import Program  # noqa: E402
 
 CONTROLLER = ROOT.parent / "shared" / "tools" / "linuxcnc_run.sh"
 HOLDER = [{"diameter_mm": 20, "length_mm": 30}]

@@ -24,7 +24,7 @@ from geometry.tool_body import HolderSegment, ToolBody
 from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
-from verify.program import Program
+from verify.program.program import Program
 
 MARGIN = 0.01
 MACHINE = Kinematics("table-table-AC", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))

@@ -4,7 +4,7 @@ Run from the root of the checkout: ``python benchmarks/machining_time.py [PROGRA
 [--kins KINS]``. Programs run on ``shared/tools/linuxcnc_run.sh`` beside the checkout in real time, feeds N times as
 fast; without any PROGRAM the patterns below do, a minute together. ``--jobs`` plans and proves three whole jobs of
 small parts from a box, on three axes, 3+2 and five, and runs their programs, ten minutes each at N = 1. Ours is
-``verify.duration`` with what that controller does: 500 mm/s, 5000 mm/s² and 360 deg/s. What it takes for a program that
+``verify.program.move_times`` with what that controller does: 500 mm/s, 5000 mm/s² and 360 deg/s. What it takes for a program that
 hardly moves is taken off its time; the time it takes to change tools stays.
 """
 
@@ -23,10 +23,10 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
-from verify.duration import minutes_of  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
 from verify.model import ProofSetup  # noqa: E402
+from verify.program.move_times import minutes_of  # noqa: E402
 
 CONTROLLER = ROOT.parent / "shared" / "tools" / "linuxcnc_run.sh"
 BEGIN = "%\nG21 G17 G90 G94 G40 G49 G80 G64 P0.001\nG54\nT1 M6\nG43 H1\nG0 X0 Y0 Z5\nG1 Z0 F3000\n"

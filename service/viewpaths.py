@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from service.viewfile import Chunk, Column
 from verify.checks.program_sequence import Reading
-from verify.duration import minutes_of
 from verify.gcode.reader import FEED
 from verify.model import NcProgram
+from verify.program.move_times import minutes_of
 
 GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: places, and how far a drawn way may be off in the two levels
 COARSE = 0.25  # mm, grid and thinning of what is not proved

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from verify.arcs import arc_points
 from verify.gcode.reader import FEED, RAPID
+from verify.program.arc_chords import arc_points
 
 RS274 = shutil.which("rs274")
 ABSENT = "LinuxCNC's interpreter rs274 is not installed"

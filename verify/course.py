@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64, I32
-from verify.dividing import MOST_TURN
 from verify.kinematics import Kinematics
-from verify.log import MOST_MOVES
-from verify.move_kinds import FEED, RAPID
-from verify.program import Poses, Program, Remark, Stop
+from verify.program.move_kinds import FEED, RAPID
+from verify.program.move_log import MOST_MOVES
+from verify.program.program import Poses, Program, Remark, Stop
+from verify.program.turn_subdivision import MOST_TURN
 
 SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
 LEAST_FEED, MOST_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for

@@ -1,6 +1,6 @@
 """Curves of both STEP-NC forms along which a tip goes: polylines, arcs of circles, and such one after the other.
 
-An arc is read as a G2 or G3 is (``verify.arcs``): as chords that leave it by 0.001 mm at most.
+An arc is read as a G2 or G3 is (``verify.program.arc_chords``): as chords that leave it by 0.001 mm at most.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from verify.arcs import ArcError, arc_points
 from verify.attributes import FLAG, LOGICAL, Checked, Either, Many, Named, OneOf, Real, Table, Text, To
+from verify.program.arc_chords import ArcError, arc_points
 
 CURVES = ("POLYLINE", "TRIMMED_CURVE", "COMPOSITE_CURVE")
 FLAT, JOIN = 1e-3, 1e-6

@@ -12,12 +12,10 @@ from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.arcs import CHORD
 from verify.blank.blank import stock_on_normals
 from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
-from verify.duration import minutes_of, spent
 from verify.findings import (
     Source,
     contact_findings,
@@ -53,6 +51,8 @@ from verify.model import (
     ZoneProof,
 )
 from verify.moves import BOW, Moves
+from verify.program.arc_chords import CHORD
+from verify.program.move_times import minutes_of, spent
 from verify.progress import Report, Stages
 from verify.removal import residual_on_normals
 from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs

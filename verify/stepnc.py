@@ -10,7 +10,7 @@ from verify import stepnc_aim, stepnc_arm
 from verify.course import Course, Cutter, CutterMoves
 from verify.kinematics import Kinematics
 from verify.part21 import Part21, is_exchange_file
-from verify.program import Program, Remark
+from verify.program.program import Program, Remark
 from verify.progress import Report, silent
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup

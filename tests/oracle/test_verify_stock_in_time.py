@@ -5,9 +5,9 @@ import pytest
 
 from tests.pocket_case import SETUP, TOOL, block, program, text
 from verify.checks.program_sequence import read_all
-from verify.duration import minutes_of
 from verify.material.machined_part import LEVELS, machined_stock, stock_in_time
 from verify.model import NcProgram
+from verify.program.move_times import minutes_of
 
 PART = block()
 # looks along -X of the part: its X is Y of the part, its Y is Z, its Z is X

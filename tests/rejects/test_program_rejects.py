@@ -5,9 +5,9 @@ import tracemalloc
 import pytest
 
 from geometry.errors import ProgramError, VerificationError
-from verify import log
 from verify.gcode.reader import read_program
-from verify.log import MOST_MOVES_A_BLOCK
+from verify.program.move_log import MOST_MOVES_A_BLOCK
+from verify.program.program import move_log
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"
@@ -194,8 +194,8 @@ def test_a_block_that_would_grow_without_bound_costs_no_memory(body):
 @pytest.mark.parametrize("body, line", [("G1 F100\n" + "X1\nX2\n" * 60, 97), ("G2 I5 F100\n", 7)])
 def test_a_program_of_too_many_moves(body, line, monkeypatch):
     """Plain lines are counted whenever a chunk of them is packed, arcs before they are written out."""
-    monkeypatch.setattr(log, "MOST_MOVES", 90)
-    monkeypatch.setattr(log.Log, "full", 5)
+    monkeypatch.setattr(move_log, "MOST_MOVES", 90)
+    monkeypatch.setattr(move_log.Log, "full", 5)
     with pytest.raises(VerificationError) as caught:
         read_program(HEAD + body + TAIL)
     assert caught.value.code == "program_too_long" and caught.value.limit == 90

@@ -20,7 +20,7 @@ from verify import stepnc_aim, stepnc_arm
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
 from verify.part21 import Part21
-from verify.program import Program
+from verify.program.program import Program
 from verify.stepnc import read_stepnc
 
 MACHINE = Kinematics("table-table-AC", None)

@@ -16,7 +16,7 @@ from tests.synthetic_plan import clamped
 from toolpath.workingsteps import Motion, Trajectory
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
-from verify.move_kinds import FEED
+from verify.program.move_kinds import FEED
 
 
 def read(plan):

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from verify.duration import minutes_of, spent
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup
+from verify.program.move_times import minutes_of, spent
 
 SETUP = ProofSetup(rapid_feed=6000.0, acceleration=1e6)
 BEGIN = "G21 G17 G90 G94 G40 G49 G80 {}\nG54\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z10\nX100\nX0\n"

@@ -11,8 +11,8 @@ from geometry.sampling import sample_surface
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program
 from tests.pocket_case import text as joined
 from verify.gcode.reader import FEED, RAPID, read_program
-from verify.log import Log
 from verify.model import FindingKind, ScoredSamples
+from verify.program.move_log import Log
 from verify.prove import error_bound, prove
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"

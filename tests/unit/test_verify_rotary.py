@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import CamError, ProgramError
-from verify.arcs import CHORD
-from verify.dividing import MOST_TURN, TURN, axis_pieces
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.kinematics import Kinematics
+from verify.program.arc_chords import CHORD
+from verify.program.turn_subdivision import MOST_TURN, TURN, axis_pieces
 
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),
           "head-table-BC": ((0.0, 0.0, 60.0), (12.0, -5.0, 3.0)), "head-head-BC": ((0.0, 0.0, 60.0),)}

@@ -9,7 +9,7 @@ import numpy as np
 from geometry.mesh import F64
 from verify.blank.blank import stock_bounds
 from verify.model import ProofSetup
-from verify.program import Program
+from verify.program.program import Program
 
 UP = np.array([0.0, 0.0, 1.0])
 Z_AXIS = 4

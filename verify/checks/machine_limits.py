@@ -14,8 +14,8 @@ from verify.checks.clear_height import UP, Z_AXIS, _top_along, top_of_all
 from verify.checks.table_clearance import UPRIGHT, lowest_places
 from verify.gcode.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
-from verify.move_kinds import FEED
-from verify.program import Program
+from verify.program.move_kinds import FEED
+from verify.program.program import Program
 
 LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
 HALF_A_TURN = 180.0 + 1e-6  # deg, and rounding

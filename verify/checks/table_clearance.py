@@ -17,7 +17,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.model import Finding, FindingKind, ProofSetup
-from verify.program import Program
+from verify.program.program import Program
 from verify.tool_bodies import Bodies
 
 BOW = 1.0 / 800.0  # of the distance from the tip

@@ -20,11 +20,11 @@ from geometry.errors import InternalError, ProgramError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.arcs import CHORD
 from verify.checks.program_sequence import read_all
 from verify.gcode.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
-from verify.program import Pause, Program
+from verify.program.arc_chords import CHORD
+from verify.program.program import Pause, Program
 from verify.progress import Report, Stages, silent
 
 TIP = 1e-3

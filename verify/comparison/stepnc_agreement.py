@@ -16,8 +16,8 @@ import numpy as np
 
 from geometry.errors import InternalError
 from geometry.mesh import F64
-from verify.arcs import CHORD
-from verify.program import Program
+from verify.program.arc_chords import CHORD
+from verify.program.program import Program
 
 TIP = 1e-3  # mm
 AXIS = 1e-6  # of unit vectors, per component

@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 
-from verify.arcs import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
-from verify.dividing import TIP
 from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
 from verify.gcode.drilling_cycles import Hole, Out, hole_moves
 from verify.gcode.rotary_words import between
 from verify.gcode.work_offsets import Origins
-from verify.log import MOST_MOVES_A_BLOCK
-from verify.move_kinds import FEED, RAPID
-from verify.program import NAN
+from verify.program.arc_chords import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
+from verify.program.move_kinds import FEED, RAPID
+from verify.program.move_log import MOST_MOVES_A_BLOCK
+from verify.program.program import NAN
+from verify.program.turn_subdivision import TIP
 
 
 class Motion(Origins):

@@ -16,7 +16,7 @@ from verify.gcode.expressions import Value
 from verify.gcode.o_words import Step, Structure, StructureError, find_structure
 from verify.gcode.parameters import LOCAL, Frame, Parameters
 from verify.gcode.parametric_lines import Line, read_line
-from verify.log import Log
+from verify.program.move_log import Log
 
 MOST_BLOCKS = 5_000_000
 MOST_CALLS = 9

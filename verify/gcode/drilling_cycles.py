@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-from verify.move_kinds import FEED, RAPID
+from verify.program.move_kinds import FEED, RAPID
 
 PECK_LIFT = 0.254
 MOVES_A_PECK = 3

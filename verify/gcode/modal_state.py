@@ -11,8 +11,8 @@ from verify.gcode.block_words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, 
 from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
-from verify.log import Log
-from verify.program import NAN, Pause, Stop
+from verify.program.move_log import Log
+from verify.program.program import NAN, Pause, Stop
 
 INCH = 25.4
 

@@ -27,9 +27,9 @@ from verify.gcode.control_flow import Flow, has_flow
 from verify.gcode.dialects import DIALECTS, LINUXCNC, spelt
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
-from verify.log import MAX_ERRORS, Log
-from verify.move_kinds import FEED, RAPID
-from verify.program import NAN, Program, Remark
+from verify.program.move_kinds import FEED, RAPID
+from verify.program.move_log import MAX_ERRORS, Log
+from verify.program.program import NAN, Program, Remark
 from verify.progress import Report, silent
 
 BLEND_LIMIT = 0.01

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from verify.dividing import axis_pieces, tip_pieces
 from verify.kinematics import Kinematics
-from verify.log import Log
-from verify.move_kinds import FEED, RAPID
-from verify.program import NAN, State
+from verify.program.move_kinds import FEED, RAPID
+from verify.program.move_log import Log
+from verify.program.program import NAN, State
+from verify.program.turn_subdivision import axis_pieces, tip_pieces
 
 TURNED = 8
 """Added to the unknown axes of a move whose rotary axes turn or stand off 0."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from verify.gcode.block_words import BlockError
-from verify.program import NAN, State
+from verify.program.program import NAN, State
 
 _FIELDS = ("plane", "scale", "relative", "centre_absolute", "feed_mode", "feed", "speed", "spindle", "offset",
            "work_offset", "retract_to_r")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from verify.gcode.block_words import WORK_OFFSETS, BlockError
-from verify.program import State
+from verify.program.program import State
 
 POSITION = {5420: 0, 5421: 1, 5422: 2, "_x": 0, "_y": 1, "_z": 2}
 _UNKNOWN = ("_vmajor", "_vminor", "_task", "_a", "_b", "_c", "_u", "_v", "_w", "_abs_x", "_abs_y", "_abs_z", "_abs_a",

@@ -15,14 +15,14 @@ from geometry.errors import InputError
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.arcs import CHORD
 from verify.blank.blank import stock_bounds
 from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all
-from verify.duration import minutes_of
 from verify.material.material import machined
 from verify.material.stock_field import Field, run_field, stock_field
 from verify.model import ProofSetup, StockKind
 from verify.moves import BOW
+from verify.program.arc_chords import CHORD
+from verify.program.move_times import minutes_of
 from verify.progress import Stages
 
 LEAST_STEP = 0.002

@@ -15,7 +15,7 @@ from verify.gcode.dialects.fanuc import Fanuc
 from verify.gcode.dialects.haas import Haas
 from verify.gcode.dialects.heidenhain import Heidenhain, is_conversational
 from verify.gcode.dialects.siemens import Siemens, is_siemens
-from verify.log import MAX_ERRORS, Log
+from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
 CONTROLS: dict[str, type[Control]] = {"fanuc": Fanuc, "haas": Haas, "siemens": Siemens, "heidenhain": Heidenhain}

@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from verify.kinematics import Kinematics
-from verify.program import Poses
+from verify.program.program import Poses
 
 
 class TurnLog:

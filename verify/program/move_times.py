@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.move_timing import Rates, move_seconds
 from verify.model import ProofSetup, Spent
-from verify.move_kinds import RAPID
-from verify.program import Program
+from verify.program.move_kinds import RAPID
+from verify.program.program import Program
 
 RAPID_TURN = float(np.radians(7200.0))
 """rad/min, of a rotary axis in a rapid, where nobody says: 20 turns."""

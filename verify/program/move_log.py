@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
-from verify.move_kinds import FEED
-from verify.posing import TurnLog
-from verify.program import Pause, Remark, Stop
+from verify.program.axis_log import TurnLog
+from verify.program.move_kinds import FEED
+from verify.program.program import Pause, Remark, Stop
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
