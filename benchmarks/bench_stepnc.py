@@ -27,7 +27,7 @@ from output.workplan import Workplan  # noqa: E402
 from tests.synthetic_plan import clamped, long_plan  # noqa: E402
 from toolpath.workingsteps import Motion, Trajectory  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
-from verify.stepnc import read_stepnc  # noqa: E402
+from verify.stepnc.reader import read_stepnc  # noqa: E402
 
 FORMS = {"AP238": stream_stepnc_aim, "ISO 14649": stream_stepnc_arm}
 ROWS = 300

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from verify.attributes import Attributes
-from verify.part21 import DERIVED, Part21, Ref, Typed, Word
+from verify.stepnc.attribute_checks import Attributes
+from verify.stepnc.part21 import DERIVED, Part21, Ref, Typed, Word
 
 NOWHERE, WORD = "#999999", ".NO_SUCH_WORD."
 

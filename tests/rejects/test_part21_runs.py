@@ -7,7 +7,7 @@ import time
 import pytest
 
 from geometry.errors import ProgramError
-from verify.part21 import Part21, decoded, is_exchange_file
+from verify.stepnc.part21 import Part21, decoded, is_exchange_file
 
 RUN, SOON = 200_000, 2.0  # letters, s
 BEGIN = "ISO-10303-21;\nHEADER;FILE_SCHEMA(('X'));ENDSEC;\nDATA;\n"

@@ -16,12 +16,11 @@ from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from tests.broken_stepnc import broken
 from tests.synthetic_plan import clamped, shaped, tiny
-from verify import stepnc_aim, stepnc_arm
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
-from verify.part21 import Part21
 from verify.program.program import Program
-from verify.stepnc import read_stepnc
+from verify.stepnc.part21 import Part21
+from verify.stepnc.reader import ap238, iso14649, read_stepnc
 
 MACHINE = Kinematics("table-table-AC", None)
 
@@ -172,8 +171,8 @@ def entities(text):
     return frozenset(" ".join(n for n, _ in file.records(k)) for of in file.entities().values() for k in of)
 
 
-@pytest.mark.parametrize(("write", "form", "names"), [(write_stepnc_arm, stepnc_arm, False),
-                                                      (write_stepnc_aim, stepnc_aim, True)], ids=["arm", "aim"])
+@pytest.mark.parametrize(("write", "form", "names"), [(write_stepnc_arm, iso14649, False),
+                                                      (write_stepnc_aim, ap238, True)], ids=["arm", "aim"])
 @pytest.mark.parametrize("rest", [False, True], ids=["all of a small job", "what that has not"])
 def test_what_is_broken_is_refused_by_name(write, form, names, rest):
     job = two_steps() if rest else tiny()

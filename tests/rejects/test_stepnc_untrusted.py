@@ -14,9 +14,9 @@ from geometry.errors import ProgramError
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from tests.synthetic_plan import clamped, tiny
-from verify.course import Course
 from verify.kinematics import Kinematics
-from verify.stepnc import read_stepnc
+from verify.stepnc.reader import read_stepnc
+from verify.stepnc.tool_motion import Course
 
 WRITERS = {"arm": write_stepnc_arm, "aim": write_stepnc_aim}
 NUMBERS = ("0", "-1", "1", "0.", "-1.", "1.E308", "-1.E308", "1.E-308", "1.E999", "1.E-999", "NAN", ".NAN.", "INF",

@@ -26,7 +26,7 @@ from verify.comparison.program_equivalence import difference
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
-from verify.stepnc import read_stepnc
+from verify.stepnc.reader import read_stepnc
 
 GRAIN = 2.0e-4  # mm, of the grid: of a point, and of a centre
 

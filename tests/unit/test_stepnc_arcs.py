@@ -16,11 +16,10 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken
-from verify import stepnc_aim, stepnc_arm
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
-from verify.part21 import Part21
-from verify.stepnc import read_moves, read_stepnc
+from verify.stepnc.part21 import Part21
+from verify.stepnc.reader import ap238, iso14649, read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "first edition": lambda p: write_stepnc_aim(replace(p, ap238=Ap238.INTEGRATED_CNC)),
          "arm": write_stepnc_arm}
@@ -105,8 +104,8 @@ def test_segments_and_curves_may_be_walked_backwards():
     assert np.abs(one.end - two.end).max() < 1e-9
 
 
-@pytest.mark.parametrize(("write", "form", "names"), [(write_stepnc_arm, stepnc_arm, False),
-                                                      (write_stepnc_aim, stepnc_aim, True)], ids=["arm", "aim"])
+@pytest.mark.parametrize(("write", "form", "names"), [(write_stepnc_arm, iso14649, False),
+                                                      (write_stepnc_aim, ap238, True)], ids=["arm", "aim"])
 def test_every_attribute_of_an_arc_broken_is_refused_by_name(write, form, names):
     """The entities arcs bring, one attribute at a time (all others: tests/rejects/test_stepnc_rejects.py)."""
     text = write(one_ring())

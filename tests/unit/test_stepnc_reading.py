@@ -21,9 +21,9 @@ from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
 from verify.model import NcProgram
-from verify.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
 from verify.prove import prove
-from verify.stepnc import is_stepnc, read_moves, read_stepnc
+from verify.stepnc.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
+from verify.stepnc.reader import is_stepnc, read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "arm": write_stepnc_arm}
 both = pytest.mark.parametrize("write", FORMS.values(), ids=FORMS)

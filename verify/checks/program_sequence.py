@@ -20,7 +20,7 @@ from verify.gcode.reader import FEED, Program, read_program
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
 from verify.progress import Report, Stages
-from verify.stepnc import is_stepnc, read_stepnc
+from verify.stepnc.reader import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 
 BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 from geometry.errors import ProgramError
 from geometry.tool_body import ToolBody
-from verify import stepnc_aim, stepnc_arm
-from verify.course import Course, Cutter, CutterMoves
 from verify.kinematics import Kinematics
-from verify.part21 import Part21, is_exchange_file
 from verify.program.program import Program, Remark
 from verify.progress import Report, silent
+from verify.stepnc.part21 import Part21, is_exchange_file
+from verify.stepnc.reader import ap238, iso14649
+from verify.stepnc.tool_motion import Course, Cutter, CutterMoves
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
 
@@ -63,7 +63,7 @@ def _course(text: str, name: str) -> Course:
     file = Part21(text.removeprefix("\ufeff"), name)
     course = Course(name, file.lines)
     readers: list[tuple[frozenset[str], Callable[[Part21, Course], None]]] = [
-        (stepnc_arm.SCHEMAS, stepnc_arm.read_arm), (stepnc_aim.SCHEMAS, stepnc_aim.read_aim)]
+        (iso14649.SCHEMAS, iso14649.read_arm), (ap238.SCHEMAS, ap238.read_aim)]
     for schemas, read in readers:
         if schemas & set(file.schemas):
             try:
@@ -72,7 +72,7 @@ def _course(text: str, name: str) -> Course:
                 raise ProgramError(f"{name}: workplans or units hold themselves, or are too many in each other",
                                    remedy="send a file whose references come to an end") from None
             return course
-    known = sorted(stepnc_arm.SCHEMAS | stepnc_aim.SCHEMAS)
+    known = sorted(iso14649.SCHEMAS | ap238.SCHEMAS)
     raise ProgramError(f"{name} is a STEP file of schema {', '.join(file.schemas) or 'none'}, which is not STEP-NC",
                        subjects=("FILE_SCHEMA",), measured=list(file.schemas), limit=known,
                        remedy="send the program as NC code, AP238 or ISO 14649")

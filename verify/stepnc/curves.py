@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from verify.attributes import FLAG, LOGICAL, Checked, Either, Many, Named, OneOf, Real, Table, Text, To
 from verify.program.arc_chords import ArcError, arc_points
+from verify.stepnc.attribute_checks import FLAG, LOGICAL, Checked, Either, Many, Named, OneOf, Real, Table, Text, To
 
 CURVES = ("POLYLINE", "TRIMMED_CURVE", "COMPOSITE_CURVE")
 FLAT, JOIN = 1e-3, 1e-6

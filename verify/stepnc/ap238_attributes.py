@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from verify.attributes import (
+from verify.stepnc.attribute_checks import (
     FLAG,
     Attributes,
     Either,
@@ -18,7 +18,7 @@ from verify.attributes import (
     Whole,
     attributes,
 )
-from verify.curves import CURVE_TABLE
+from verify.stepnc.curves import CURVE_TABLE
 
 _METHOD = {"name": Text(), "description": Text(), "consequence": Text(), "purpose": Text()}
 EXECUTABLES = ("MACHINING_WORKPLAN", "MACHINING_WORKINGSTEP", "MACHINING_NC_FUNCTION", "MACHINING_PROCESS_EXECUTABLE")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from verify.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
+from verify.stepnc.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
 
 FARTHEST = 1e6  # mm, of the coordinates of a path and the sizes of a tool
 UNIT = 1e-3  # what the length of a tool axis may be off one

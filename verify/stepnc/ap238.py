@@ -15,12 +15,12 @@ import numpy as np
 
 from geometry.errors import ProgramError
 from geometry.mesh import F64
-from verify.aim_tables import EXECUTABLES, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
-from verify.attributes import FARTHEST, Checked, shown
-from verify.course import MOST_DWELL, Course, Cutter
-from verify.curves import curve_points
-from verify.part21 import Part21, Ref, Typed
-from verify.stepnc_arm import sane_rates, shape_of, tool_number
+from verify.stepnc.ap238_attributes import EXECUTABLES, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
+from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
+from verify.stepnc.curves import curve_points
+from verify.stepnc.iso14649 import sane_rates, shape_of, tool_number
+from verify.stepnc.part21 import Part21, Ref, Typed
+from verify.stepnc.tool_motion import MOST_DWELL, Course, Cutter
 
 SCHEMAS = frozenset({"MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA", "INTEGRATED_CNC_SCHEMA"})
 _PREFIX = {None: 1.0, "KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3,

@@ -15,7 +15,7 @@ import numpy as np
 
 from geometry.errors import ProgramError
 from geometry.mesh import F64
-from verify.attributes import (
+from verify.stepnc.attribute_checks import (
     FARTHEST,
     FLAG,
     LOGICAL,
@@ -31,9 +31,9 @@ from verify.attributes import (
     Whole,
     attributes,
 )
-from verify.course import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
-from verify.curves import CURVE_TABLE, CURVES, curve_points
-from verify.part21 import Part21, Ref, Typed, Value
+from verify.stepnc.curves import CURVE_TABLE, CURVES, curve_points
+from verify.stepnc.part21 import Part21, Ref, Typed, Value
+from verify.stepnc.tool_motion import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
 
 SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
 MM_MIN = 60_000.0  # of one m/s
