@@ -2,7 +2,7 @@
 
 Run from the root of the checkout: ``python benchmarks/bench_isoparametric.py [--cases] [--chords] [--trims N]
 [--demo] [--wheel FOLDER [--lean DEGREES]]``; without a flag all but the last. What is left is judged by
-``verify.removal``, which shares no code with the passes. Seconds are wall clock of one run, compiled kernels: laying
+``verify.surface.removal``, which shares no code with the passes. Seconds are wall clock of one run, compiled kernels: laying
 into the square, passes and steps.
 """
 
@@ -46,7 +46,7 @@ from toolpath.passes.pass_family import Dragged, Promise, Swath, Target  # noqa:
 from toolpath.passes.side_step import lay_out as parallel  # noqa: E402
 from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes  # noqa: E402
 
 RADIUS, SCALLOP = 5.0, 0.5

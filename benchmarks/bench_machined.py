@@ -21,7 +21,7 @@ import numpy as np  # noqa: E402
 
 from tests.convergence.test_machined import SHIFTS, near_cut, slope_of  # noqa: E402
 from tests.machined_cases import CASES, Machined, wedge  # noqa: E402
-from verify.removal import residual_on_normals  # noqa: E402
+from verify.surface.removal import residual_on_normals  # noqa: E402
 
 ALL: dict[str, Callable[[], Machined]] = {**CASES, "wedge at 45 degrees": lambda: wedge(math.pi / 4)}
 

@@ -7,7 +7,7 @@ split : the ranges whole, fed the better way, and parted; and D, whose curvature
         1200 mm along on one half and 150 mm on the other
 blade : both sides of a blade of the KJ66 wheel; nothing of the wheel is looked at but that face
 
-What passes leave, and how deep they cut, is measured by ``verify.removal`` on the exact surface, 1 mm apart (0.15 mm on
+What passes leave, and how deep they cut, is measured by ``verify.surface.removal`` on the exact surface, 1 mm apart (0.15 mm on
 the blade). The bound is the closed form of a strip at the match, or at the least tilt where there is none, integrated
 over the surface: as many passes as if each could be as wide everywhere as it is in the middle of its strip.
 """
@@ -47,7 +47,7 @@ from toolpath.passes.isoparametric_passes import IsoSurface  # noqa: E402
 from toolpath.passes.isoparametric_passes import lay_out as ball_passes  # noqa: E402
 from toolpath.passes.trimmed_faces import TrimmedFace  # noqa: E402
 from verify.moves import Moves  # noqa: E402
-from verify.removal import residual_on_normals  # noqa: E402
+from verify.surface.removal import residual_on_normals  # noqa: E402
 from verify.tool_axes import ToolAxes  # noqa: E402
 
 Poses = tuple[F64, F64]

@@ -1,7 +1,7 @@
 """Side steps bracketed on the true measure: passes and what they leave, on the thesis's surfaces and on others.
 
 Run from the root of the checkout: ``python benchmarks/bench_scallop.py [--thesis] [--others N] [--parts FOLDER]``;
-without a flag both tables. What is left is measured by ``verify.removal``, which shares no code with the planner's
+without a flag both tables. What is left is measured by ``verify.surface.removal``, which shares no code with the planner's
 measure but the mesh: closed forms of straight moves on the normals of the exact surface, 0.05 mm apart, borders
 included. Seconds are wall clock, one run, compiled kernels.
 """
@@ -33,7 +33,7 @@ from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target  #
 from toolpath.passes.reach_border import beyond  # noqa: E402
 from toolpath.passes.side_step import lay_out  # noqa: E402
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
 

@@ -4,7 +4,7 @@ Run from the root of the checkout: ``python benchmarks/bench_strategies.py [--wh
 part, or the compressor wheel from the folder of parts by others. Every zone with exact faces is walked by each strategy
 through the same stock, refined by the planner's own rounds until no more than the scallop is left; then by the planner
 as it is, which goes on from what it took. What is left at the samples of the zone and how deep the ball enters the part
-are measured by ``verify.removal`` and on exact faces, which share no code with the planner. Plane-parallel passes are
+are measured by ``verify.surface.removal`` and on exact faces, which share no code with the planner. Plane-parallel passes are
 tried on the first N steep zones of each tool, 120 s at most each.
 """
 
@@ -37,7 +37,7 @@ from service.prepare import Prepared, placement_of  # noqa: E402
 from toolpath.plan_settings import Pattern
 from toolpath.workingsteps import Motion, Workingstep  # noqa: E402
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from zones.machinable_area import Form  # noqa: E402
 
 PARALLEL_S = 120

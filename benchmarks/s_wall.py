@@ -10,7 +10,7 @@ by up to 11 degrees, and twice stands upright, where A and C of a table have the
 
 Rates are of the rotary axes of a table A/C by millimetre of tip; ``rough`` is the root mean square of how the tool axis
 bends, deg/mm², with stations evenly on the tip's way; a reversal is a turn back of a rotary axis by more than 0.05 deg.
-What is left and how deep is measured by ``verify.removal`` on the exact surface, 0.5 mm apart.
+What is left and how deep is measured by ``verify.surface.removal`` on the exact surface, 0.5 mm apart.
 
 With ``--cost`` the led passes of the outer side are walked over finer and finer triangles of it instead: seconds by
 1,000 locations with the search for axes and all questions of what is in the way, and the exponent of that in triangles.
@@ -42,7 +42,7 @@ from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, posed  # noq
 from toolpath.passes.forward_step import Profile, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes  # noqa: E402
 from zones.reach.assembly import Clearances
 

@@ -14,70 +14,11 @@ import os
 import shutil
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import InputError
-from schemas.machine import DIALECT_ENDINGS
-
-PROGRAMS = tuple(f"{d}.{e}" for d, e in DIALECT_ENDINGS.items())
-RESULT_FILES = (*(f"program.{p}" for p in PROGRAMS), "job.stpnc", "job.arm.stpnc", "report.json", "zones.json",
-                "preview.png", "deviation.png", "sheet.html", "sheet.pdf", "view.bin", "machined.stl")
-ACCESS_FILES = (*(f"program.*.{p}" for p in PROGRAMS), "job.*.stpnc", "machined.*.stl")  # of further accesses
-VERIFICATION_FILES = ("report.json", "deviation.png", "view.bin", "machined.stl")
-PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.stpnc", "job.*.stpnc", "zones.json")
-PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
-
-
-def clear_results(folder: Path) -> None:
-    """Delete the files of an earlier job from a folder: a program left beside a new report would pass for proved.
-
-    Raises
-    ------
-    InputError
-        One of them cannot be deleted.
-    """
-    _clear(folder, (*RESULT_FILES, *ACCESS_FILES))
-
-
-def clear_verification(folder: Path) -> None:
-    """Delete the files of an earlier verification from a folder.
-
-    Raises
-    ------
-    InputError
-        One of them cannot be deleted; ``out_holds_a_job``: files of a plan lie there, perhaps the very program that is
-        to be proved, and the report of a plan must not be taken from beside its programs.
-    """
-    plan = sorted({p.name for pattern in PLAN_MARKS for p in folder.glob(pattern)})
-    if plan:
-        raise InputError(f"the folder {folder} holds the files of a planned job", code="out_holds_a_job",
-                         subjects=tuple(plan), remedy="give the verification a folder of its own")
-    _clear(folder, VERIFICATION_FILES)
-
-
-def _clear(folder: Path, patterns: Iterable[str]) -> None:
-    """Delete what matches, and what a crash left half written of it."""
-    wanted = [p for pattern in patterns for p in (pattern, f"{pattern}.part")]
-    for path in sorted({p for pattern in wanted for p in folder.glob(pattern)}):
-        try:
-            path.unlink(missing_ok=True)
-        except OSError as error:
-            raise InputError(f"{path} of an earlier job cannot be deleted: {error.strerror}",
-                             code="out_not_writable", remedy="give another --out") from None
-
-
-@lru_cache(maxsize=1)
-def code_version() -> str:
-    """Hash over every source file that can change a result, hex."""
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        for path in sorted(p for p in (root / package).rglob("*") if p.suffix in (".py", ".html")):
-            digest.update(f"{path.relative_to(root)}\0".encode())
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+from service.files import make_folder, make_private, sync_folder, sync_tree
+from service.version import code_version
 
 
 def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256: str | None = None,
@@ -92,41 +33,6 @@ def key_of(row: Mapping[Any, Any]) -> str:
     """Name of the result of a job, by its row."""
     return artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
                         row["spindle_tool"], row["stock_sha256"])
-
-
-def make_private(folder: Path) -> None:
-    """Make a folder that only this user can look into; one that is there keeps its mode."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    folder.mkdir(mode=0o700, exist_ok=True)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and flush the entries of those above that had to be made for it: a file that is flushed may be lost
-    with the entry of its folder."""
-    if not folder.is_dir():
-        make_folder(folder.parent)
-        folder.mkdir(exist_ok=True)
-        sync_folder(folder.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk."""
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-def sync_tree(folder: Path) -> None:
-    """Flush every file and folder below ``folder`` to the disk."""
-    for path in folder.rglob("*"):
-        if path.is_file():
-            with path.open("rb") as handle:
-                os.fsync(handle.fileno())
-        elif path.is_dir():
-            sync_folder(path)
-    sync_folder(folder)
 
 
 def _drop(path: Path) -> None:

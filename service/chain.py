@@ -24,7 +24,6 @@ from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean, Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
-from service.artifacts import clear_results
 from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld, upright
 from service.convert import (
     check_plannable,
@@ -33,9 +32,10 @@ from service.convert import (
     rotary_limits,
     tool_bodies,
 )
-from service.delivery import Files, deliver, json_bytes
+from service.delivery import Files, clear_results, deliver, json_bytes
 from service.held import FREE_RATIO, band_planes, in_turn
 from service.kept import Kept
+from service.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.materials import STEP_DOWN, bending, cutting_data, rates_of
 from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
@@ -51,7 +51,7 @@ from service.programs import (
 from service.resume import Resumed
 from service.scoring import Score, score
 from service.sheet import sheet_files
-from service.shown import MAP_NAME, MESH_NAME, MeshWish, draw_proof, machined_part
+from service.shown import MAP_NAME, draw_proof
 from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces

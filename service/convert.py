@@ -319,3 +319,8 @@ def placement_frame(placement: Placement) -> tuple[NDArray[np.float64], NDArray[
     x -= (x @ z) * z
     x /= np.linalg.norm(x)
     return np.array(placement.origin_mm, dtype=np.float64), np.vstack([x, np.cross(z, x), z])
+
+
+def material_name(setup: Setup) -> str:
+    """Name of the material of a setup."""
+    return str(getattr(setup.material, "name", None) or getattr(setup.material, "id", None) or "material")

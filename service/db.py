@@ -16,7 +16,7 @@ from sqlalchemy.engine import Engine
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
-from service.artifacts import make_private
+from service.files import make_private
 
 AWAY = (DBAPIError, PoolTimeoutError)
 """What is raised while the database does not answer: by itself, or to who waits for one of its connections."""

@@ -5,8 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+
+from geometry.errors import InputError
+from schemas.machine import DIALECT_ENDINGS
 
 Files = dict[str, tuple[str, str, str | None, bytes | Path]]
 """By name: kind, dialect, access, content; a large one as a file beside its place, which is moved there."""
@@ -55,3 +59,49 @@ def _digest(data: bytes | Path) -> str:
         return hashlib.sha256(data).hexdigest()
     with open(data, "rb") as f:
         return hashlib.file_digest(f, "sha256").hexdigest()
+
+
+PROGRAMS = tuple(f"{d}.{e}" for d, e in DIALECT_ENDINGS.items())
+RESULT_FILES = (*(f"program.{p}" for p in PROGRAMS), "job.stpnc", "job.arm.stpnc", "report.json", "zones.json",
+                "preview.png", "deviation.png", "sheet.html", "sheet.pdf", "view.bin", "machined.stl")
+ACCESS_FILES = (*(f"program.*.{p}" for p in PROGRAMS), "job.*.stpnc", "machined.*.stl")  # of further accesses
+VERIFICATION_FILES = ("report.json", "deviation.png", "view.bin", "machined.stl")
+PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.stpnc", "job.*.stpnc", "zones.json")
+
+
+def clear_results(folder: Path) -> None:
+    """Delete the files of an earlier job from a folder: a program left beside a new report would pass for proved.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be deleted.
+    """
+    _clear(folder, (*RESULT_FILES, *ACCESS_FILES))
+
+
+def clear_verification(folder: Path) -> None:
+    """Delete the files of an earlier verification from a folder.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be deleted; ``out_holds_a_job``: files of a plan lie there, perhaps the very program that is
+        to be proved, and the report of a plan must not be taken from beside its programs.
+    """
+    plan = sorted({p.name for pattern in PLAN_MARKS for p in folder.glob(pattern)})
+    if plan:
+        raise InputError(f"the folder {folder} holds the files of a planned job", code="out_holds_a_job",
+                         subjects=tuple(plan), remedy="give the verification a folder of its own")
+    _clear(folder, VERIFICATION_FILES)
+
+
+def _clear(folder: Path, patterns: Iterable[str]) -> None:
+    """Delete what matches, and what a crash left half written of it."""
+    wanted = [p for pattern in patterns for p in (pattern, f"{pattern}.part")]
+    for path in sorted({p for pattern in wanted for p in folder.glob(pattern)}):
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"{path} of an earlier job cannot be deleted: {error.strerror}",
+                             code="out_not_writable", remedy="give another --out") from None

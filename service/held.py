@@ -11,7 +11,7 @@ from service.convert import rotary_machine
 from service.prepare import Prepared
 from toolpath.counterexamples import HighWall
 from toolpath.planning.depth_bands import largest_corner, planes
-from verify.slender import thin_walls
+from verify.surface.slender_walls import thin_walls
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
 from zones.reach.access_view import View
@@ -35,7 +35,7 @@ def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) ->
     """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.planning.depth_bands``).
 
     They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor
-    bend holds near by, as the proof asks it (``verify.slender``), down to what holds the lowest; what has single places
+    bend holds near by, as the proof asks it (``verify.surface.slender_walls``), down to what holds the lowest; what has single places
     over it the proof finds.
 
     unheld : walls that a proof found without support, known as walls or not

@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from service.artifacts import sync_folder
+from service.files import sync_folder
 
 DIGEST = 32  # bytes of a SHA-256
 

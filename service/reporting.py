@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from schemas.setup import Setup, setup_sha256
+from schemas.setup import setup_sha256
 from service import advice, offers
 from service.cautions import Caution
 from service.convert import rotary_machine
@@ -39,11 +39,6 @@ def r(value: float, digits: int = 4) -> float | None:
 def faces(numbers: tuple[int, ...]) -> list[str]:
     """Face ids of face numbers."""
     return [f"F{n}" for n in numbers]
-
-
-def material_name(setup: Setup) -> str:
-    """Name of the material of a setup."""
-    return str(getattr(setup.material, "name", None) or getattr(setup.material, "id", None) or "material")
 
 
 def zones_document(report: dict[str, Any]) -> dict[str, Any]:

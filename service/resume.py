@@ -31,11 +31,11 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
-from service.artifacts import code_version
 from service.kept import Kept
 from service.packing import Known, pack, unpack
 from service.prepare import Prepared
 from service.sides import Side
+from service.version import code_version
 from toolpath.counterexamples import Counterexamples
 from toolpath.passes.pass_family import Target
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow

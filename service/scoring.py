@@ -3,7 +3,7 @@
 The proof has samples of its own, four times as dense as those zones are built of. Each is handed to the zone of a
 planning sample of the same face and form near it, if that zone's tool can touch it: judged by the exact reach of
 the tool before any pass is laid. The planner then measures its passes at the same places, by a formula of its own
-(``toolpath.stock.residual_map``); the proof measures there what the program it reads back leaves (``verify.removal``).
+(``toolpath.stock.residual_map``); the proof measures there what the program it reads back leaves (``verify.surface.removal``).
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class ProofSetup:
     rotary_rate   : rad/min, the fastest either turns in a feed move, or None
     table         : mm, Z of what the part stands on, or None; table_known : somebody said so, else it is held against
                     tools that lean only
-    free_ratio    : how many times as high as thick a wall may be free where it is finished (``verify.support``)
+    free_ratio    : how many times as high as thick a wall may be free where it is finished (``verify.surface.wall_support``)
     walls_in_turn : whether more than that is a finding; else it is a figure alone
     """
 

@@ -24,16 +24,6 @@ from verify.findings import (
     residual_findings,
 )
 from verify.gcode.reader import Program
-from verify.guard import (
-    CLOSER_SHARE,
-    SURE,
-    closer_points,
-    closer_seeds,
-    convex_edges,
-    gouge_depths,
-    guard_notes,
-    guard_samples,
-)
 from verify.material.collision import DIP
 from verify.material.dogleg_rapids import box_findings
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
@@ -54,9 +44,19 @@ from verify.moves import BOW, Moves
 from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
 from verify.progress import Report, Stages
-from verify.removal import residual_on_normals
-from verify.scoring import RAY_ERROR, face_proofs, proved_samples, zone_proofs
-from verify.support import supported
+from verify.surface.guard_points import (
+    CLOSER_SHARE,
+    SURE,
+    closer_points,
+    closer_seeds,
+    convex_edges,
+    gouge_depths,
+    guard_notes,
+    guard_samples,
+)
+from verify.surface.removal import residual_on_normals
+from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
+from verify.surface.wall_support import supported
 
 LEAST_REACH = 1.0
 READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known

@@ -12,14 +12,13 @@ from schemas.machine import DIALECT_ENDINGS, Machine
 from schemas.materials import MATERIALS
 from schemas.setup import Stock
 from schemas.tools import BUILT_KINDS
-from service.artifacts import code_version
 from service.errors import UnauthorizedError
 from service.keys import SCOPES
 from service.principals import Who
 from service.problems import responses
 from service.settings import Settings
 from service.uploads import DEADLINE_S
-from service.version import VERSION
+from service.version import VERSION, code_version
 
 router = APIRouter(prefix="/v1/capabilities", tags=["operation"])
 

@@ -8,7 +8,7 @@ import pytest
 from tests.machined_cases import BOX, CASES, mill, path
 from tests.oracle.turning_twin import least_left
 from tests.oracle.turning_twin import random_rays as rays
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 
 STEPS = np.array([0.8, 0.4, 0.2])
 SHIFTS = np.random.default_rng(1).uniform(0.0, 1.0, (4, 3))  # wherever the lattice falls

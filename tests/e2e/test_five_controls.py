@@ -14,9 +14,9 @@ from geometry.errors import InternalError
 from output.gcode.dialects import DIALECTS
 from schemas.machine import DIALECT_ENDINGS
 from service import chain, programs
-from service.artifacts import clear_results
 from service.cli import app
 from service.convert import parse_setup
+from service.delivery import clear_results
 from tests.step_files import write_step
 from verify.gcode.dialects import DIALECTS as READ
 

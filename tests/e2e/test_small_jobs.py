@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from service import chain
-from service.artifacts import RESULT_FILES
 from service.cli import app
+from service.delivery import RESULT_FILES
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")

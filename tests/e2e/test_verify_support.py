@@ -28,7 +28,7 @@ from verify.findings import Source
 from verify.model import FindingKind, ScoredSamples
 from verify.moves import Moves
 from verify.prove import Proof, prove
-from verify.support import supported
+from verify.surface.wall_support import supported
 from verify.tool_axes import ToolAxes
 
 PART = wall_part()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program, scored, text
-from verify.guard import gouge_depths
 from verify.material.machined_part import machined_stock
 from verify.material.tiles import run_tiles
 from verify.prove import prove
+from verify.surface.guard_points import gouge_depths
 
 PART = block()
 SCORED = scored(PART)

@@ -10,12 +10,12 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.pocket_case import TOOL, block
 from verify.blank.blank import stock_on_normals
-from verify.guard import convex_edges, gouge_depths
 from verify.kernels.heights import lowest
 from verify.material.stock_lines import blank, run_stock
 from verify.material.stock_pass import descents, end_radii
 from verify.model import ProofSetup, StockKind
 from verify.moves import Moves
+from verify.surface.guard_points import convex_edges, gouge_depths
 
 
 def profile(rho, radius, corner, grow):

@@ -11,7 +11,7 @@ from verify.kernels.pose import MOST_ANGLE, PIECE, fill_piece, near_segment2, pi
 from verify.kernels.profile import FINE, carried, standing
 from verify.material.point_tree import CHUNK, PointTree, curve_keys
 from verify.moves import BOW, Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes, square_to
 
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}

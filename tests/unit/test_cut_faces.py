@@ -13,7 +13,7 @@ from toolpath.passes.cutter_locations import lifted
 from toolpath.passes.forward_step import Profile, steps
 from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 
 PLANES = (6.5, 10.0)  # of z + 0.15 x, mm
 SCALLOP, CHORD = 0.02, 0.004

@@ -18,7 +18,7 @@ from toolpath.passes.cutter_locations import lifted, tips
 from toolpath.passes.forward_step import Profile, steps
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out, side_step
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 
 RADIUS, SCALLOP = 5.0, 0.5
 

@@ -19,7 +19,7 @@ from toolpath.stock.cut_history import Depths, Walked
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import course, laid
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from zones.lattice import Lattice
 
 SCALLOP, CHORD = 0.02, 0.004

@@ -268,7 +268,7 @@ def test_a_key_that_becomes_free_in_between_makes_a_new_job(store, monkeypatch):
 
 
 def test_folders_that_are_made_for_a_file_are_flushed_too(tmp_path, monkeypatch):
-    flushed, sync = [], service.artifacts.sync_folder
+    flushed, sync = [], service.files.sync_folder
     monkeypatch.setattr(service.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
     files = Artifacts(tmp_path / "data")
     sha, _ = files.put_blob([b"abc"])

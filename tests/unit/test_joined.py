@@ -13,7 +13,7 @@ from toolpath.passes.cutter_locations import lifted
 from toolpath.passes.forward_step import Profile, steps
 from toolpath.passes.isoparametric_passes import JoinedSurface, lay_out
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 
 LINE = np.array([0.0, 0, 1, 1])
 ARC = np.array([0.0, 0, 0, 1, 1, 1])

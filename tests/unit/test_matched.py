@@ -15,7 +15,7 @@ from toolpath.five_axis.matched_passes import Matched, Wanted
 from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
 from toolpath.passes.isoparametric_passes import IsoSurface
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes
 
 HALF = 20.0

@@ -9,7 +9,7 @@ from tests.hand_parts import ball, tool
 from toolpath.five_axis.curvature_matching import clear_tilt, gouge_depth, matching_tilt, mean_direction, strip_width
 from toolpath.passes.cutter_locations import tips
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes
 
 H = 0.005

@@ -16,7 +16,7 @@ from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.strategies.isoparametric import course
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 from verify.tool_axes import ToolAxes
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField

@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 from tests.hand_parts import box_mesh, dome, slope_field
-from verify.guard import (
+from verify.surface.guard_points import (
     DEEP_A_MOVE,
     MOST_SEEDS,
     closer_points,

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.tool_body import ToolBody
 from verify.moves import Moves
-from verify.removal import residual_on_normals
+from verify.surface.removal import residual_on_normals
 
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0)
 FLAT = ToolBody("T2", 2, 4.0, 0.0, 8.0, 3.8, 20.0, 6.0, 45.0)

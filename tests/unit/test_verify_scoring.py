@@ -8,7 +8,7 @@ from geometry.sampling import SurfaceSamples
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program, scored, text
 from verify.model import ProofSetup
 from verify.prove import prove
-from verify.scoring import face_proofs, proved_samples, zone_proofs
+from verify.surface.sample_scores import face_proofs, proved_samples, zone_proofs
 
 BUDGET = ProofSetup(scallop_height=0.02, gouge_tolerance=0.01, stock_allowance=0.1)
 FACE = np.array([7, 3, 7, 7, 3, 7], np.int32)

@@ -13,7 +13,7 @@ from geometry.sampling import sample_surface
 from tests.decomposition_shapes import box, to_part
 from tests.hand_parts import joined, terraces
 from tests.thin_wall_case import FOOT, LEFT, RIGHT, THICK, TOP, wall_part
-from verify.slender import HELD, STEP, ThinWalls, thin_walls
+from verify.surface.slender_walls import HELD, STEP, ThinWalls, thin_walls
 
 
 def places(mesh: TriangleMesh, ratio: float = 10.0, density: float = 60.0) -> ThinWalls:

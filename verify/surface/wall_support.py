@@ -1,6 +1,6 @@
 """Whether thin walls keep their support: both sides go down in turn, and stock stands beside them not far below.
 
-Notation: p and q are opposite places of a thin wall (``verify.slender``), K the ratio of height to thickness that a
+Notation: p and q are opposite places of a thin wall (``verify.surface.slender_walls``), K the ratio of height to thickness that a
 wall may be free for. ``done(p)`` is when no more than twice the scallop is left at p over the allowance, ``gone(p)``
 when so much of the stock before it is gone that it no longer holds the wall. **The rule**: when both p and q are done,
 there is a place of the same wall, no farther from p than its limit, K times the mean thickness below p, at which stock
@@ -24,9 +24,9 @@ from verify.findings import Source
 from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support
 from verify.moves import Moves
 from verify.progress import Report, silent
-from verify.removal import residual_on_normals
-from verify.scoring import RAY_ERROR
-from verify.slender import ThinWalls, thin_walls
+from verify.surface.removal import residual_on_normals
+from verify.surface.sample_scores import RAY_ERROR
+from verify.surface.slender_walls import ThinWalls, thin_walls
 
 PARTS = 256
 """Parts of the program that times are told in: what happens in one of them counts as at once, and as in order."""

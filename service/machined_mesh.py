@@ -1,0 +1,74 @@
+"""The machined part as a mesh: which one is asked for, its figures and its STL file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.errors import InputError
+from geometry.mesh import F64
+from geometry.part import Part
+from geometry.stl import stl_bytes
+from geometry.tool_body import ToolBody
+from service.shown import MAP_NAME
+from verify.checks.program_sequence import Given
+from verify.material.machined_part import check_step, machined_stock, surface_error
+from verify.model import ProofSetup
+from verify.progress import Report
+
+MESH_NAME, MAP_NAME = "machined.stl", "deviation.png"
+
+
+@dataclass(frozen=True, eq=False)
+class MeshWish:
+    """The mesh of the machined part that is asked for.
+
+    step : mm between nodes; box : (2, 3) float64, mm, a window in the coordinates of the program, or None
+    """
+
+    step: float
+    box: F64 | None = None
+
+    @classmethod
+    def of(cls, step: float, box: str | None) -> MeshWish:
+        """From what was written: ``box`` as 'x0,y0,z0,x1,y1,z1'.
+
+        Raises
+        ------
+        InputError
+            ``bad_mesh_step``, ``bad_mesh_box``.
+        """
+        check_step(step)
+        if box is None:
+            return cls(step)
+        try:
+            numbers = [float(v) for v in box.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != 6:
+            raise InputError(f"the window of the machined part is no six numbers: {box}", code="bad_mesh_box",
+                             measured=box, remedy="give x0,y0,z0,x1,y1,z1 in mm, the lower corner first")
+        return cls(step, np.array(numbers).reshape(2, 3))
+
+
+def machined_part(wish: MeshWish, programs: Sequence[Given], part: Part, tools: Sequence[ToolBody],
+                  setup: ProofSetup, progress: Report, *, spindle_tool: int = 0) -> tuple[dict[str, Any], bytes]:
+    """The machined part as figures for the report, file and access left out, and as a binary STL file.
+
+    programs, part, tools, setup, spindle_tool : as ``verify.material.machined_part.machined_stock`` takes them, and errors as it
+        raises them; ``nothing_stands`` (InputError) where the window holds no stock
+    """
+    field = machined_stock(programs, part, tools, setup, wish.step, box=wish.box, spindle_tool=spindle_tool,
+                           progress=progress)
+    mesh = field.surface()
+    if not len(mesh.faces):
+        raise InputError("nothing stands in the window of the machined part", code="nothing_stands",
+                         measured=None if wish.box is None else wish.box.tolist(),
+                         remedy="give a window that holds some of the part, or a finer step")
+    figures = {"volume_mm3": round(field.volume, 4), "step_mm": round(field.step, 6),
+               "error_mm": round(surface_error(field.step, setup.kinematics is not None), 6),
+               "box_mm": np.round(mesh.bounds, 4).tolist(), "triangles": len(mesh.faces)}
+    return figures, stl_bytes(mesh)
