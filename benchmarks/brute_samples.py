@@ -379,7 +379,7 @@ def planned_normals(mesh: Any, points: F64, triangles: NDArray[np.int64]) -> F64
 def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, normals: F64, lift: float,
                   allowance: float, cusp: float) -> dict[str, BOOL]:
     """What ``zones.reach.tip_field.touchable`` says of samples (n, 3) mm, with and without its play."""
-    from zones.reach.tip_field import tip_field
+    from zones.reach import tip_field
 
     field = tip_field.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, tip_field.lattice_step(tool), allowance,
                            cusp)

@@ -13,13 +13,12 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.stl import stl_bytes
 from geometry.tool_body import ToolBody
-from service.shown import MAP_NAME
 from verify.checks.program_sequence import Given
 from verify.material.machined_part import check_step, machined_stock, surface_error
 from verify.model import ProofSetup
 from verify.progress import Report
 
-MESH_NAME, MAP_NAME = "machined.stl", "deviation.png"
+MESH_NAME = "machined.stl"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from geometry.sampling import SurfaceSamples
 from service.deviation import COLOURS, Mark, Measured, draw_deviation
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 
+MAP_NAME = "deviation.png"
 MOST_GOUGES = 4
 
 

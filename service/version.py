@@ -1,11 +1,12 @@
-"""The version of the product, as programs, reports and the API carry it."""
+"""The version of the product, as programs, reports and the API carry it, and the digest of its sources."""
+
+from __future__ import annotations
+
 import hashlib
 from functools import lru_cache
 from pathlib import Path
 
 VERSION = "0.1.0"
-
-
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from geometry.errors import ProgramError, VerificationError
 from verify.gcode.reader import read_program
+from verify.program import move_log
 from verify.program.move_log import MOST_MOVES_A_BLOCK
-from verify.program.program import move_log
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"

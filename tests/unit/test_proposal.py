@@ -14,7 +14,7 @@ from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_
 from zones.reach.access_reach import able
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import touchable
-from zones.remainder.remainder import tool_proposal
+from zones.remainder import tool_proposal
 from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, catalogue
 from zones.remainder.tool_proposal import propose
 from zones.remainder.tool_requirements import Buyer, Cutter

@@ -9,8 +9,8 @@ from geometry.tool_body import ToolBody
 from verify.kinematics import Kinematics
 from verify.program.program import Program, Remark
 from verify.progress import Report, silent
+from verify.stepnc import ap238, iso14649
 from verify.stepnc.part21 import Part21, is_exchange_file
-from verify.stepnc.reader import ap238, iso14649
 from verify.stepnc.tool_motion import Course, Cutter, CutterMoves
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
