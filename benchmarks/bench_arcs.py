@@ -36,8 +36,8 @@ from geometry.mesh import F64  # noqa: E402
 from output.arc_fitting import SHARE, fitted, stretches  # noqa: E402
 from output.program_grid import GridArc, pieces, to_grid  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
-from service import chain, programs  # noqa: E402
-from service.convert import parse_setup  # noqa: E402
+from service import pipeline, programs  # noqa: E402
+from service.from_wire import parse_setup  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
 from toolpath.workingsteps import Motion  # noqa: E402
@@ -90,7 +90,7 @@ def planned(folder: Path, part: Path, setup: dict[str, Any], arcs: bool) -> tupl
     programs.fitted = spied
     try:
         setup = {**setup, "machine": {**setup.get("machine", {}), "arcs": arcs}}
-        report = chain.plan(part, parse_setup(setup), folder, lambda _stage, _share: None)
+        report = pipeline.plan(part, parse_setup(setup), folder, lambda _stage, _share: None)
     finally:
         programs.fitted = fitted
     return report, *(seen or [None, None])

@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.parts_table import PUBLIC, Job, family_job, public_job  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
-from service.convert import read_setup  # noqa: E402
+from service.from_wire import read_setup  # noqa: E402
 from service.prepare import Prepared, prepare  # noqa: E402
 from service.reporting import accesses_of  # noqa: E402
 

@@ -34,7 +34,7 @@ from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
-from service.convert import read_setup, tool_bodies  # noqa: E402
+from service.from_wire import read_setup, tool_bodies  # noqa: E402
 from tests import pocket_case  # noqa: E402
 from verify.blank.blank import stock_bounds  # noqa: E402
 from verify.gcode.reader import FEED, read_program  # noqa: E402

@@ -72,7 +72,7 @@ def start_figures(folder: Path) -> dict[str, float]:
 def cpu_of(service: Service) -> dict[str, float]:
     """Processor time of each process and of the children it has waited for, s."""
     found: dict[str, float] = {}
-    for k, kept in enumerate(service.kept):
+    for k, kept in enumerate(service.checkpoint_store):
         times = psutil.Process(kept.process.pid).cpu_times()
         name = Path(kept.process.args[1]).stem if isinstance(kept.process.args, list) else str(k)
         label = kept.process.args[2] if name == "-m" and isinstance(kept.process.args, list) else "api"

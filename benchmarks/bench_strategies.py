@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-import service.chain as chain  # noqa: E402
+import service.pipeline as chain  # noqa: E402
 import toolpath.planning.job_plan as planner  # noqa: E402
 import toolpath.planning.zone_finishing as finish  # noqa: E402
 from examples.family import make_part  # noqa: E402
@@ -32,7 +32,7 @@ from geometry.mesh import F64  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
-from service.convert import parse_setup  # noqa: E402
+from service.from_wire import parse_setup  # noqa: E402
 from service.prepare import Prepared, placement_of  # noqa: E402
 from toolpath.plan_settings import Pattern
 from toolpath.workingsteps import Motion, Workingstep  # noqa: E402

@@ -433,7 +433,7 @@ def reach_of_files(part_path: Path, setup_path: Path, step: float | None = None)
     CamError
         Either file is wrong.
     """
-    from service.convert import read_setup
+    from service.from_wire import read_setup
     from service.prepare import load
 
     setup = read_setup(setup_path)

@@ -395,7 +395,7 @@ COLUMNS = ("reached", "cutter differs", "cutter wrong", "differs", "wrong", "wro
 def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any]:
     """Figures of one part: by tool and for the union of the tools, shares of the machinable area."""
     from geometry.mesh_queries.bvh import TriangleTree
-    from service.convert import read_setup, tool_bodies
+    from service.from_wire import read_setup, tool_bodies
     from service.prepare import clearances, load
 
     setup = read_setup(setup_path)

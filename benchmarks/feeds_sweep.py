@@ -19,9 +19,9 @@ from examples.setups import suggest_setup
 from output.header_text import decimal
 from schemas.materials import MATERIALS
 from schemas.setup import Setup
-from service.chain import cut_table
-from service.convert import parse_setup
-from service.materials import DEFAULT_MAX_FEED_MM_MIN, DEFAULT_MAX_RPM
+from service.cutting_data import DEFAULT_MAX_FEED_MM_MIN, DEFAULT_MAX_RPM
+from service.from_wire import parse_setup
+from service.pipeline import cut_table
 from toolpath.plan_settings import CutData
 
 PARTS = 300

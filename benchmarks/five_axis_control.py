@@ -42,8 +42,8 @@ from scipy.ndimage import minimum_filter1d  # noqa: E402
 
 from geometry.mesh import F64  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
-from service import chain  # noqa: E402
-from service.convert import machine_kinematics, parse_setup  # noqa: E402
+from service import pipeline  # noqa: E402
+from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
 from service.programs import gauge_lengths  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.program.program import Program  # noqa: E402
@@ -161,7 +161,7 @@ def table(name: str, folder: Path, faster: float) -> tuple[list[list[str]], bool
     """Plan, prove and run the bar on one machine: rows of the table, and whether all is as it should be."""
     setup, out, kind = setup_of(name), folder / name, MACHINES[name]["kinematics"]
     write_bar(folder / "bar.step")
-    state = chain.plan(folder / "bar.step", setup, out, lambda _stage, _share: None)["state"]
+    state = pipeline.plan(folder / "bar.step", setup, out, lambda _stage, _share: None)["state"]
     if state != "proved":
         return [[name, state, *["-"] * (len(HEAD) - 2)]], False
     program = out / "program.linuxcnc.ngc"

@@ -23,8 +23,8 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.parts_table import PUBLIC, Job, family_job, public_job  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
-from service import chain  # noqa: E402
-from service.convert import read_setup  # noqa: E402
+from service import pipeline  # noqa: E402
+from service.from_wire import read_setup  # noqa: E402
 
 MACHINE = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-30, 110], [-360, 360]]}
 KINDS: dict[str, dict[str, Any]] = {"upright": {"orientations": "given", "simultaneous": False},
@@ -42,7 +42,7 @@ def row(name: str, kind: str, job: Job, out: Path) -> list[str]:
     given = read_setup(job.setup).model_dump(mode="json", exclude_unset=True)
     given["machine"] = {**MACHINE, **KINDS[kind]}
     begun = time.perf_counter()
-    report = chain.plan(job.part, Setup.model_validate(given), out, silent)
+    report = pipeline.plan(job.part, Setup.model_validate(given), out, silent)
     seconds = time.perf_counter() - begun
     steps: dict[str, dict[str, Any]] = {s["id"]: s for s in report["steps"]}
     zones = report["zones"]

@@ -41,7 +41,7 @@ def planned(seed: int, folder: Path) -> dict[str, Any]:
     from examples.family import make_part
     from geometry.errors import CamError
     from schemas.setup import Setup
-    from service import chain
+    from service import pipeline
 
     made = make_part(seed, "random", walls=2 + seed % 2, connections=seed % 4, gap=GAPS)
     step, _, _ = made.write(folder)
@@ -50,7 +50,7 @@ def planned(seed: int, folder: Path) -> dict[str, Any]:
     form = list(FORMS)[seed % len(FORMS)]
     machine = {**MACHINE, "ap238": form, "restart_points": True}
     try:
-        report = chain.plan(step, Setup.model_validate({**made.setup, "machine": machine}), folder / "job", silent)
+        report = pipeline.plan(step, Setup.model_validate({**made.setup, "machine": machine}), folder / "job", silent)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}
     zones = report["zones"]

@@ -59,14 +59,14 @@ def patterns() -> dict[str, str]:
 def jobs(folder: Path) -> dict[str, str]:
     """Programs of three whole jobs, by name."""
     from benchmarks.stepnc_family import MACHINES, small
-    from service import chain
-    from service.convert import parse_setup
+    from service import pipeline
+    from service.from_wire import parse_setup
 
     made = {}
     for seed, machine in enumerate(MACHINES):
         part, setup = small(seed, folder)
         setup |= {"stock": {"kind": "box", "margin_mm": 0.6, "uncertainty_mm": 0.2}, "machine": MACHINES[machine]}
-        report = chain.plan(part, parse_setup(setup), folder / machine, lambda _stage, _share: None)
+        report = pipeline.plan(part, parse_setup(setup), folder / machine, lambda _stage, _share: None)
         (program,) = (folder / machine).glob("program*.ngc")
         made[f"small:{seed} on {machine}, {len(report['steps'])} steps"] = program.read_text()
     return made

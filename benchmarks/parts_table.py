@@ -142,8 +142,8 @@ def run_job(job: Job, out: Path, with_brute: bool) -> list[str]:
     """Plan, prove, judge and compare one part."""
     from benchmarks.brute_reach import reach_of_files
     from geometry.errors import CamError
-    from service.chain import plan
-    from service.convert import read_setup
+    from service.from_wire import read_setup
+    from service.pipeline import plan
 
     stages, folder = Stages(), out / job.name.replace(":", "-")
     try:

@@ -49,8 +49,8 @@ from benchmarks.stepnc_family import LABEL, from_labels  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from output.clamping_sequence import SPARE  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
-from service import chain  # noqa: E402
-from service.convert import machine_kinematics, parse_setup  # noqa: E402
+from service import pipeline  # noqa: E402
+from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
 from service.programs import gauge_lengths  # noqa: E402
 from verify.gcode.reader import RAPID, read_program  # noqa: E402
 
@@ -224,7 +224,7 @@ def table(name: str, folder: Path, faster: float, by_line: bool) -> bool:
     """Plan, prove and run one job; prints its rows and says whether all is as it should be."""
     folder.mkdir(parents=True, exist_ok=True)
     part, setup = job(name, folder)
-    state = chain.plan(part, setup, folder / "out", lambda _stage, _share: None)["state"]
+    state = pipeline.plan(part, setup, folder / "out", lambda _stage, _share: None)["state"]
     if state != "proved":
         print(f"| {name} | {state} |" + " |" * (len(HEAD) - 2), flush=True)
         return False

@@ -37,8 +37,8 @@ import numpy as np  # noqa: E402
 
 from examples.family import RECIPES, make_part  # noqa: E402
 from geometry.errors import CamError  # noqa: E402
-from service import chain  # noqa: E402
-from service.convert import parse_setup  # noqa: E402
+from service import pipeline  # noqa: E402
+from service.from_wire import parse_setup  # noqa: E402
 
 CHECK = ROOT.parent / "shared" / "stepnc" / "p21check.py"
 GCODE = ROOT.parent / "shared" / "tools" / "gcode_check.sh"
@@ -119,7 +119,7 @@ def row(recipe: str, seed: int, machine: str, scallop: float | None, folder: Pat
     if scallop is not None:
         setup["quality"] = {**setup["quality"], "scallop_height_mm": scallop, "chordal_tolerance_mm": CHORDS}
     try:
-        report = chain.plan(part, parse_setup(setup), folder / "out", lambda _stage, _share: None)
+        report = pipeline.plan(part, parse_setup(setup), folder / "out", lambda _stage, _share: None)
     except CamError as refusal:
         return f"{form} | {refusal.code} | | | | |"
     found = "".join(f", {count} {kind}" for kind, count in report["finding_counts"].items())

@@ -58,12 +58,12 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
     from examples.family import make_part
     from geometry.errors import CamError
     from schemas.setup import Setup
-    from service import chain
+    from service import pipeline
     from toolpath.planning.job_plan import Plan, plan_job
 
     if spacing is not None:
-        usual = chain.proof_setup
-        chain.proof_setup = lambda *a, **k: replace(usual(*a, **k), line_spacing=spacing)
+        usual = pipeline.proof_setup
+        pipeline.proof_setup = lambda *a, **k: replace(usual(*a, **k), line_spacing=spacing)
     recipe, seed = part.split(":")
     made = make_part(int(seed), recipe, **PARTS[part])
     step, _, _ = made.write(folder)
@@ -82,7 +82,7 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
 
     facts = {"part": part, "axes": axes, "plan": plan, "spacing": spacing, "engaged_limit": engaged}
     try:
-        report = chain.plan(step, Setup.model_validate(setup), folder / "job", stages,
+        report = pipeline.plan(step, Setup.model_validate(setup), folder / "job", stages,
                             planner=plain if plan == "baseline" else plan_job)
     except CamError as refusal:
         return facts | {"state": "error", "code": refusal.code, "message": refusal.message}

@@ -30,7 +30,7 @@ POST a part with its setup, follow the events, fetch report and files. Lengths a
 in its name. Errors are application/problem+json."""
 
 
-def create_app(settings: Settings | None = None, chain: str = "service.chain") -> FastAPI:
+def create_app(settings: Settings | None = None, chain: str = "service.pipeline") -> FastAPI:
     """The application.
 
     settings : taken from the environment when None

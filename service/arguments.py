@@ -66,7 +66,7 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
     """
     from geometry.errors import InputError
     from geometry.step_import.text_checks import check_text
-    from service.convert import no_stock_file, of_blank
+    from service.from_wire import no_stock_file, of_blank
 
     if setup.stock.kind != "step":
         return None

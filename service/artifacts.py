@@ -121,7 +121,7 @@ class Artifacts:
         return True
 
     def kept(self, key: str) -> Path:
-        """Where attempts at the result of that key keep what the next one takes over (``service.kept``)."""
+        """Where attempts at the result of that key keep what the next one takes over (``service.checkpoint_store``)."""
         return self.root / "kept" / key[:2] / key
 
     def drop_kept(self, key: str) -> None:

@@ -1,7 +1,7 @@
 """Blank and fixtures of a setup against the part they are meant for, once its place is known.
 
 What the setup alone can say (a margin of 0, an allowance beyond the margin) is found before that, in
-``service.convert.check_blank``.
+``service.from_wire.check_blank``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.part import Part
 from geometry.sampling import sample_surface
 from schemas.setup import Setup
-from service.convert import face_numbers
+from service.from_wire import face_numbers
 from service.stock import Blank
 from verify.blank.blank import stock_on_normals
 from verify.model import ProofSetup

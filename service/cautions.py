@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from schemas.setup import Setup
-from service.materials import cutting_data
+from service.cutting_data import cutting_data
 from service.prepare import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.linking.ramp_entry import LEAST_RUN

@@ -3,7 +3,7 @@
 
 The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
 Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it takes something over from an
-attempt before (``service.kept``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
+attempt before (``service.checkpoint_store``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
 """
 
 
@@ -52,8 +52,8 @@ def compute(request, progress, resumed):
     import json
     from pathlib import Path
 
-    from service.convert import parse_setup
-    from service.kept import Kept
+    from service.checkpoint_store import Kept
+    from service.from_wire import parse_setup
 
     chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])

@@ -41,8 +41,8 @@ def plan(part: Part, setup: SetupPath,
     """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
-        from service.chain import plan as plan_job
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
+        from service.pipeline import plan as plan_job
 
         report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box), blank_path=blank)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
@@ -57,7 +57,7 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
-        from service.chain import zones_only
+        from service.pipeline import zones_only
 
         return zones_only(part, given, progress, blank_path=blank), 0
 
@@ -83,9 +83,9 @@ def verify(part: Part, setup: SetupPath,
     """Prove any program or STEP-NC, also foreign ones; the report goes to stdout, what was found in short to stderr."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
-        from service.chain import verify_program
         from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
+        from service.pipeline import verify_program
 
         started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
         result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank,
@@ -221,7 +221,7 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None],
     with reported(as_json):
         from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
-        from service.convert import read_setup
+        from service.from_wire import read_setup
 
         given = read_setup(setup)
         check_text(part)

@@ -55,7 +55,7 @@ def print_json(data: Any) -> None:
 def verification_summary(report: dict[str, Any], seconds: float) -> str:
     """A verification in a few lines: state, findings by kind with the first line of each, coverage, files, time.
 
-    report  : as ``service.chain.verify_program`` gives it; seconds : it took
+    report  : as ``service.pipeline.verify_program`` gives it; seconds : it took
     """
     count = sum(report.get("finding_counts", {}).values())
     lines = [f"{report['state']}: {count or 'no'} finding{'' if count == 1 else 's'}"]

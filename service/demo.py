@@ -20,7 +20,7 @@ from service.logs import configure
 from service.server import background, settings_with, wait_for_interrupt
 
 
-def run_demo(out: Path, *, keep: bool, chain: str = "service.chain") -> int:
+def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
     """Make the sample part, serve, post, follow, fetch; returns 0 only when the job is proved.
 
     out  : folder the files are fetched into
@@ -62,8 +62,8 @@ def run_warm() -> None:
     """
     from examples.demo import write_small
     from geometry.kernels.cache import FOLDER, remove_stale
-    from service.chain import plan
-    from service.convert import read_setup
+    from service.from_wire import read_setup
+    from service.pipeline import plan
 
     if FOLDER is not None:
         remove_stale(FOLDER)

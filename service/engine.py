@@ -49,7 +49,7 @@ class Engine:
     >>> engine.start(); engine.close()   # doctest: +SKIP
     """
 
-    def __init__(self, settings: Settings, chain: str = "service.chain") -> None:
+    def __init__(self, settings: Settings, chain: str = "service.pipeline") -> None:
         self.settings = settings
         self.owner = f"service-{uuid.uuid4().hex}"
         self.work = WorkConfig(

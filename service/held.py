@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from service.cautions import MOST_RATIO, walls_to_cut
-from service.convert import rotary_machine
+from service.from_wire import rotary_machine
 from service.prepare import Prepared
 from toolpath.counterexamples import HighWall
 from toolpath.planning.depth_bands import largest_corner, planes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from geometry.tool_body import ToolBody
 from schemas.setup import Setup
 from schemas.tools import Tool
-from service.convert import tool_bodies
+from service.from_wire import tool_bodies
 from service.prepare import Prepared, clearances, tip_field
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View

@@ -15,7 +15,6 @@ from starlette.routing import compile_path
 
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
-from service.convert import MOST_TOLD, sentence
 from service.db import AWAY
 from service.errors import (
     ERROR_TABLE,
@@ -31,6 +30,7 @@ from service.errors import (
     UnavailableError,
     problem_document,
 )
+from service.from_wire import MOST_TOLD, sentence
 from service.head import is_stream
 from service.storage import STORAGE_FULL, is_full
 

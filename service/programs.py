@@ -23,8 +23,8 @@ from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service import reporting
-from service.convert import rotary_machine, tool_bodies
-from service.materials import rates_of
+from service.cutting_data import rates_of
+from service.from_wire import rotary_machine, tool_bodies
 from service.prepare import TABLE_SPARE, Prepared, table_height
 from service.sides import Look, Program, Side
 from service.stock import turned_box
@@ -208,7 +208,7 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     """By how much the ball that tools turn outside of is moved up, and made greater, so that they clear the table.
 
     height, radius : mm, of its centre and its size
-    leans  : rad, the most a tool leans, well below a half turn (``service.convert.check_plannable``)
+    leans  : rad, the most a tool leans, well below a half turn (``service.from_wire.check_plannable``)
     table  : mm, Z that no tool may come down to
 
     Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its

@@ -14,7 +14,7 @@ from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
 from service import advice, offers
 from service.cautions import Caution
-from service.convert import rotary_machine
+from service.from_wire import rotary_machine
 from service.prepare import Prepared, clearances
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan

@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
-from service.kept import Kept
-from service.packing import Known, pack, unpack
+from service.checkpoint_store import Kept
 from service.prepare import Prepared
+from service.serialization import Known, pack, unpack
 from service.sides import Side
 from service.version import code_version
 from toolpath.counterexamples import Counterexamples
@@ -119,7 +119,7 @@ class Resumed:
         """Keep a value for another attempt; False where that could not be done."""
         try:
             done = self.kept.put(kind, name, pack(value, self._known))
-        except TypeError as error:  # a class that ``service.packing`` does not know: no reason for a job to fail
+        except TypeError as error:  # a class that ``service.serialization`` does not know: no reason for a job to fail
             log.warning("cannot be kept for another attempt", kind=kind, error=str(error))
             return False
         if not done:

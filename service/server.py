@@ -19,8 +19,8 @@ from pydantic_settings import SettingsError
 
 from geometry.errors import CamError, SetupError
 from service.app import create_app
-from service.convert import problems_of
 from service.errors import UnavailableError
+from service.from_wire import problems_of
 from service.logs import configure
 from service.settings import Settings
 
@@ -76,12 +76,12 @@ class _Server(uvicorn.Server):
         return known or UnavailableError("the service did not start; the log says why", code="did_not_start")
 
 
-def _server(settings: Settings, chain: str = "service.chain") -> _Server:
+def _server(settings: Settings, chain: str = "service.pipeline") -> _Server:
     return _Server(uvicorn.Config(create_app(settings, chain), log_config=None, access_log=False,
                                   timeout_graceful_shutdown=5))
 
 
-def run_server(settings: Settings, chain: str = "service.chain") -> None:
+def run_server(settings: Settings, chain: str = "service.pipeline") -> None:
     """Serve until SIGINT or SIGTERM; running jobs go back to the queue.
 
     chain : see ``create_app``
@@ -112,7 +112,7 @@ def _run_quietly(server: _Server, listener: socket.socket) -> None:
 
 
 @contextmanager
-def background(settings: Settings, chain: str = "service.chain") -> Iterator[str]:
+def background(settings: Settings, chain: str = "service.pipeline") -> Iterator[str]:
     """Serve in a thread; yields the base URL.
 
     Raises

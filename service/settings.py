@@ -85,7 +85,7 @@ class Settings(BaseSettings):
     @field_validator("webhook_origins")
     @classmethod
     def _origins(cls, value: list[str]) -> list[str]:
-        from service.targets import parse_origin
+        from service.outbound_requests import parse_origin
 
         return [parse_origin(text) for text in value]
 

@@ -22,8 +22,8 @@ from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from schemas.setup import Setup
 from service.clampshot import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
-from service.convert import material_name, tool_bodies
 from service.delivery import Files, listed
+from service.from_wire import material_name, tool_bodies
 from service.prepare import Prepared
 from service.programs import access_of, gauge_lengths, proof_frame
 from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard

@@ -14,7 +14,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from schemas.setup import Setup
-from service.convert import no_stock_file
+from service.from_wire import no_stock_file
 from toolpath.stock.stock_map import StockMap
 from zones.reach.access_view import View, turned
 

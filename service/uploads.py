@@ -18,9 +18,9 @@ from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_import.text_checks import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.artifacts import Artifacts
-from service.convert import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
 from service.engine import Engine
 from service.errors import RequestError
+from service.from_wire import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
 from service.store import NewJob
 from service.webhooks import registered
 

@@ -12,8 +12,8 @@ from geometry.errors import CamError
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
-from service.convert import tool_bodies
 from service.delivery import Files
+from service.from_wire import tool_bodies
 from service.prepare import Prepared
 from service.reporting import REMAINDER_FLOOR_MM2
 from service.scoring import Score

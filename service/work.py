@@ -53,7 +53,7 @@ class WorkConfig:
     data_dir: str
     limits: Limits
     lease_s: float
-    chain: str = "service.chain"
+    chain: str = "service.pipeline"
     max_attempts: int = 3
     log_level: str = "info"
     log_format: str = "console"

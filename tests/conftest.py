@@ -41,8 +41,8 @@ class PlannedJob:
 @pytest.fixture(scope="session")
 def demo_job(demo_files: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> PlannedJob:
     """The demo part planned and proved once per run (half a minute or so)."""
-    from service.chain import plan
-    from service.convert import read_setup
+    from service.from_wire import read_setup
+    from service.pipeline import plan
 
     part, setup = demo_files
     out = tmp_path_factory.mktemp("demo-out")

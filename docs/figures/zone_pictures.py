@@ -20,7 +20,7 @@ from examples.family import make_part
 from geometry.mesh import F64
 from geometry.trimming.facet_sheet import refined, sheet_of
 from service.camera import Camera
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from service.prepare import Prepared, prepare
 from service.raster import Canvas
 from zones.plan_view.channel_plan import ChannelPlan

@@ -93,12 +93,12 @@ def part(tmp_path_factory):
 @pytest.fixture(scope="module")
 def alone(part, tmp_path_factory):
     """What the chain finds where nothing happens."""
-    from service import chain
-    from service.convert import parse_setup
+    from service import pipeline
+    from service.from_wire import parse_setup
 
     path = tmp_path_factory.mktemp("alone") / "p.step"
     path.write_bytes(part)
-    return chain.zones_only(path, parse_setup(json.dumps(SETUP)), lambda *_: None)
+    return pipeline.zones_only(path, parse_setup(json.dumps(SETUP)), lambda *_: None)
 
 
 @pytest.fixture

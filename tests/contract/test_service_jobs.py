@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from schemas.setup import content_hash
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 

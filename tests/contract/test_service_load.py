@@ -27,7 +27,7 @@ import sys
 from pathlib import Path
 from service import chain
 from schemas.setup import canonical_json
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 part, setup, out = map(Path, sys.argv[1:])
 kept = canonical_json(parse_setup(setup.read_text())).decode()  # what a job keeps has all defaults filled in
 chain.plan(part, parse_setup(kept), out, lambda *_: None)

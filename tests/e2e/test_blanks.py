@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from service import chain
+from service import pipeline
 from service.cli import app
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")
@@ -27,7 +27,7 @@ def quiet(_stage: str, _share: float) -> None:
 
 
 def planned(part: Path, out: Path, *, blank: Path | None = None, **fields: object) -> dict[str, Any]:
-    return chain.plan(part, parse_setup(json.dumps({**SETUP, **fields})), out, quiet, blank_path=blank)
+    return pipeline.plan(part, parse_setup(json.dumps({**SETUP, **fields})), out, quiet, blank_path=blank)
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +50,9 @@ def test_from_a_standing_bar(part: Path, tmp_path: Path) -> None:
     assert report["state"] == "proved" and report["findings"] == [] and report["coverage"] > 0.99
     text = (tmp_path / "program.linuxcnc.ngc").read_text()
     higher = {**SETUP, "stock": {**stock, "cylinder_mm": {**BAR, "height": 15}}}
-    again = chain.verify_program(part, parse_setup(json.dumps(higher)), text, quiet)
+    again = pipeline.verify_program(part, parse_setup(json.dumps(higher)), text, quiet)
     assert again["state"] == "unproved" and set(again["finding_counts"]) & {"collision", "rapid", "plunge"}
-    same = chain.verify_program(part, parse_setup(json.dumps({**SETUP, "stock": stock})), text, quiet)
+    same = pipeline.verify_program(part, parse_setup(json.dumps({**SETUP, "stock": stock})), text, quiet)
     assert not same["findings"]
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from schemas.setup import Setup
-from service import chain
+from service import pipeline
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")
@@ -27,7 +27,7 @@ def part(tmp_path_factory):
 def planned(part, out, tool):
     setup = {"tools": [tool], "quality": {"scallop_height_mm": 0.02},
              "stock": {"kind": "box", "margin_mm": 1.0, "uncertainty_mm": 0.2}}
-    return chain.plan(part, Setup.model_validate(setup), out, lambda stage, share: None)
+    return pipeline.plan(part, Setup.model_validate(setup), out, lambda stage, share: None)
 
 
 def test_a_limit_of_the_engaged_angle_is_kept_from_the_first_layer_to_the_last_finish(part, tmp_path):

@@ -10,8 +10,8 @@ import pytest
 
 from examples.demo import demo_setup
 from examples.family import make_part
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -23,7 +23,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder: Path = tmp_path_factory.mktemp("five")
     step, _, _ = make_part(0, "demo").write(folder)
     setup = parse_setup(json.dumps({**demo_setup(), "machine": MACHINE}))
-    return chain.plan(step, setup, folder / "out", lambda _stage, _share: None)
+    return pipeline.plan(step, setup, folder / "out", lambda _stage, _share: None)
 
 
 def test_it_is_proved_with_all_that_can_be_reached(report: dict[str, Any]) -> None:

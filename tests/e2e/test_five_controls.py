@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from geometry.errors import InternalError
 from output.gcode.dialects import DIALECTS
 from schemas.machine import DIALECT_ENDINGS
-from service import chain, programs
+from service import pipeline, programs
 from service.cli import app
-from service.convert import parse_setup
 from service.delivery import clear_results
+from service.from_wire import parse_setup
 from tests.step_files import write_step
 from verify.gcode.dialects import DIALECTS as READ
 
@@ -43,7 +43,7 @@ def part(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def job(part, tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
-    return out, chain.plan(part, parse_setup(json.dumps(SETUP)), out, quiet)
+    return out, pipeline.plan(part, parse_setup(json.dumps(SETUP)), out, quiet)
 
 
 def test_what_the_wire_names_is_written_and_read():
@@ -74,7 +74,7 @@ def test_headers_say_what_the_report_says(job):
 def test_every_step_has_its_label_unless_the_setup_says_otherwise(part, job, tmp_path):
     out, report = job
     setup = {**SETUP, "machine": {**SETUP["machine"], "restart_points": False}}
-    chain.plan(part, parse_setup(json.dumps(setup)), tmp_path, quiet)
+    pipeline.plan(part, parse_setup(json.dumps(setup)), tmp_path, quiet)
     marks = {"siemens": r"^STEP_S\d+:", "heidenhain": r'^\d+ LBL "S\d+"'}
     for d, name in NAMES.items():
         mark = re.compile(marks.get(d, r"^N\d+$"), re.MULTILINE)
@@ -111,7 +111,7 @@ def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypa
 
     monkeypatch.setattr(programs, "write_program", lying)
     with pytest.raises(InternalError) as refused:
-        chain.plan(part, parse_setup(json.dumps(SETUP)), tmp_path, quiet)
+        pipeline.plan(part, parse_setup(json.dumps(SETUP)), tmp_path, quiet)
     assert refused.value.code == "programs_differ" and refused.value.subjects == (NAMES["siemens"], NAMES["haas"])
     assert not list(tmp_path.glob("program*")) and not list(tmp_path.glob("*.stpnc"))
 
@@ -119,7 +119,7 @@ def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypa
 @pytest.mark.parametrize("order", [["fanuc", "linuxcnc"], ["fanuc", "heidenhain", "haas"], ["fanuc"]], ids=str)
 def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
     """In whatever order the machine names them; what it says is in the error bound."""
-    report = chain.plan(part, parse_setup(json.dumps({**SETUP, "machine": {"dialects": order}})), tmp_path, quiet)
+    report = pipeline.plan(part, parse_setup(json.dumps({**SETUP, "machine": {"dialects": order}})), tmp_path, quiet)
     assert report["state"] == "proved"
     assert sorted(f["dialect"] for f in report["files"] if f["kind"] == "program") == sorted(order)
     assert any("parameters of the machine" in note for note in report["proof"]["notes"])
@@ -129,7 +129,7 @@ def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
     """A step of 14 kB and two small ones for 16 kB: three programs, run one after the other on one blank."""
     machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16}
-    report = chain.plan(part, parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine})), tmp_path, quiet)
+    report = pipeline.plan(part, parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine})), tmp_path, quiet)
     assert report["state"] == "proved" and report["coverage"] == 1.0
     names = [f["name"] for f in report["files"] if f["kind"] == "program"]
     ends = ("linuxcnc.ngc", "heidenhain.h")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh import F64
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 from service.prepare import prepare
 from service.programs import turning_of
 from verify.gcode.reader import read_program
@@ -48,7 +48,7 @@ def part(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def job(part: Path) -> tuple[Path, dict[str, Any]]:
     """Folder and report of the job."""
     out = part.parent / "out"
-    return out, chain.plan(part, parse_setup(json.dumps(SETUP)), out, quiet)
+    return out, pipeline.plan(part, parse_setup(json.dumps(SETUP)), out, quiet)
 
 
 def test_leaning_walls_are_cut_by_the_flank_and_proved(job: tuple[Path, dict[str, Any]]) -> None:

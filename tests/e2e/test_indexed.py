@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from schemas.setup import Setup
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 from service.prepare import prepare
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
@@ -46,7 +46,7 @@ def part(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def planned(part: Path, name: str, **machine: object) -> tuple[Path, Setup, dict[str, Any]]:
     setup = parse_setup(json.dumps({**SETUP, "machine": {**MACHINE, **machine}}))
     out = part.parent / name
-    return out, setup, chain.plan(part, setup, out, quiet)
+    return out, setup, pipeline.plan(part, setup, out, quiet)
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_level_tool_clears_the_table_and_an_upright_one_what_is_told_of_it(par
     for access, table in (([{"direction": [1, 0, 0]}, {"id": "A2"}], None), ([{}], 0.0)):
         setup = parse_setup(json.dumps({**SETUP, "access": access, "machine": {
             **MACHINE, "orientations": "given", "table_z_mm": table}}))
-        report = chain.plan(part, setup, part.parent / "level", quiet)
+        report = pipeline.plan(part, setup, part.parent / "level", quiet)
         assert report["state"] == "proved", report["findings"]
 
 
@@ -108,8 +108,8 @@ def test_programs_of_joints_are_proved_like_those_with_tool_centre_point_control
     out, setup, report = planned(part, "joints", tcp=False, pivots_mm=[[0, 0, -60], [0, 0, 0]])
     text = (out / "program.linuxcnc.ngc").read_text()
     assert report["state"] == "proved" and "M428" not in text
-    again = chain.verify_program(part, setup, text, quiet)
+    again = pipeline.verify_program(part, setup, text, quiet)
     assert not again["findings"]
     elsewhere = {**MACHINE, "tcp": False, "pivots_mm": [[0, 0, -59], [0, 0, 0]]}
     moved = parse_setup(json.dumps({**SETUP, "machine": elsewhere}))
-    assert chain.verify_program(part, moved, text, quiet)["finding_counts"].get("gouge", 0) > 0
+    assert pipeline.verify_program(part, moved, text, quiet)["finding_counts"].get("gouge", 0) > 0

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh import F64
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
@@ -44,7 +44,7 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     setup = {"tools": [TOOL], "quality": {"scallop_height_mm": 0.03, "chordal_tolerance_mm": 0.01},
              "material": "AlMgSi1 6082", "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.1}, "machine": MACHINE,
              "operations": {"lean": {"tilt_deg": 15}, "faces": inner}}
-    return folder / "out", chain.plan(folder / "part.step", parse_setup(json.dumps(setup)), folder / "out", quiet)
+    return folder / "out", pipeline.plan(folder / "part.step", parse_setup(json.dumps(setup)), folder / "out", quiet)
 
 
 def test_the_hollow_is_finished_leaning_and_proved(job: tuple[Path, dict[str, Any]]) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 
 cq = pytest.importorskip("cadquery")
 pytestmark = pytest.mark.slow  # a job of a minute; what it is made of is in tests/unit/test_matched_strategy.py
@@ -38,7 +38,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     above = cq.Workplane(obj=cq.Solid.extrudeLinear(top, cq.Vector(0, 0, 40)))
     block = cq.Workplane().box(LONG, WIDE, 20, centered=(True, True, False)).cut(above)
     cq.exporters.export(block, str(folder / "hollow.step"))
-    return chain.plan(folder / "hollow.step", parse_setup(json.dumps(SETUP)), folder / "out", quiet)
+    return pipeline.plan(folder / "hollow.step", parse_setup(json.dumps(SETUP)), folder / "out", quiet)
 
 
 def test_the_hollow_is_cut_by_the_tilted_end_and_proved(report: dict[str, Any]) -> None:

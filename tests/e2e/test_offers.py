@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from schemas.setup import Setup
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from service.prepare import prepare
 from service.reporting import dry_report
 from tests.step_files import write_step

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.five_axis_gain import MACHINE
 from examples.family import make_part
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -20,14 +20,14 @@ def _planned(folder: Path, told: list[float]) -> dict[str, Any]:
     made = make_part(101, "random", walls=3, connections=1, gap=(0.8, 6.0))
     step, _, _ = made.write(folder)
     setup = parse_setup(json.dumps({**made.setup, "machine": MACHINE}))
-    return chain.plan(step, setup, folder / "out", lambda _stage, share: told.append(share))
+    return pipeline.plan(step, setup, folder / "out", lambda _stage, share: told.append(share))
 
 
 @pytest.fixture(scope="module")
 def once(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """The report of the first plan alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "PLANS", 1)
+        patch.setattr(pipeline, "PLANS", 1)
         return _planned(tmp_path_factory.mktemp("once"), [])
 
 

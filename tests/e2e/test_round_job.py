@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from service import chain, programs
-from service.convert import parse_setup
+from service import pipeline, programs
+from service.from_wire import parse_setup
 from tests.arc_plans import off
 from tests.step_files import write_step
 from toolpath.workingsteps import Motion
@@ -39,7 +39,7 @@ def job(tmp_path_factory):
 
     fitted, programs.fitted = programs.fitted, spied
     try:
-        report = chain.plan(write_step(shape, folder / "round.step"), parse_setup(json.dumps(SETUP)), folder / "out",
+        report = pipeline.plan(write_step(shape, folder / "round.step"), parse_setup(json.dumps(SETUP)), folder / "out",
                             lambda _stage, _share: None)
     finally:
         programs.fitted = fitted

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from service import chain
+from service import pipeline
 from service.cli import app
 from service.delivery import RESULT_FILES
 from tests.step_files import write_step
@@ -129,13 +129,13 @@ def test_no_program_of_an_earlier_job_stays_beside_a_later_answer(part, tmp_path
 
 def test_warm_plans_a_part_on_which_every_strategy_has_something_to_do(monkeypatch):
     reports = []
-    plan = chain.plan
+    plan = pipeline.plan
 
     def listening(*args):
         reports.append(plan(*args))
         return reports[-1]
 
-    monkeypatch.setattr(chain, "plan", listening)
+    monkeypatch.setattr(pipeline, "plan", listening)
     assert CliRunner().invoke(app, ["warm"]).exit_code == 0
     assert {s["strategy"] for s in reports[0]["steps"]} == {
         "layers", "floor", "zlevel", "zigzag", "isoparametric"}
@@ -144,7 +144,7 @@ def test_warm_plans_a_part_on_which_every_strategy_has_something_to_do(monkeypat
 
 def test_warm_fails_where_the_small_part_is_not_proved(monkeypatch):
     finding = {"message": "T1 cuts into the part"}
-    monkeypatch.setattr(chain, "plan", lambda *_args: {"state": "unproved", "findings": [finding]})
+    monkeypatch.setattr(pipeline, "plan", lambda *_args: {"state": "unproved", "findings": [finding]})
     got = CliRunner().invoke(app, ["warm", "--json"])
     assert got.exit_code == 1
     problem = json.loads(got.stdout)

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from service import chain
+from service import pipeline
 from service.cautions import thin_walls
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from service.prepare import prepare
 from tests.decomposition_shapes import box, plate
 
@@ -29,7 +29,7 @@ def setup(**changes):
 
 
 def test_the_dry_check_names_the_thin_wall_only(step):
-    told = [w for w in chain.zones_only(step, setup(), lambda *_: None)["part"]["warnings"] if "thick" in w]
+    told = [w for w in pipeline.zones_only(step, setup(), lambda *_: None)["part"]["warnings"] if "thick" in w]
     assert len(told) == 1
     assert told[0].startswith("wall W2 is 1.00 mm thick and 14.00 high near X") and "14.0 to 1" in told[0]
 

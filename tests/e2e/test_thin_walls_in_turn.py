@@ -8,7 +8,7 @@ import pytest
 
 from examples.setups import setup_with, tool
 from schemas.setup import Setup
-from service import chain
+from service import pipeline
 from service.held import FREE_RATIO, PLANNED_RATIO, band_planes
 from service.prepare import prepare
 from tests.decomposition_shapes import box
@@ -40,7 +40,7 @@ def setup(tools=(FLAT,), **changes) -> Setup:
 
 
 def plan(step, folder, asked):
-    return chain.plan(step, asked, folder, lambda *_: None)
+    return pipeline.plan(step, asked, folder, lambda *_: None)
 
 
 def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_path, monkeypatch):
@@ -51,8 +51,8 @@ def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_pa
     assert support["most_ratio"] <= PLANNED_RATIO + 1.0 and support["limit_ratio"] == FREE_RATIO
     steps = [s["strategy"] for s in banded["steps"]]
     assert steps.count("layers") == 2 and steps.index("zlevel") < len(steps) - 1 - steps[::-1].index("layers")
-    monkeypatch.setattr(chain, "band_planes", lambda *_: ())
-    monkeypatch.setattr(chain, "PLANS", 1)
+    monkeypatch.setattr(pipeline, "band_planes", lambda *_: ())
+    monkeypatch.setattr(pipeline, "PLANS", 1)
     whole = plan(wall, tmp_path / "whole", setup())
     assert whole["state"] == "unproved" and set(whole["finding_counts"]) == {"support"}
     assert 14.0 < whole["proof"]["support"]["most_ratio"] < 9.5 / 0.6 + 1.0  # the last layer at the foot still stands

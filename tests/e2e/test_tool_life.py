@@ -7,8 +7,8 @@ import json
 import pytest
 
 from examples.demo import write_small
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 
 pytest.importorskip("cadquery")
 
@@ -20,7 +20,7 @@ def planned(tmp_path_factory):
     raw = json.loads(setup.read_text())
     for tool in raw["tools"]:
         tool["life_min"] = 2.0
-    return chain.plan(step, parse_setup(json.dumps(raw)), folder / "out", lambda *_: None), folder / "out"
+    return pipeline.plan(step, parse_setup(json.dumps(raw)), folder / "out", lambda *_: None), folder / "out"
 
 
 def test_no_cutter_is_longer_in_cut_than_it_lasts(planned):

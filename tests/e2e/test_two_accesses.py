@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from schemas.setup import Setup
-from service import chain
-from service.convert import parse_setup
+from service import pipeline
+from service.from_wire import parse_setup
 
 cq = pytest.importorskip("cadquery")
 
@@ -43,7 +43,7 @@ def job(frame: Path) -> tuple[Path, Setup, dict[str, Any]]:
     """Folder, setup and report of the job."""
     setup = parse_setup(json.dumps(SETUP))
     out = frame.parent / "out"
-    return out, setup, chain.plan(frame, setup, out, quiet)
+    return out, setup, pipeline.plan(frame, setup, out, quiet)
 
 
 def test_both_programs_are_proved(job: tuple[Path, Setup, dict[str, Any]]) -> None:
@@ -71,8 +71,8 @@ def test_each_access_has_its_zones_and_half_of_the_walls(job: tuple[Path, Setup,
 def test_a_program_is_proved_along_its_own_access(frame: Path, job: tuple[Path, Setup, dict[str, Any]]) -> None:
     out, setup, _ = job
     text = (out / "program.A2.linuxcnc.ngc").read_text()
-    assert chain.verify_program(frame, setup, text, quiet, "A2")["findings"] == []
-    assert chain.verify_program(frame, setup, text, quiet, "A1")["findings"] != []
+    assert pipeline.verify_program(frame, setup, text, quiet, "A2")["findings"] == []
+    assert pipeline.verify_program(frame, setup, text, quiet, "A1")["findings"] != []
 
 
 def test_a_first_access_along_which_no_wall_stands_is_said(tmp_path: Path) -> None:
@@ -82,6 +82,6 @@ def test_a_first_access_along_which_no_wall_stands_is_said(tmp_path: Path) -> No
     askew, upright = {"id": "A1", "direction": [0, 0.8, 0.6]}, {"id": "A2", "direction": [0, 0, 1]}
     for order, said in (([askew, upright], True), ([upright | {"id": "A1"}, askew | {"id": "A2"}], False)):
         order[1] = order[1] | {"work_offset": "G55"}
-        report = chain.zones_only(path, parse_setup(json.dumps(SETUP | {"access": order})), quiet)
+        report = pipeline.zones_only(path, parse_setup(json.dumps(SETUP | {"access": order})), quiet)
         assert any("name A2 first" in w for w in report["part"]["warnings"]) == said
         assert bool(report["walls"]) != said

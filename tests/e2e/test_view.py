@@ -13,8 +13,8 @@ pytestmark = pytest.mark.timeout(900)
 
 def test_a_program_that_takes_too_long_to_be_shown_is_proved_all_the_same(part, tmp_path):  # noqa: F811
     # a dwell-free day of cutting: seconds in ms do not fit the file, and the proof is not to be lost for that
-    from service.chain import verify_program
-    from service.convert import parse_setup
+    from service.from_wire import parse_setup
+    from service.pipeline import verify_program
     from tests.e2e.test_withheld import SETUP
 
     slow = "G21 G17 G90 G94 G64 P0.001\nG54\nT1 M6\nG43 H1\nS1000 M3\nG0 Z20\nX0 Y0\nG1 Z10 F0.0002\nG0 Z20\nM2\n"

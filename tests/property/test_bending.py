@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.materials import MATERIALS
-from service.chain import cut_table
-from service.convert import parse_setup
+from service.from_wire import parse_setup
+from service.pipeline import cut_table
 from toolpath.tool_deflection import LEAST_SHARE
 
 KINDS = st.sampled_from(["ball", "flat", "bull"])

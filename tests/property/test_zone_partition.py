@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from geometry.sampling import sample_surface
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from service.prepare import Prepared, prepare
 from service.reporting import dry_report
 

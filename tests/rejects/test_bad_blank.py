@@ -8,8 +8,8 @@ import pytest
 from geometry.errors import CamError, SetupError
 from geometry.mesh import TriangleMesh
 from service.blank import check_against_part
-from service.convert import parse_setup
 from service.errors import problem_document
+from service.from_wire import parse_setup
 from service.stock import blank_of
 from tests.unit.test_boxes import block
 

@@ -15,7 +15,7 @@ import pytest
 
 from geometry.errors import CamError, InternalError, SetupError, StepError
 from geometry.step_import.text_checks import check_text
-from service.convert import check_plannable, parse_setup
+from service.from_wire import check_plannable, parse_setup
 from tests.hostile_inputs import FULL_SETUP, mutated_setup, mutated_step
 
 SETUP = {"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 3, "flute_length_mm": 5},

@@ -11,7 +11,7 @@ import pytest
 
 from examples.demo import write_small
 from schemas.setup import Setup
-from service import chain
+from service import pipeline
 from service.again import MOST, MOST_PACKED, Attempt, Learned, learned
 from service.sides import Look
 from tests.hand_parts import SHORT_TOOLS
@@ -151,8 +151,8 @@ def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_p
         far = Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})
         return Learned({"A2": far}) if len(asked) == 1 else None
 
-    monkeypatch.setattr(chain, "learned", once)
-    report = chain.plan(part, Setup.model_validate(given), tmp_path / "out", lambda *_: None, planner=planner)
+    monkeypatch.setattr(pipeline, "learned", once)
+    report = pipeline.plan(part, Setup.model_validate(given), tmp_path / "out", lambda *_: None, planner=planner)
     assert along == ["A1", "A2", "A2"] and asked == [["A1", "A2"]] * 2
     assert report["state"] == "proved" and {z["access"] for z in report["zones"]} == {"A1", "A2"}
     assert report["time"]["in_cut_s"] + report["time"]["in_air_s"] == pytest.approx(report["machining_time_s"], abs=0.2)

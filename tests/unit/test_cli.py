@@ -20,7 +20,7 @@ SETUP = {"tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3}]}
 
 class FakeChain(types.ModuleType):
     def __init__(self):
-        super().__init__("service.chain")
+        super().__init__("service.pipeline")
         self.answer = {"state": "proved", "findings": []}
 
     def _say(self, progress):
@@ -46,7 +46,7 @@ class FakeChain(types.ModuleType):
 @pytest.fixture
 def chain(monkeypatch):
     fake = FakeChain()
-    monkeypatch.setitem(sys.modules, "service.chain", fake)
+    monkeypatch.setitem(sys.modules, "service.pipeline", fake)
     monkeypatch.setattr(service, "chain", fake, raising=False)
     return fake
 

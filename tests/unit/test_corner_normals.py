@@ -13,7 +13,7 @@ from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
-from service.convert import parse_setup  # noqa: E402
+from service.from_wire import parse_setup  # noqa: E402
 from service.prepare import planning_samples  # noqa: E402
 from tests.hand_parts import ball, tool  # noqa: E402
 from tests.step_files import write_step  # noqa: E402

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from service.kept import Kept
+from service.checkpoint_store import Kept
 
 NAME = "a" * 64
 

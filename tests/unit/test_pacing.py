@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from service.chain import cut_table
-from service.convert import parse_setup, tool_bodies
+from service.from_wire import parse_setup, tool_bodies
+from service.pipeline import cut_table
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.feeds.feed_scheduling import ANGLE, GUARD, STEP, Pace, paced
 from toolpath.stock.engagement import SKIN_SHARE, angles

@@ -10,7 +10,7 @@ import pytest
 
 from geometry.errors import CamError
 from geometry.move_timing import Rates
-from service.packing import Known, pack, unpack
+from service.serialization import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.planning.job_plan import Plan

@@ -15,8 +15,8 @@ import pytest
 
 from examples.demo import write_small
 from schemas.setup import Setup
-from service import chain, resume
-from service.kept import Kept
+from service import pipeline, resume
+from service.checkpoint_store import Kept
 from service.resume import Resumed
 from service.sides import Side
 from tests.synthetic_plan import step
@@ -30,7 +30,7 @@ from zones.lattice import Lattice
 TWO_WAYS = {"access": [{"id": "A1"}, {"id": "A2", "direction": [1.0, 0.0, 0.0], "work_offset": "G55"}]}
 TURNED = {"machine": {"kind": "5-axis", "kinematics": "table-table-AC", "orientations": "given"},
           "access": [{"id": "A1", "direction": [0.6, 0.0, 0.8]}, {"id": "A2"}]}
-PROVE: Callable[..., Proof] = chain.prove
+PROVE: Callable[..., Proof] = pipeline.prove
 
 
 class Cut(Exception):
@@ -74,9 +74,9 @@ class Job:
             self.proved += 1
             return PROVE(*args, **more)
 
-        self.patch.setattr(chain, "prove", prove)
+        self.patch.setattr(pipeline, "prove", prove)
         out = self.folder / name
-        chain.plan(self.part, self.setup, out, lambda *_: None, planner=planner, kept=kept)
+        pipeline.plan(self.part, self.setup, out, lambda *_: None, planner=planner, kept=kept)
         return {p.name: p.read_bytes() for p in out.iterdir()}
 
     def cut(self, kept: Kept, **where: int) -> None:
@@ -136,13 +136,13 @@ def test_rounds_are_gone_through_again_without_planning_or_proving(tmp_path, mon
     """A job that is planned twice, for its first proof has something to say of the second access."""
     asked: list[int] = []
 
-    def once(told: chain.Learned, attempt: chain.Attempt) -> chain.Learned | None:
+    def once(told: pipeline.Learned, attempt: pipeline.Attempt) -> pipeline.Learned | None:
         asked.append(1)
         zone = next(z for z in attempt.zones if z.access == "A2")
         left = Counterexamples(left={zone.id: np.arange(len(zone.tips) // 2)})
-        return chain.Learned({"A2": left}, ("planned again",)) if len(asked) == 1 else None
+        return pipeline.Learned({"A2": left}, ("planned again",)) if len(asked) == 1 else None
 
-    monkeypatch.setattr(chain, "learned", once)
+    monkeypatch.setattr(pipeline, "learned", once)
     job, kept = Job(tmp_path, monkeypatch, **TWO_WAYS), Kept(tmp_path / "kept")
     plain = job.run("plain", None)
     assert job.planned == ["A1", "A2", "A2"] and job.proved == 2
@@ -160,8 +160,8 @@ class Prepared:
 
     def __init__(self, folder: Path) -> None:
         part, path = write_small(folder)
-        self.ready = chain.prepare(part, Setup.model_validate(json.loads(path.read_text())), lambda *_: None)
-        scored = chain.score(self.ready)
+        self.ready = pipeline.prepare(part, Setup.model_validate(json.loads(path.read_text())), lambda *_: None)
+        scored = pipeline.score(self.ready)
         self.checks, self.samples = scored.checks(self.ready), scored.samples
         self.view = self.ready.views[0]
         self.tool = next(iter(self.view.fields.values())).tool

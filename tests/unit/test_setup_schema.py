@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from geometry.errors import SetupError
 from schemas.materials import MATERIALS, find_material
 from schemas.setup import Setup, canonical_json, content_hash, setup_sha256
-from service.convert import (
+from service.cutting_data import cutting_data, feed_per_tooth
+from service.from_wire import (
     check_plannable,
     check_spindle_tool,
     face_numbers,
@@ -21,7 +22,6 @@ from service.convert import (
     rotary_machine,
     tool_bodies,
 )
-from service.materials import cutting_data, feed_per_tooth
 
 TOOL = {"id": "T1", "kind": "ball", "diameter_mm": 3}
 FIVE = {"kind": "5-axis", "kinematics": "table-table-AC"}

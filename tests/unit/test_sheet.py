@@ -16,8 +16,8 @@ import pytest
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
 from service.clampshot import box_mesh, corners_of
-from service.convert import parse_setup
 from service.delivery import Files
+from service.from_wire import parse_setup
 from service.sheet import sheet_files
 from service.sheetmodel import Facts, Section, Sheet
 from service.sheetpdf import latin, pdf_of
@@ -71,7 +71,7 @@ def pdf_text(data: bytes) -> str:
 
 
 def steps() -> tuple[Workingstep, ...]:
-    from service.convert import tool_bodies
+    from service.from_wire import tool_bodies
     one, two, _ = tool_bodies(parse_setup(json.dumps(SETUP)))
     return (step(1, two, "layers", zone=None, faces=(), z=8.0), step(2, one, "zlevel", zone="Z1"),
             step(3, one, "zigzag", zone="Z2", z=-4.0))

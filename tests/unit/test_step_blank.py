@@ -16,7 +16,7 @@ from schemas.setup import canonical_json, content_hash
 from service.arguments import blank_file
 from service.blank import check_against_part
 from service.cli import app
-from service.convert import parse_setup
+from service.from_wire import parse_setup
 from service.prepare import load_blank, prepare
 from service.stock import blank_of
 from tests.hand_parts import as_part, box_mesh, joined, terraces

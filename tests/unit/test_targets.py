@@ -8,7 +8,7 @@ import time
 import pytest
 
 from service.errors import RequestError
-from service.targets import BlockedError, check_allowed, is_public, parse_origin, parse_target, resolve, send
+from service.outbound_requests import BlockedError, check_allowed, is_public, parse_origin, parse_target, resolve, send
 
 ORIGIN = "https://mes.example.com:443"
 

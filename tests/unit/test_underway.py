@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from service.packing import Known, pack, unpack
+from service.serialization import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.test_isoparametric_strategy import bowl
 from toolpath.passes.pass_family import Target

@@ -8,9 +8,9 @@ file "done" beside the folders of what is kept, with "child in a plan" a plan al
 import os
 import signal
 
-import service.chain as chain
+import service.pipeline as chain
 import service.resume as resume
-from service.chain import verify_program, zones_only  # noqa: F401
+from service.pipeline import verify_program, zones_only  # noqa: F401
 from toolpath.plan_checkpoint import Keeper
 from toolpath.planning.job_plan import plan_job
 

@@ -4,9 +4,9 @@ import fake_chain
 
 
 def _real():
-    import service.chain
+    import service.pipeline
 
-    return service.chain
+    return service.pipeline
 
 
 def plan(part_path, setup, out, progress, **more):

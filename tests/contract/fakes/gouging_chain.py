@@ -1,6 +1,6 @@
 """The real chain with a writer that ends every program with a cut half a mm into the floor of the small step part."""
 
-import service.chain as chain
+import service.pipeline as chain
 import service.programs as programs
 
 write = programs.write_program

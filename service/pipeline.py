@@ -25,18 +25,18 @@ from schemas.setup import Lean, Setup
 from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld, upright
-from service.convert import (
+from service.checkpoint_store import Kept
+from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
+from service.delivery import Files, clear_results, deliver, json_bytes
+from service.from_wire import (
     check_plannable,
     check_spindle_tool,
     machine_kinematics,
     rotary_limits,
     tool_bodies,
 )
-from service.delivery import Files, clear_results, deliver, json_bytes
 from service.held import FREE_RATIO, band_planes, in_turn
-from service.kept import Kept
 from service.machined_mesh import MESH_NAME, MeshWish, machined_part
-from service.materials import STEP_DOWN, bending, cutting_data, rates_of
 from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
 from service.programs import (
