@@ -22,8 +22,8 @@ import numpy as np
 import uvicorn
 
 from geometry.tool_body import HolderSegment, ToolBody
+from service.commands.view_command import folder_app
 from service.viewdata import tool_shape
-from service.viewer import folder_app
 from service.viewfile import Chunk, Column, write_view
 from service.viewmesh import GRID, JUDGED, LEFT_UNIT, Facets, mesh_chunks
 from service.viewpaths import AXIS_UNIT, Way, path_chunks

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service import keycommands
-from service.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
+from service.commands import key_commands
+from service.commands.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
 
 if TYPE_CHECKING:
     from schemas.setup import Setup
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="From a STEP part of walls and internal connections to a proved milling job.")
-app.add_typer(keycommands.app, name="keys")
+app.add_typer(key_commands.app, name="keys")
 
 Part = Annotated[Path, typer.Argument(metavar="PART.step", help="The part, a STEP file.", show_default=False)]
 SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
@@ -123,7 +123,7 @@ def view(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of p
          as_json: AsJson = False) -> None:
     """Show a folder of results in the browser: the page of a job, served to this machine until Ctrl-C."""
     with reported(as_json):
-        from service.viewer import show_folder
+        from service.commands.view_command import show_folder
 
         show_folder(folder, port, open_browser=browser)
 
@@ -134,7 +134,7 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
          as_json: AsJson = False) -> None:
     """Make a sample part, post it to an embedded service, and fetch its files."""
     with reported(as_json):
-        from service.demo import run_demo
+        from service.commands.demo import run_demo
 
         code = run_demo(out, keep=keep)
         raise typer.Exit(code)
@@ -167,8 +167,8 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 def warm(as_json: AsJson = False) -> None:
     """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
     with reported(as_json):
+        from service.commands.demo import run_warm
         from service.console import say
-        from service.demo import run_warm
 
         say("compiling kernels, about a minute the first time")
         run_warm()

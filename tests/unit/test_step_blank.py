@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from geometry.errors import CamError, PartError, SetupError, StepError
 from geometry.mesh import TriangleMesh
 from schemas.setup import canonical_json, content_hash
-from service.arguments import blank_file
 from service.blank import check_against_part
 from service.cli import app
+from service.commands.arguments import blank_file
 from service.from_wire import parse_setup
 from service.prepare import load_blank, prepare
 from service.stock import blank_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.arguments import reported
+from service.commands.arguments import reported
 
 if TYPE_CHECKING:
     from service.keys import KeyStore
