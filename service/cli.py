@@ -106,11 +106,11 @@ def serve(host: Annotated[str | None, typer.Option(help="Address; default 127.0.
           data: Annotated[Path | None, typer.Option(help="Data folder; default ./data.")] = None,
           as_json: AsJson = False) -> None:
     """Serve the HTTP interface, engine included; every other setting comes from ZONEMILL_* variables."""
-    from service.server import settings_with
+    from service.api.server import settings_with
 
     given = {"host": host, "port": port, "data_dir": data}
     with reported(as_json):
-        from service.server import run_server
+        from service.api.server import run_server
 
         run_server(settings_with(given))
 
@@ -177,8 +177,8 @@ def warm(as_json: AsJson = False) -> None:
 @app.command()
 def openapi() -> None:
     """Print openapi.yaml."""
-    from service.app import create_app
-    from service.openapi import as_yaml
+    from service.api.app import create_app
+    from service.api.openapi import as_yaml
 
     sys.stdout.write(as_yaml(create_app().openapi()))
 

@@ -60,7 +60,7 @@ def webhook_secret(principal: Annotated[str, typer.Option(help="Whose webhooks a
     """Print the secret that signs the webhooks of a principal, for its receiver; needs ZONEMILL_WEBHOOK_SECRET."""
     with reported(as_json):
         from geometry.errors import SetupError
-        from service.server import settings_with
+        from service.api.server import settings_with
         from service.webhooks import secret_of
 
         master = settings_with({}).webhook_secret
@@ -72,9 +72,9 @@ def webhook_secret(principal: Annotated[str, typer.Option(help="Whose webhooks a
 
 def _store(data: Path | None) -> KeyStore:
     """The keys in the database of the settings; it is made where there is none."""
+    from service.api.server import settings_with
     from service.db import connect, migrate
     from service.keys import KeyStore
-    from service.server import settings_with
 
     given: dict[str, Any] = {"data_dir": data}
     url = settings_with(given).url

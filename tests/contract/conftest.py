@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
+from service.api.app import create_app
 from service.logs import configure
 from service.settings import Settings
 from tests.contract.servers import postgres_server

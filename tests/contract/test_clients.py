@@ -11,8 +11,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.api.server import background, settings_with
 from service.keys import KeyStore
-from service.server import background, settings_with
 from tests.step_files import write_step
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from service.api.server import background, settings_with
 from service.keys import KeyStore
-from service.server import background, settings_with
 from tests.contract.test_service_input import STEP
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "examples" / "curl"

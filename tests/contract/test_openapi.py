@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from schemas.setup import Setup
-from service.app import create_app
+from service.api.app import create_app
+from service.api.openapi import as_yaml
 from service.errors import ERROR_TABLE
-from service.openapi import as_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.server import background, settings_with
+from service.api.server import background, settings_with
 from tests.contract.servers import free_port, postgres_server, until_open
 
 ROOT = Path(__file__).resolve().parents[2]

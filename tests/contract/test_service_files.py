@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import httpx
 import pytest
 
-from service.server import background, settings_with
+from service.api.server import background, settings_with
 
 TEXT = b"%\nG21\nM2\n%\n"  # what the fake chain writes as a program
 

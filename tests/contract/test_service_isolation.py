@@ -6,8 +6,8 @@ import time
 
 import pytest
 
+from service.api.server import background, settings_with
 from service.logs import configure
-from service.server import background, settings_with
 from tests.contract.test_service_input import STEP
 
 # The page is the same for every job; what it shows it asks for with a key.

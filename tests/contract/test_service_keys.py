@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from service.routes import events
+from service.api.routes import events
 
 
 def test_until_there_is_a_key_loopback_is_trusted_and_then_nobody(make_client, post):

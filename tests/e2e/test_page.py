@@ -17,9 +17,9 @@ from pathlib import Path
 import pytest
 import uvicorn
 
+from service.api.server import background, settings_with
 from service.commands.view_command import folder_app
 from service.pages import FOLDER
-from service.server import background, settings_with
 from tests.e2e.test_withheld import FAKES, SETUP, call, part  # noqa: F401
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from service.server import background, settings_with
+from service.api.server import background, settings_with
 from tests.e2e.test_page import driven, shown
 from tests.e2e.test_withheld import call, part  # noqa: F401
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from schemas.report import Report
 from service import programs
-from service.app import create_app
+from service.api.app import create_app
 from service.cli import app
 from service.settings import Settings
 from tests.step_files import write_step

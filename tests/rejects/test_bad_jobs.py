@@ -19,7 +19,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from geometry.step_import.occ.loading import load_part
-from service.app import create_app
+from service.api.app import create_app
 from service.logs import configure
 from service.settings import Settings
 from tests.step_files import write_step

@@ -102,8 +102,8 @@ def test_the_reader_outlives_what_it_is_given(small, tmp_path):
 @pytest.mark.soak
 @pytest.mark.timeout(7200)
 def test_a_thousand_broken_files_posted_to_a_service(small, tmp_path):
+    from service.api.server import background, settings_with
     from service.logs import configure
-    from service.server import background, settings_with
 
     configure("error", "console")
     count, first = int(os.environ.get("SOAK_COUNT", "1000")), int(os.environ.get("SOAK_FIRST", "0"))

@@ -4,8 +4,8 @@ import time
 
 import pytest
 
+from service.api.principals import PostRate
 from service.errors import RateError
-from service.principals import PostRate
 
 
 def test_so_many_in_any_window_and_each_principal_for_himself(monkeypatch):

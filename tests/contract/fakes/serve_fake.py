@@ -7,8 +7,8 @@ import os
 import sys
 import threading
 
+from service.api.server import background, run_server, settings_with
 from service.logs import configure
-from service.server import background, run_server, settings_with
 
 configure("warning", "console")
 port = int(sys.argv[3]) if len(sys.argv) > 3 else 0

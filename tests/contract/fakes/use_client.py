@@ -15,8 +15,8 @@ from zm.models.tool import Tool
 from zm.models.tool_kind import ToolKind
 from zm.types import File
 
+from service.api.server import background, settings_with
 from service.logs import configure
-from service.server import background, settings_with
 
 configure("warning", "console")
 with background(settings_with({"data_dir": sys.argv[1], "port": 0, "poll_s": 0.05}), "fake_chain") as url:

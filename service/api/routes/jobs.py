@@ -13,6 +13,9 @@ from pydantic import Field
 from schemas.jobs import Job, JobFiles, JobKind, JobPage, JobState
 from schemas.report import Report, Verification
 from schemas.zones import Zones
+from service.api.principals import Principal, Submitter
+from service.api.problems import responses
+from service.api.range_requests import check_range
 from service.errors import (
     GoneError,
     NotFoundError,
@@ -22,9 +25,6 @@ from service.errors import (
     UnauthorizedError,
     WithheldError,
 )
-from service.principals import Principal, Submitter
-from service.problems import responses
-from service.ranges import check_range
 from service.resources import (
     decode_cursor,
     encode_cursor,

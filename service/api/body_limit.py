@@ -11,7 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.problems import BODY_LIMIT, problem_response, too_large
+from service.api.problems import BODY_LIMIT, problem_response, too_large
 
 FORMS = ("/v1/jobs", "/v1/zones", "/v1/verifications")
 LARGEST_JSON = 1_000_000  # a tool with the finest profile takes a tenth of it

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from pydantic_settings import SettingsError
 
 from geometry.errors import CamError, SetupError
-from service.app import create_app
+from service.api.app import create_app
 from service.errors import UnavailableError
 from service.from_wire import problems_of
 from service.logs import configure

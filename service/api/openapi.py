@@ -12,7 +12,7 @@ from pydantic.json_schema import models_json_schema
 from schemas.jobs import JobEvent
 from schemas.problem import Problem
 from schemas.setup import Setup
-from service.samples import add_samples
+from service.api.openapi_examples import add_samples
 
 TEMPLATE = "#/components/schemas/{model}"
 

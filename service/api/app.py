@@ -13,14 +13,14 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from geometry.errors import CamError
-from service import problems
+from service.api import problems
+from service.api.body_limit import BodyLimitMiddleware
+from service.api.head_requests import HeadMiddleware
+from service.api.metrics import Metrics, MetricsMiddleware
+from service.api.openapi import document
+from service.api.principals import PostRate
+from service.api.routes import capabilities, events, health, jobs, keys, library, submissions, view
 from service.engine import Engine
-from service.head import HeadMiddleware
-from service.limits import BodyLimitMiddleware
-from service.metrics import Metrics, MetricsMiddleware
-from service.openapi import document
-from service.principals import PostRate
-from service.routes import capabilities, events, health, jobs, keys, library, submissions, view
 from service.settings import Settings
 
 VERSION = "0.1.0"

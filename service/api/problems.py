@@ -15,6 +15,7 @@ from starlette.routing import compile_path
 
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
+from service.api.head_requests import is_stream
 from service.db import AWAY
 from service.errors import (
     ERROR_TABLE,
@@ -31,7 +32,6 @@ from service.errors import (
     problem_document,
 )
 from service.from_wire import MOST_TOLD, sentence
-from service.head import is_stream
 from service.storage import STORAGE_FULL, is_full
 
 log = structlog.get_logger(__name__)

@@ -8,9 +8,9 @@ import structlog
 from fastapi import APIRouter, Path, Request, status
 
 from schemas.keys import KeyList, MadeKey, NewKey
+from service.api.principals import Admin
+from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
-from service.principals import Admin
-from service.problems import responses
 from service.resources import key_resource
 
 log = structlog.get_logger(__name__)

@@ -22,10 +22,10 @@ from sqlalchemy.engine import RowMapping
 from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
+from service.api.principals import Principal, Who
+from service.api.problems import responses
 from service.db import AWAY
 from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
-from service.principals import Principal, Who
-from service.problems import responses
 from service.resources import event_data
 
 log = structlog.get_logger(__name__)

@@ -12,12 +12,12 @@ from schemas.machine import DIALECT_ENDINGS, Machine
 from schemas.materials import MATERIALS
 from schemas.setup import Stock
 from schemas.tools import BUILT_KINDS
+from service.api.principals import Who
+from service.api.problems import responses
+from service.api.uploads import DEADLINE_S
 from service.errors import UnauthorizedError
 from service.keys import SCOPES
-from service.principals import Who
-from service.problems import responses
 from service.settings import Settings
-from service.uploads import DEADLINE_S
 from service.version import VERSION, code_version
 
 router = APIRouter(prefix="/v1/capabilities", tags=["operation"])

@@ -9,6 +9,9 @@ from starlette.concurrency import run_in_threadpool
 
 from geometry.errors import ProgramError, SetupError, StepError
 from schemas.jobs import Job
+from service.api.principals import Submitter, submission_rate
+from service.api.problems import responses
+from service.api.uploads import DEADLINE_S, new_job, read_form
 from service.errors import (
     KeyConflictError,
     MethodError,
@@ -19,10 +22,7 @@ from service.errors import (
     UnauthorizedError,
     UnavailableError,
 )
-from service.principals import Submitter, submission_rate
-from service.problems import responses
 from service.resources import job_resource, path_of
-from service.uploads import DEADLINE_S, new_job, read_form
 
 router = APIRouter(prefix="/v1", tags=["submissions"], dependencies=[Depends(submission_rate)])
 

@@ -7,9 +7,9 @@ from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from schemas.jobs import Health
+from service.api.principals import Watcher
+from service.api.problems import responses
 from service.errors import UnauthorizedError
-from service.principals import Watcher
-from service.problems import responses
 
 router = APIRouter(tags=["operation"])
 

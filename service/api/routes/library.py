@@ -15,11 +15,11 @@ from schemas.jobs import MachineEntry, MachineList, MaterialEntry, MaterialList,
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material
 from schemas.tools import Tool
+from service.api.principals import Principal, Who, require
+from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
 from service.keys import ADMIN, SUBMIT, Identity
 from service.library import SHARED, Entry, LibraryStore
-from service.principals import Principal, Who, require
-from service.problems import responses
 from service.resources import time_text
 
 router = APIRouter(prefix="/v1", tags=["libraries"])
