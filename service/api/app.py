@@ -20,7 +20,7 @@ from service.api.metrics import Metrics, MetricsMiddleware
 from service.api.openapi import document
 from service.api.principals import PostRate
 from service.api.routes import capabilities, events, health, jobs, keys, library, submissions, view
-from service.engine import Engine
+from service.jobs.engine import Engine
 from service.settings import Settings
 
 VERSION = "0.1.0"
@@ -34,7 +34,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.pipeline"
     """The application.
 
     settings : taken from the environment when None
-    chain    : module a job's child calls; see ``service.work.WorkConfig``
+    chain    : module a job's child calls; see ``service.jobs.attempt.WorkConfig``
     """
     settings = settings or Settings()
 

@@ -18,7 +18,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from limits import parse
 
 from service.errors import ForbiddenError, RateError, UnauthorizedError
-from service.keys import ADMIN, METRICS, READ, SCOPES, SUBMIT, Identity
+from service.jobs.api_keys import ADMIN, METRICS, READ, SCOPES, SUBMIT, Identity
 from service.settings import Settings, is_loopback
 
 LOCAL = Identity("local", frozenset(SCOPES))

@@ -16,7 +16,6 @@ from starlette.routing import compile_path
 from geometry.errors import CamError, InternalError
 from schemas.problem import PROBLEM_MEDIA_TYPE, Problem
 from service.api.head_requests import is_stream
-from service.db import AWAY
 from service.errors import (
     ERROR_TABLE,
     ForbiddenError,
@@ -32,7 +31,8 @@ from service.errors import (
     problem_document,
 )
 from service.from_wire import MOST_TOLD, sentence
-from service.storage import STORAGE_FULL, is_full
+from service.jobs.database import AWAY
+from service.jobs.disk_space import STORAGE_FULL, is_full
 
 log = structlog.get_logger(__name__)
 BODY_LIMIT = "zonemill.body_limit"  # where a request keeps how many bytes its body may have

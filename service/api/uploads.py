@@ -17,12 +17,12 @@ from starlette.exceptions import HTTPException
 from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_import.text_checks import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
-from service.artifacts import Artifacts
-from service.engine import Engine
 from service.errors import RequestError
 from service.from_wire import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
-from service.store import NewJob
-from service.webhooks import registered
+from service.jobs.artifacts import Artifacts
+from service.jobs.engine import Engine
+from service.jobs.job_store import NewJob
+from service.jobs.webhooks import registered
 
 CHUNK = 1 << 20
 MAX_SETUP_BYTES = 4_000_000

@@ -10,7 +10,7 @@ import typer
 from service.commands.arguments import reported
 
 if TYPE_CHECKING:
-    from service.keys import KeyStore
+    from service.jobs.api_keys import KeyStore
 
 app = typer.Typer(no_args_is_help=True, help="API keys of the service: make, list, revoke.")
 
@@ -28,7 +28,7 @@ def create(principal: Annotated[str, typer.Option(help="Whose key it is; jobs be
     """Make a key and print it; it is told this once and cannot be shown again."""
     with reported(as_json):
         from service.console import print_json, say
-        from service.resources import key_resource
+        from service.jobs.resources import key_resource
 
         store = _store(data)
         text, row = store.make(principal, [s.strip() for s in scopes.split(",")], days or None, note)
@@ -41,7 +41,7 @@ def list_keys(data: Data = None, as_json: AsJson = False) -> None:
     """Print every key without its secret."""
     with reported(as_json):
         from service.console import print_json
-        from service.resources import key_resource
+        from service.jobs.resources import key_resource
 
         print_json([key_resource(row).model_dump() for row in _store(data).all()])
 
@@ -61,7 +61,7 @@ def webhook_secret(principal: Annotated[str, typer.Option(help="Whose webhooks a
     with reported(as_json):
         from geometry.errors import SetupError
         from service.api.server import settings_with
-        from service.webhooks import secret_of
+        from service.jobs.webhooks import secret_of
 
         master = settings_with({}).webhook_secret
         if master is None:
@@ -73,8 +73,8 @@ def webhook_secret(principal: Annotated[str, typer.Option(help="Whose webhooks a
 def _store(data: Path | None) -> KeyStore:
     """The keys in the database of the settings; it is made where there is none."""
     from service.api.server import settings_with
-    from service.db import connect, migrate
-    from service.keys import KeyStore
+    from service.jobs.api_keys import KeyStore
+    from service.jobs.database import connect, migrate
 
     given: dict[str, Any] = {"data_dir": data}
     url = settings_with(given).url

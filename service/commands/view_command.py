@@ -23,8 +23,8 @@ from starlette.routing import Route
 from geometry.errors import SetupError
 from schemas.jobs import Job, JobFile, JobFiles, JobLinks
 from service.console import say
+from service.jobs.resources import file_sha256, is_program, media_type
 from service.pages import asset, page
-from service.resources import file_sha256, is_program, media_type
 from service.settings import is_loopback
 from service.viewdata import VIEW_NAME
 

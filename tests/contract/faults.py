@@ -220,7 +220,7 @@ class Service:
         for kept in self.kept:
             try:
                 found += [p for p in psutil.Process(kept.process.pid).children(recursive=True)
-                          if "service.child" in p.cmdline()]
+                          if "service.jobs.job_process" in p.cmdline()]
             except psutil.Error:
                 pass
         return found

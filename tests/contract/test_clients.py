@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from service.api.server import background, settings_with
-from service.keys import KeyStore
+from service.jobs.api_keys import KeyStore
 from tests.step_files import write_step
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,7 +42,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """The service itself, which wants a key, and a part of one step."""
-    from service.db import connect, migrate
+    from service.jobs.database import connect, migrate
 
     cq = pytest.importorskip("cadquery")
     folder = tmp_path_factory.mktemp("clients")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.api.server import background, settings_with
-from service.keys import KeyStore
+from service.jobs.api_keys import KeyStore
 from tests.contract.test_service_input import STEP
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "examples" / "curl"
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(shutil.which("curl") is None, reason="curl is no
 @pytest.fixture(scope="module")
 def run(fake_path, tmp_path_factory):
     """Run a script with its arguments in a folder with a part and a setup; returns the finished process."""
-    from service.db import connect, migrate
+    from service.jobs.database import connect, migrate
 
     folder = tmp_path_factory.mktemp("curl")
     settings = settings_with({"data_dir": folder / "data", "port": 0, "poll_s": 0.05, "workers": 1})

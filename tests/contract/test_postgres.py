@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 import sqlalchemy as sa
 
-from service.db import connect, metadata, migrate
 from service.errors import KeyConflictError, NotFoundError, RateError
-from service.keys import KeyStore
-from service.library import LibraryStore
-from service.store import JobStore, NewJob, Room
+from service.jobs.api_keys import KeyStore
+from service.jobs.database import connect, metadata, migrate
+from service.jobs.job_store import JobStore, NewJob, Room
+from service.jobs.library import LibraryStore
 
 
 @pytest.fixture

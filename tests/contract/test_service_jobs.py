@@ -167,7 +167,7 @@ def test_cancel_frees_the_worker_in_under_a_second(client, post, finish, setup_j
     assert time.monotonic() - started < 1.0
     assert finish(client, waiting)["state"] == "proved"
     assert client.get(job["links"]["report"]).json()["code"] == "no_result"
-    assert not [p for p in psutil.Process().children(recursive=True) if "service.child" in " ".join(p.cmdline())]
+    assert not [p for p in psutil.Process().children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
     assert client.delete(waiting["links"]["self"]).json()["state"] == "proved"  # an end stays
 
 
@@ -241,12 +241,12 @@ def test_a_child_that_cannot_be_started_for_want_of_handles_is_waited_for(client
     popen, left = subprocess.Popen, [errno.EMFILE, errno.EAGAIN]
 
     def starts(*args, **kwargs):
-        if "service.child" in args[0] and left:
+        if "service.jobs.job_process" in args[0] and left:
             raise OSError(left.pop(), "none left")
         return popen(*args, **kwargs)
 
-    monkeypatch.setattr("service.supervisor.subprocess.Popen", starts)
-    monkeypatch.setattr("service.work.AGAIN_S", 0.1)
+    monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", starts)
+    monkeypatch.setattr("service.jobs.attempt.AGAIN_S", 0.1)
     job = finish(client, post(client, "few handles").json())
     assert (job["state"], job["attempt"]) == ("proved", 1) and not left
 
@@ -255,9 +255,9 @@ def test_a_worker_that_can_start_no_child_at_all_says_so(client, post, finish, m
     def never(*_args, **_kwargs):
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr("service.supervisor.subprocess.Popen", never)
-    monkeypatch.setattr("service.work.AGAIN_S", 0.05)
-    monkeypatch.setattr("service.work.PATIENCE_S", 0.3)
+    monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", never)
+    monkeypatch.setattr("service.jobs.attempt.AGAIN_S", 0.05)
+    monkeypatch.setattr("service.jobs.attempt.PATIENCE_S", 0.3)
     job = finish(client, post(client, "no handles").json())
     assert (job["state"], job["error"]["code"]) == ("failed", "worker_exhausted")
     assert "limits of open files" in job["error"]["remedy"]

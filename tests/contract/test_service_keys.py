@@ -51,7 +51,7 @@ def test_a_key_that_expired_or_was_revoked_is_told_so_only_to_who_has_its_secret
     short, long = bearer(client, "ada", days=0.5), bearer(client, "ada")
     assert client.get("/v1/jobs", headers=short).status_code == 200
     now = time.time()
-    monkeypatch.setattr("service.keys.time.time", lambda: now + 86400)
+    monkeypatch.setattr("service.jobs.api_keys.time.time", lambda: now + 86400)
     assert client.get("/v1/jobs", headers=short).json()["code"] == "key_expired"
     client.app.state.engine.keys.revoke(long["Authorization"].split("_")[1])
     assert client.get("/v1/jobs", headers=long).json()["code"] == "key_revoked"

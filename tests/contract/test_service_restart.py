@@ -46,7 +46,7 @@ def _asleep(client, job):
 
 
 def _job_children(process):
-    return [p for p in psutil.Process(process.pid).children(recursive=True) if "service.child" in " ".join(p.cmdline())]
+    return [p for p in psutil.Process(process.pid).children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
 
 
 def test_a_killed_service_leaves_no_child_and_resumes_its_job(serve, post, finish):

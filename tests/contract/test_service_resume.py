@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.janitor import GRACE_S, Janitor
+from service.jobs.retention import GRACE_S, Janitor
 from service.settings import Settings
 from tests.contract.servers import free_port
 from tests.contract.test_service_cluster import Cluster
@@ -175,7 +175,7 @@ def test_a_worker_of_a_cluster_goes_on_with_what_another_one_planned(postgres, f
 
 
 def test_what_is_kept_for_jobs_that_wait_stays_and_the_rest_goes(make_client, post, finish):
-    from service.artifacts import key_of
+    from service.jobs.artifacts import key_of
 
     client = make_client()
     engine = client.app.state.engine

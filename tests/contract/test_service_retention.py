@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-import service.engine as engine_module
-from service.janitor import GRACE_S, Janitor, Swept
+import service.jobs.engine as engine_module
+from service.jobs.retention import GRACE_S, Janitor, Swept
 from service.settings import Settings
 from tests.contract.test_service_input import STEP
 
@@ -16,7 +16,7 @@ DAY = 86400.0
 
 def aged(client, job, days):
     """Make a job look as if it had ended days ago, its files with it."""
-    from service.db import jobs
+    from service.jobs.database import jobs
 
     engine = client.app.state.engine
     with engine.jobs.engine.begin() as c:
@@ -151,7 +151,7 @@ def test_uploads_that_led_to_no_job_and_leftovers_of_a_crash_go(make_client, pos
 
 
 def test_what_is_taken_up_meanwhile_stays(tmp_path):
-    from service.artifacts import Artifacts
+    from service.jobs.artifacts import Artifacts
 
     files = Artifacts(tmp_path)
     space = files.workspace()

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from service import webhooks
-from service.webhooks import pause_s, secret_of, signature
+from service.jobs import webhooks
+from service.jobs.webhooks import pause_s, secret_of, signature
 
 MASTER = "m" * 40
 

@@ -107,8 +107,8 @@ def test_a_first_job_without_json(drive, part, tmp_path):  # noqa: F811
 
 
 def test_a_key_is_asked_for_and_kept_in_the_tab_alone(drive, tmp_path):
-    from service.db import connect
-    from service.keys import KeyStore
+    from service.jobs.api_keys import KeyStore
+    from service.jobs.database import connect
 
     given = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": tmp_path / "data", "auth": "keys"})
     with background(given) as url:

@@ -199,7 +199,7 @@ def submit(client, parts):
         while job["state"] in ("queued", "running") and time.monotonic() < deadline:
             time.sleep(0.05)
             job = client.get(job["links"]["self"]).json()
-        assert not [p for p in psutil.Process().children(recursive=True) if "service.child" in " ".join(p.cmdline())]
+        assert not [p for p in psutil.Process().children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
         return answer, job
 
     return send
@@ -271,5 +271,5 @@ def test_the_command_ends_with_3_where_no_tool_fits(command, parts):
 def test_no_process_outlives_the_jobs():
     """The reader runs in a child of a child; after all of the above none of them is left."""
     left = [p for p in psutil.Process().children(recursive=True)
-            if any(word in " ".join(p.cmdline()) for word in ("service.child", "step_child"))]
+            if any(word in " ".join(p.cmdline()) for word in ("service.jobs.job_process", "step_child"))]
     assert left == []

@@ -13,12 +13,12 @@ import structlog
 from sqlalchemy.exc import IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
-import service.db
-from service.db import AWAY, connect, migrate
+import service.jobs.database
+from service.jobs.attempt import WorkConfig, _Attempt, run_job
+from service.jobs.database import AWAY, connect, migrate
+from service.jobs.job_store import JobStore, NewJob
+from service.jobs.supervisor import Limits
 from service.logs import configure
-from service.store import JobStore, NewJob
-from service.supervisor import Limits
-from service.work import WorkConfig, _Attempt, run_job
 
 
 def test_what_the_database_raises_holds_no_values(tmp_path):
@@ -29,7 +29,7 @@ def test_what_the_database_raises_holds_no_values(tmp_path):
                  webhook_url="https://mes.example.com/hook?token=hunter2")
     job = store.create(new)[0]
     with pytest.raises(IntegrityError) as caught, store.engine.begin() as c:
-        c.execute(service.db.jobs.insert().values(dict(job)))
+        c.execute(service.jobs.database.jobs.insert().values(dict(job)))
     assert "hunter2" not in str(caught.value) and "customer" not in str(caught.value)
     with store.engine.begin() as c:
         c.exec_driver_sql("DROP TABLE jobs")
@@ -40,8 +40,8 @@ def test_what_the_database_raises_holds_no_values(tmp_path):
 
 def test_a_server_that_says_nothing_is_given_up_soon(monkeypatch):
     pytest.importorskip("psycopg")
-    monkeypatch.setitem(service.db.POSTGRES, "connect_timeout", 2)
-    assert service.db.POSTGRES["tcp_user_timeout"] <= 30_000
+    monkeypatch.setitem(service.jobs.database.POSTGRES, "connect_timeout", 2)
+    assert service.jobs.database.POSTGRES["tcp_user_timeout"] <= 30_000
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"postgresql+psycopg://zonemill@127.0.0.1:{silent.getsockname()[1]}/zonemill"
         started = time.monotonic()
@@ -84,7 +84,7 @@ def test_no_free_connection_is_a_database_that_is_away_and_stops_no_job():
 
 def test_processes_that_start_at_the_same_time_wait_for_each_other(tmp_path):
     url = f"sqlite:///{tmp_path / 'data' / 'x.db'}"
-    code = f"from service.db import migrate; import sys; sys.stdin.read(); migrate({url!r})"
+    code = f"from service.jobs.database import migrate; import sys; sys.stdin.read(); migrate({url!r})"
     started = [subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
                for _ in range(3)]
     said = []

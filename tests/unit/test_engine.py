@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from service.engine import MERCY_S, Engine
 from service.errors import UnavailableError
+from service.jobs.engine import MERCY_S, Engine
 from service.settings import Settings
 
 

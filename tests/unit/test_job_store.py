@@ -10,13 +10,13 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
 
-import service.artifacts
-import service.db
-from service.artifacts import Artifacts, artifact_key
-from service.db import connect, jobs, metadata, migrate
+import service.jobs.artifacts
+import service.jobs.database
 from service.errors import KeyConflictError, NotFoundError, RateError
-from service.library import LibraryStore
-from service.store import JobStore, NewJob, Room
+from service.jobs.artifacts import Artifacts, artifact_key
+from service.jobs.database import connect, jobs, metadata, migrate
+from service.jobs.job_store import JobStore, NewJob, Room
+from service.jobs.library import LibraryStore
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_the_migrations_make_the_tables_of_the_code(url):
 def test_jobs_of_the_first_schema_are_kept(tmp_path):
     url = f"sqlite:///{tmp_path / 'old.db'}"
     config = Config()
-    config.set_main_option("script_location", str(Path(service.db.__file__).parent / "migrations"))
+    config.set_main_option("script_location", str(Path(service.jobs.database.__file__).parent / "migrations"))
     row = {c.name: 0 if isinstance(c.type, sa.Integer | sa.Float) else "x" for c in jobs.columns if not c.nullable}
     with connect(url).connect() as connection:
         config.attributes["connection"] = connection
@@ -269,7 +269,7 @@ def test_a_key_that_becomes_free_in_between_makes_a_new_job(store, monkeypatch):
 
 def test_folders_that_are_made_for_a_file_are_flushed_too(tmp_path, monkeypatch):
     flushed, sync = [], service.files.sync_folder
-    monkeypatch.setattr(service.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
+    monkeypatch.setattr(service.jobs.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
     files = Artifacts(tmp_path / "data")
     sha, _ = files.put_blob([b"abc"])
     assert flushed == [files.root, files.root / "blobs", files.root / "blobs" / sha[:2]]

@@ -5,9 +5,9 @@ import threading
 import pytest
 
 from schemas.base import split_reference
-from service.db import connect, migrate
 from service.errors import NotFoundError
-from service.library import SHARED, LibraryStore
+from service.jobs.database import connect, migrate
+from service.jobs.library import SHARED, LibraryStore
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import pytest
 
 from geometry.errors import SetupError
 from service.api.server import settings_with
-from service.db import connect, migrate
-from service.engine import Engine
-from service.keys import KeyStore
+from service.jobs.api_keys import KeyStore
+from service.jobs.database import connect, migrate
+from service.jobs.engine import Engine
 from service.settings import Settings, is_loopback
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settings.md"

@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from service.supervisor import Limits, supervise
+from service.jobs.supervisor import Limits, supervise
 
 
 def test_a_child_that_cannot_be_started_leaves_no_open_file(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from service.api.principals import Who
 from service.api.problems import responses
 from service.api.uploads import DEADLINE_S
 from service.errors import UnauthorizedError
-from service.keys import SCOPES
+from service.jobs.api_keys import SCOPES
 from service.settings import Settings
 from service.version import VERSION, code_version
 

@@ -24,9 +24,9 @@ from starlette.concurrency import run_in_threadpool
 from schemas.jobs import FINAL_STATES
 from service.api.principals import Principal, Who
 from service.api.problems import responses
-from service.db import AWAY
 from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
-from service.resources import event_data
+from service.jobs.database import AWAY
+from service.jobs.resources import event_data
 
 log = structlog.get_logger(__name__)
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])

@@ -25,7 +25,7 @@ from service.errors import (
     UnauthorizedError,
     WithheldError,
 )
-from service.resources import (
+from service.jobs.resources import (
     decode_cursor,
     encode_cursor,
     file_sha256,

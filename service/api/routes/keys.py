@@ -11,7 +11,7 @@ from schemas.keys import KeyList, MadeKey, NewKey
 from service.api.principals import Admin
 from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
-from service.resources import key_resource
+from service.jobs.resources import key_resource
 
 log = structlog.get_logger(__name__)
 router = APIRouter(prefix="/v1/keys", tags=["keys"])

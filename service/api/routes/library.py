@@ -18,9 +18,9 @@ from schemas.tools import Tool
 from service.api.principals import Principal, Who, require
 from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
-from service.keys import ADMIN, SUBMIT, Identity
-from service.library import SHARED, Entry, LibraryStore
-from service.resources import time_text
+from service.jobs.api_keys import ADMIN, SUBMIT, Identity
+from service.jobs.library import SHARED, Entry, LibraryStore
+from service.jobs.resources import time_text
 
 router = APIRouter(prefix="/v1", tags=["libraries"])
 

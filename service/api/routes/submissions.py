@@ -22,7 +22,7 @@ from service.errors import (
     UnauthorizedError,
     UnavailableError,
 )
-from service.resources import job_resource, path_of
+from service.jobs.resources import job_resource, path_of
 
 router = APIRouter(prefix="/v1", tags=["submissions"], dependencies=[Depends(submission_rate)])
 

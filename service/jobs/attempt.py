@@ -20,12 +20,12 @@ import structlog
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import CamError, CancelledError, InternalError, ResourceError
-from service.artifacts import Artifacts, key_of
-from service.db import AWAY, connect
+from service.jobs.artifacts import Artifacts, key_of
+from service.jobs.database import AWAY, connect
+from service.jobs.disk_space import STORAGE_FULL, check_writable, is_full, storage_full
+from service.jobs.job_store import WORKER, JobStore
+from service.jobs.supervisor import Limits, supervise
 from service.logs import configure_once
-from service.storage import STORAGE_FULL, check_writable, is_full, storage_full
-from service.store import WORKER, JobStore
-from service.supervisor import Limits, supervise
 
 log = structlog.get_logger(__name__)
 

@@ -1,5 +1,5 @@
 # The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
-"""``python -m service.child REQUEST.json FD``: run one job, send progress lines to the pipe FD.
+"""``python -m service.jobs.job_process REQUEST.json FD``: run one job, send progress lines to the pipe FD.
 
 The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
 Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it takes something over from an
@@ -88,7 +88,7 @@ def main(argv):
     pipe = int(argv[2])
     guard(request["parent"], request["address_bytes"])
     from geometry.errors import CamError, InternalError, ResourceError
-    from service.storage import is_full, storage_full
+    from service.jobs.disk_space import is_full, storage_full
 
     def send(message):
         os.write(pipe, (json.dumps(message, default=str) + "\n").encode())

@@ -1,10 +1,10 @@
-"""Alembic's entry: runs the revisions on the connection that ``service.db.migrate`` hands over."""
+"""Alembic's entry: runs the revisions on the connection that ``service.jobs.database.migrate`` hands over."""
 
 from __future__ import annotations
 
 from alembic import context
 
-from service.db import metadata
+from service.jobs.database import metadata
 
 connection = context.config.attributes["connection"]
 context.configure(connection=connection, target_metadata=metadata, render_as_batch=True,

@@ -17,8 +17,8 @@ from geometry.errors import error_from_dict
 from schemas.jobs import FINAL_STATES, Job, JobEvent, JobFile, JobFiles, JobLinks, JobResumed, JobSummary, JobWebhook
 from schemas.keys import Key
 from schemas.problem import Problem
-from service.artifacts import Artifacts
 from service.errors import GoneError, NotFoundError, NotReadyError, RequestError, WithheldError, problem_document
+from service.jobs.artifacts import Artifacts
 
 MEDIA_TYPES = {".json": "application/json", ".png": "image/png", ".stpnc": "model/step", ".svg": "image/svg+xml",
                ".html": "text/html; charset=utf-8", ".pdf": "application/pdf", ".bin": "application/octet-stream"}

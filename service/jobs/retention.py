@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import structlog
 
-from service.artifacts import Artifacts, key_of
+from service.jobs.artifacts import Artifacts, key_of
+from service.jobs.job_store import JobStore
 from service.settings import Settings
-from service.store import JobStore
 
 log = structlog.get_logger(__name__)
 

@@ -19,18 +19,18 @@ import structlog
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import ResourceError, SetupError
-from service.artifacts import Artifacts
-from service.db import AWAY, connect, migrate
 from service.errors import RateError, UnavailableError
-from service.janitor import Janitor
-from service.keys import KeyStore
-from service.library import LibraryStore
+from service.jobs.api_keys import KeyStore
+from service.jobs.artifacts import Artifacts
+from service.jobs.attempt import WorkConfig, run_job
+from service.jobs.database import AWAY, connect, migrate
+from service.jobs.disk_space import check_free, check_writable
+from service.jobs.job_store import JobStore, NewJob, Room
+from service.jobs.library import LibraryStore
+from service.jobs.retention import Janitor
+from service.jobs.supervisor import Limits
+from service.jobs.webhooks import Courier
 from service.settings import Settings, is_loopback
-from service.storage import check_free, check_writable
-from service.store import JobStore, NewJob, Room
-from service.supervisor import Limits
-from service.webhooks import Courier
-from service.work import WorkConfig, run_job
 
 log = structlog.get_logger(__name__)
 
@@ -259,7 +259,7 @@ class Engine:
 
     def _tell_workers(self) -> None:
         """Tell workers what to do with their jobs when they end; one of an older release may not know how."""
-        from service.orderly import OrderlyEnd
+        from service.jobs.worker_shutdown import OrderlyEnd
 
         try:
             self._client.register_plugin(OrderlyEnd())

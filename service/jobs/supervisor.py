@@ -25,7 +25,7 @@ import psutil  # type: ignore[import-untyped]
 
 from geometry.errors import CancelledError, ResourceError, error_from_dict
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 # Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
 ADDRESS_ROOM = 8_000_000_000
 _SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
@@ -52,7 +52,7 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
               on_resumed: Callable[[Mapping[str, int]], None], keep: Callable[[], bool]) -> str:
     """Run a job in a child.
 
-    request     : see ``service.child``; 'parent' and 'address_bytes' are filled in here
+    request     : see ``service.jobs.job_process``; 'parent' and 'address_bytes' are filled in here
     scratch     : folder for what lives as long as the child
     on_progress : called with stage and fraction, at most once per look
     on_resumed  : called with what the child took over from attempts before, by kind
@@ -77,7 +77,7 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
         reading, writing = os.pipe()
         try:
             with log.open("wb") as out, closing_fd(writing):
-                child = subprocess.Popen([sys.executable, "-m", "service.child", str(path), str(writing)],
+                child = subprocess.Popen([sys.executable, "-m", "service.jobs.job_process", str(path), str(writing)],
                                          pass_fds=(writing,), stdin=subprocess.DEVNULL, stdout=out, stderr=out,
                                          start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
             try:

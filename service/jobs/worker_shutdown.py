@@ -8,7 +8,7 @@ from typing import Any
 
 from distributed import Status, WorkerPlugin
 
-from service import work
+from service.jobs import attempt
 
 PATIENCE_S = 8.0  # within what is usually given to a process between SIGTERM and SIGKILL
 LOOK_S = 0.05
@@ -23,7 +23,7 @@ class OrderlyEnd(WorkerPlugin):  # type: ignore[misc]
         """Stop the attempts of a worker that closes, and wait until they have put their jobs back."""
         if worker.status is not Status.closing:
             return
-        work.ending.set()
+        attempt.ending.set()
         until = time.monotonic() + PATIENCE_S
-        while work.under_way and time.monotonic() < until:
+        while attempt.under_way and time.monotonic() < until:
             await asyncio.sleep(LOOK_S)

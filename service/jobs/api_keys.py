@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import sqlalchemy as sa
 from sqlalchemy.engine import Engine, RowMapping
 
-from service.db import api_keys
 from service.errors import NotFoundError, RequestError, UnauthorizedError
+from service.jobs.database import api_keys
 
 SUBMIT, READ, ADMIN, METRICS = "submit", "read", "admin", "metrics"
 SCOPES = (SUBMIT, READ, ADMIN, METRICS)

@@ -21,8 +21,8 @@ from sqlalchemy.sql.dml import ReturningInsert
 
 from geometry.errors import CamError, ResourceError
 from schemas.jobs import FINAL_STATES
-from service.db import jobs, labels
 from service.errors import KeyConflictError, NotFoundError, RateError
+from service.jobs.database import jobs, labels
 
 FAR_LEASES = 10  # no holder asks for so many at once
 WORKER = "worker-"  # how the names of holders begin that have started an attempt
@@ -376,7 +376,7 @@ class JobStore:
         return named
 
     def unfinished(self) -> list[RowMapping]:
-        """Every job that waits or runs, as far as its result is named by it (``service.artifacts.key_of``)."""
+        """Every job that waits or runs, as far as its result is named by it (``service.jobs.artifacts.key_of``)."""
         columns = (jobs.c.kind, jobs.c.part_sha256, jobs.c.setup_sha256, jobs.c.program_sha256, jobs.c.spindle_tool,
                    jobs.c.stock_sha256)
         with self.engine.connect() as c:

@@ -18,8 +18,8 @@ from sqlalchemy.engine import Engine, RowMapping
 from sqlalchemy.exc import IntegrityError
 
 from schemas.base import split_reference
-from service.db import entries
 from service.errors import NotFoundError
+from service.jobs.database import entries
 
 SHELVES = ("tools", "machines", "materials")
 SHARED = ""

@@ -22,10 +22,10 @@ import structlog
 from sqlalchemy.engine import RowMapping
 
 from service.errors import RequestError
+from service.jobs.job_store import JobStore
+from service.jobs.resources import job_resource
 from service.outbound_requests import BlockedError, check_allowed, parse_target, resolve, send
-from service.resources import job_resource
 from service.settings import Settings
-from service.store import JobStore
 from service.version import VERSION
 
 log = structlog.get_logger(__name__)
