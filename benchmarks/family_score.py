@@ -82,10 +82,10 @@ def draw(part: Any, found: Any, out: Path, title: str) -> None:
     import numpy as np
     from PIL import Image, ImageDraw
 
-    from service.camera import Camera
-    from service.lettering import font
+    from service.pictures.annotation import font
+    from service.pictures.camera import Camera
+    from service.pictures.scene import shaded
     from service.preview import CONNECTION, OTHER, zone_colour
-    from service.scene import shaded
 
     colours = np.full((len(part.faces) + 1, 3), OTHER, np.float32)
     for index, wall in enumerate(found.walls):

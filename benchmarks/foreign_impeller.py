@@ -34,8 +34,8 @@ from benchmarks.foreign_twin import SPACING  # noqa: E402
 from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.step_import.reader import read_part  # noqa: E402
 from geometry.stl import write_stl  # noqa: E402
-from service.camera import Camera  # noqa: E402
-from service.scene import lit  # noqa: E402
+from service.pictures.camera import Camera  # noqa: E402
+from service.pictures.scene import lit  # noqa: E402
 from verify.material.machined_part import machined_stock  # noqa: E402
 from verify.model import Finding, FindingKind, Proof  # noqa: E402
 

@@ -37,6 +37,7 @@ from service.from_wire import (
 )
 from service.held import FREE_RATIO, band_planes, in_turn
 from service.machined_mesh import MESH_NAME, MeshWish, machined_part
+from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
 from service.programs import (
@@ -51,7 +52,6 @@ from service.programs import (
 from service.resume import Resumed
 from service.scoring import Score, score
 from service.sheet import sheet_files
-from service.shown import MAP_NAME, draw_proof
 from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces

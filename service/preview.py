@@ -20,8 +20,7 @@ from PIL import Image, ImageDraw
 
 from geometry.mesh import F64, TriangleMesh
 from output.header_text import ascii_text, decimal
-from service.camera import Camera
-from service.lettering import (
+from service.pictures.annotation import (
     GREY,
     INK,
     RGB,
@@ -33,8 +32,9 @@ from service.lettering import (
     draw_triad,
     font,
 )
-from service.raster import F32, Canvas
-from service.scene import lit, segments
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import F32, Canvas
+from service.pictures.scene import lit, segments
 from service.viewfile import read_view
 from service.viewpaths import CUT, RAPID
 

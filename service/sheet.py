@@ -21,9 +21,10 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from schemas.setup import Setup
-from service.clampshot import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.delivery import Files, listed
 from service.from_wire import material_name, tool_bodies
+from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
+from service.pictures.tool_drawing import draw_tool, svg_of
 from service.prepare import Prepared
 from service.programs import access_of, gauge_lengths, proof_frame
 from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
@@ -43,7 +44,6 @@ from service.sheettables import (
     zones_table,
 )
 from service.sides import Look, Program
-from service.tooldrawing import draw_tool, svg_of
 from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (

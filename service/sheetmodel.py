@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.tooldrawing import ToolDrawing
+from service.pictures.tool_drawing import ToolDrawing
 
 
 @dataclass(frozen=True)

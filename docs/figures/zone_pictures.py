@@ -19,10 +19,10 @@ from PIL import Image, ImageDraw
 from examples.family import make_part
 from geometry.mesh import F64
 from geometry.trimming.facet_sheet import refined, sheet_of
-from service.camera import Camera
 from service.from_wire import parse_setup
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import Canvas
 from service.prepare import Prepared, prepare
-from service.raster import Canvas
 from zones.plan_view.channel_plan import ChannelPlan
 from zones.zoning.zone_patches import Nearest
 from zones.zoning.zones import ZoneArea

@@ -22,7 +22,7 @@ from numba import config
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("geometry", "zones", "toolpath", "verify")
 # compiled functions that stand outside the packages of kernels
-BESIDE = ("service/raster.py", "examples/casting.py", "examples/reach.py")
+BESIDE = ("service/pictures/rasterizer.py", "examples/casting.py", "examples/reach.py")
 DAY_S = 86400.0
 
 _DIGEST = re.compile(r"[0-9a-f]{16}")

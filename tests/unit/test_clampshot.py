@@ -10,8 +10,18 @@ import pytest
 from PIL import Image
 
 from geometry.part import FaceInfo, Part
-from service.clampshot import COMING, FIXTURE, HEADER, SIZE, Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
-from service.lettering import AXES
+from service.pictures.annotation import AXES
+from service.pictures.clamping_picture import (
+    COMING,
+    FIXTURE,
+    HEADER,
+    SIZE,
+    Clamped,
+    bar_mesh,
+    box_mesh,
+    clamp_picture,
+    corners_of,
+)
 
 
 def block(low: tuple[float, ...], high: tuple[float, ...]) -> np.ndarray:

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from geometry.sampling import sample_surface
-from service.camera import Camera
-from service.deviation import COLOURS, GREEN, PALE, SIZE, UNCUT, Mark, Measured, draw_deviation
+from service.pictures.camera import Camera
+from service.pictures.deviation_map import COLOURS, GREEN, PALE, SIZE, UNCUT, Mark, Measured, draw_deviation
 from tests.pocket_case import block
 
 PART = block()

@@ -8,11 +8,12 @@ import pytest
 from PIL import Image
 
 from geometry.part import EdgeInfo, EdgeKind
-from service import deviation, preview
-from service.camera import Camera
-from service.lettering import scale_length
+from service import preview
+from service.pictures import deviation_map
+from service.pictures.annotation import scale_length
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import Canvas
 from service.preview import REMAINDER, SIZE, TOOLS, draw_preview, zone_colour
-from service.raster import Canvas
 from service.viewfile import Chunk, Column, write_view
 from service.viewmesh import GRID, LEFT_UNIT, Facets, edge_chunk, mesh_chunks
 from tests.hand_parts import as_part, box_mesh, joined
@@ -139,9 +140,9 @@ def test_colours_and_classes_are_those_of_the_page():
 
     assert np.allclose(rows("TOOLS"), preview.TOOLS) and np.allclose(rows("REMAINDER"), [preview.REMAINDER])
     assert np.allclose(rows("OTHER"), [preview.OTHER]) and np.allclose(rows("CONNECTION"), [preview.CONNECTION])
-    assert np.allclose(rows("CLASSES"), deviation.COLOURS[:deviation.UNCUT])
-    assert np.allclose(rows("UNCUT"), [deviation.COLOURS[deviation.UNCUT]])
-    assert f"STEPS = [{deviation.STEPS[0]:g}, {deviation.STEPS[1]:g}]" in source
+    assert np.allclose(rows("CLASSES"), deviation_map.COLOURS[:deviation_map.UNCUT])
+    assert np.allclose(rows("UNCUT"), [deviation_map.COLOURS[deviation_map.UNCUT]])
+    assert f"STEPS = [{deviation_map.STEPS[0]:g}, {deviation_map.STEPS[1]:g}]" in source
     hue = re.search(r"const hue = ([\d.]+) \+ ([\d.]+) \* \(\(index \* ([\d.]+)\) % 1\)", source).groups()
     assert [float(v) for v in hue] == [0.15, 0.76, 0.381966]
     assert zone_colour(0) == pytest.approx((0.8176, 0.7781, 0.4224), abs=1e-4)

@@ -15,9 +15,9 @@ import pytest
 
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
-from service.clampshot import box_mesh, corners_of
 from service.delivery import Files
 from service.from_wire import parse_setup
+from service.pictures.clamping_picture import box_mesh, corners_of
 from service.sheet import sheet_files
 from service.sheetmodel import Facts, Section, Sheet
 from service.sheetpdf import latin, pdf_of

@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from geometry.tool_body import HolderSegment, ToolBody
-from service.tooldrawing import HEIGHT, LETTER, WIDTH, draw_tool, svg_of
+from service.pictures.tool_drawing import HEIGHT, LETTER, WIDTH, draw_tool, svg_of
 
 SVG = "{http://www.w3.org/2000/svg}"
 HOLDER = (HolderSegment(14.0, 20.0, 12.0), HolderSegment(20.0, 20.0, 30.0))

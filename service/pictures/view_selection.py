@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.sampling import SurfaceSamples
-from service.camera import Camera
-from service.lettering import PAPER
-from service.raster import Canvas
+from service.pictures.annotation import PAPER
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import Canvas
 
 TRIAL = (480, 360)  # pixels of the pictures that views are chosen with
 MOST_TRIED = 20_000  # samples

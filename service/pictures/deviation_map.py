@@ -21,8 +21,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from output.header_text import ascii_text, decimal
-from service.camera import Camera
-from service.lettering import (
+from service.pictures.annotation import (
     GREY,
     INK,
     RGB,
@@ -33,9 +32,10 @@ from service.lettering import (
     draw_triad,
     font,
 )
-from service.raster import Canvas
-from service.scene import add_edges, lit
-from service.sights import choose_views, seen
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import Canvas
+from service.pictures.scene import add_edges, lit
+from service.pictures.view_selection import choose_views, seen
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8

@@ -6,9 +6,9 @@ import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeKind, Part
-from service.camera import Camera
-from service.lettering import INK, PAPER
-from service.raster import F32, Canvas
+from service.pictures.annotation import INK, PAPER
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import F32, Canvas
 
 
 def lit(mesh: TriangleMesh, colours: F32, camera: Camera) -> Canvas:

@@ -9,7 +9,7 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
-from service.deviation import COLOURS, Mark, Measured, draw_deviation
+from service.pictures.deviation_map import COLOURS, Mark, Measured, draw_deviation
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 
 MAP_NAME = "deviation.png"

@@ -17,8 +17,7 @@ from PIL import Image, ImageDraw
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from output.header_text import ascii_text, decimal
-from service.camera import Camera
-from service.lettering import (
+from service.pictures.annotation import (
     AXES,
     GREY,
     INK,
@@ -29,8 +28,9 @@ from service.lettering import (
     draw_scale,
     font,
 )
-from service.raster import Canvas
-from service.scene import add_edges, lit, segments
+from service.pictures.camera import Camera
+from service.pictures.rasterizer import Canvas
+from service.pictures.scene import add_edges, lit, segments
 
 SIZE = (1760, 780)
 HEADER, LEGEND, GUTTER = 44, 66, 8

@@ -9,7 +9,7 @@ from PIL import ImageDraw, ImageFont
 from PIL.ImageFont import FreeTypeFont
 
 from output.header_text import ascii_text, decimal
-from service.camera import Camera
+from service.pictures.camera import Camera
 
 RGB = tuple[float, float, float]
 WHITE: RGB = (1.0, 1.0, 1.0)
