@@ -22,7 +22,7 @@ from benchmarks.parts_table import PUBLIC, Job, family_job, public_job  # noqa: 
 from schemas.setup import Setup  # noqa: E402
 from service.from_wire import read_setup  # noqa: E402
 from service.prepare import Prepared, prepare  # noqa: E402
-from service.reporting import accesses_of  # noqa: E402
+from service.report.report import accesses_of  # noqa: E402
 
 MACHINE = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-30, 110], [-360, 360]]}
 

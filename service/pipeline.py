@@ -22,7 +22,6 @@ from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
 from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean, Setup
-from service import reporting
 from service.again import PLANS, Attempt, Learned, learned, worth_another
 from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld, upright
 from service.checkpoint_store import Kept
@@ -49,6 +48,7 @@ from service.programs import (
     turning_of,
     with_figures,
 )
+from service.report import report as reporting
 from service.resume import Resumed
 from service.scoring import Score, score
 from service.sheet import sheet_files

@@ -22,10 +22,10 @@ from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
-from service import reporting
 from service.cutting_data import rates_of
 from service.from_wire import rotary_machine, tool_bodies
 from service.prepare import TABLE_SPARE, Prepared, table_height
+from service.report import report as reporting
 from service.sides import Look, Program, Side
 from service.stock import turned_box
 from service.trimmed import exact_faces

@@ -15,7 +15,7 @@ from geometry.tool_body import ToolBody
 from service.delivery import Files
 from service.from_wire import tool_bodies
 from service.prepare import Prepared
-from service.reporting import REMAINDER_FLOOR_MM2
+from service.report.report import REMAINDER_FLOOR_MM2
 from service.scoring import Score
 from service.sides import Look
 from service.version import VERSION
@@ -45,7 +45,7 @@ def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32
 
     scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
     zone   : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
-    rest   : (n,) bool, those that stay uncut; stays : why, as ``service.reporting.job_report`` has it
+    rest   : (n,) bool, those that stay uncut; stays : why, as ``service.report.report.job_report`` has it
     report : whose places are in the setup frame; of a job that is not proved no program is given away.
              Where the file cannot be made its notes say so
     """

@@ -11,7 +11,7 @@ import pytest
 from schemas.setup import Setup
 from service.from_wire import parse_setup
 from service.prepare import prepare
-from service.reporting import dry_report
+from service.report.report import dry_report
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")

@@ -13,7 +13,7 @@ import shapely
 from geometry.sampling import sample_surface
 from service.from_wire import parse_setup
 from service.prepare import Prepared, prepare
-from service.reporting import dry_report
+from service.report.report import dry_report
 
 pytest.importorskip("cadquery")
 

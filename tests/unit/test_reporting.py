@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from service import reporting
+from service.report import report
 from tests.synthetic_plan import BALL, step
 from toolpath.planning.zone_finishing import ZonePlan
 from toolpath.workingsteps import Motion, Trajectory
@@ -20,14 +20,14 @@ def cut(length: float, feed: float) -> tuple[Trajectory, ...]:
 @pytest.fixture
 def planned(monkeypatch):
     """What the report says of zone Z1 whose workingsteps are given."""
-    monkeypatch.setattr(reporting, "_zone", lambda _ready, zone: {"id": zone.id, "rejected": []})
+    monkeypatch.setattr(report, "_zone", lambda _ready, zone: {"id": zone.id, "rejected": []})
     zone = SimpleNamespace(id="Z1")
     ready = SimpleNamespace(setup=SimpleNamespace(quality=SimpleNamespace(scallop_height_mm=0.01)))
 
     def ask(*steps):
         first = next((s.id for s in steps if s.zone == "Z1"), None)
         plan = ZonePlan(zone, first, "zigzag", 0.3, 5, np.zeros(0, np.int64))
-        return reporting._planned(ready, zone, plan, {s.id: s for s in steps}, SimpleNamespace(zones={}))
+        return report._planned(ready, zone, plan, {s.id: s for s in steps}, SimpleNamespace(zones={}))
 
     return ask
 

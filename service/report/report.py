@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
-from service import advice, offers
 from service.cautions import Caution
 from service.from_wire import rotary_machine
 from service.prepare import Prepared, clearances
+from service.report import approach_cones, tool_offers
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
@@ -99,7 +99,7 @@ def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
 
 def _cone(ready: Prepared, zone: ZoneArea) -> dict[str, Any] | None:
     """Approach cone of a zone: axis in the setup frame and half angle, degrees."""
-    cone = advice.cone_of(ready, zone)
+    cone = approach_cones.cone_of(ready, zone)
     if cone is None:
         return None
     return {"axis": [r(v, 6) for v in cone.axis.tolist()], "half_angle_deg": r(math.degrees(cone.half_angle), 2),
@@ -153,7 +153,7 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
     items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift,
                     clear=clearances(ready.setup))
     return {**_shape(ready), **_areas(ready), "zones": [_zone(ready, z) for z in ready.zones],
-            "remainder": _remainder(ready, items), "proposal": offers.as_dict(ready.setup, offers.offers(ready))}
+            "remainder": _remainder(ready, items), "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready))}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
@@ -192,7 +192,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         "inputs": _inputs(ready),
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
-        "proposal": offers.as_dict(ready.setup, offers.offers(ready)), "findings": findings,
+        "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
