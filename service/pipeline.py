@@ -51,7 +51,7 @@ from service.programs import (
 from service.report import report as reporting
 from service.resume import Resumed
 from service.scoring import Score, score
-from service.sheet import sheet_files
+from service.setup_sheet.setup_sheet import sheet_files
 from service.sides import Look, Program, Side, in_setup_frame
 from service.stepnc import stepnc_under_way
 from service.trimmed import trimmed_faces

@@ -18,9 +18,9 @@ from geometry.part import FaceInfo, Part
 from service.delivery import Files
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
-from service.sheet import sheet_files
-from service.sheetmodel import Facts, Section, Sheet
-from service.sheetpdf import latin, pdf_of
+from service.setup_sheet.model import Facts, Section, Sheet
+from service.setup_sheet.pdf import latin, pdf_of
+from service.setup_sheet.setup_sheet import sheet_files
 from service.sides import Program
 from service.stock import blank_of
 from tests.synthetic_plan import plan, step

@@ -53,7 +53,7 @@ export function slender(all: ViewRest[]): string {
   return times.length ? `as a tool would be ${least === most ? least : `${least} to ${most}`} times as long as thick` : "";
 }
 
-/** What would do for an entry of the remainder, in words; with `slender` as much as the sheet says (service/sheettables.py). */
+/** What would do for an entry of the remainder, in words; with `slender` as much as the sheet says (service/setup_sheet/tables.py). */
 export function needs(r: ViewRest): string {
   const w = r.would_need as Need;
   const round = w.kind === "bull" ? ` with a corner of ${w.corner_radius_mm} mm` : "";

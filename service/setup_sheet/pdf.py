@@ -15,7 +15,7 @@ from PIL import Image
 from output.header_text import ascii_text
 from output.stepnc.part21 import time_stamp
 from service.pictures.tool_drawing import HEIGHT, LETTER, WIDTH, ToolDrawing
-from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
 
 MARGIN, FOOT = 12.0, 14.0  # mm
 INK, QUIET, BAD, GOOD = (20, 24, 29), (74, 82, 92), (163, 13, 23), (11, 90, 42)

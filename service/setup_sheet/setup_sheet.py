@@ -1,6 +1,6 @@
 """Setup sheet of a job, as a web page and as a PDF: what planner and machinist have to know before the spindle turns.
 
-Both are made of one ``service.sheetmodel.Sheet``, so that they say the same. It holds no line of a program, and of a
+Both are made of one ``service.setup_sheet.model.Sheet``, so that they say the same. It holds no line of a program, and of a
 job that is not proved it says so before all else. No clock and no random number: the same input gives the same bytes.
 """
 
@@ -27,9 +27,9 @@ from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp
 from service.pictures.tool_drawing import draw_tool, svg_of
 from service.prepare import Prepared
 from service.programs import access_of, gauge_lengths, proof_frame
-from service.sheetmodel import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
-from service.sheetpdf import pdf_of
-from service.sheettables import (
+from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.pdf import pdf_of
+from service.setup_sheet.tables import (
     NONE,
     cautions_section,
     files_table,
@@ -52,7 +52,7 @@ ZONE_WORDS = (
     "Scallop: what stands over the surface between two passes, mm; as asked for, what 99 % of the samples keep, and "
     "the most.",
     "Covered: share of the zone that the proof found within the budget.")
-HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
+HTML_NAME, PDF_NAME = "template.html", "sheet.pdf"
 
 
 def sheet_files(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any], files: Files) -> Files:
@@ -275,7 +275,7 @@ def _template() -> Template:
                       trim_blocks=True, lstrip_blocks=True)
     env.filters["svg"] = svg_of
     env.filters["data"] = lambda png: "data:image/png;base64," + base64.b64encode(png).decode()
-    return env.get_template("sheet.html")
+    return env.get_template("template.html")
 
 
 def html_of(sheet: Sheet) -> bytes:

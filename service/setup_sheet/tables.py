@@ -8,7 +8,7 @@ from typing import Any
 
 from output.header_text import decimal
 from schemas.setup import Setup
-from service.sheetmodel import Facts, Lines, Section, Table
+from service.setup_sheet.model import Facts, Lines, Section, Table
 
 NONE = "-"
 SHORT_LABEL = 8  # characters of a label that fit into a narrow column
