@@ -36,8 +36,9 @@ from geometry.mesh import F64  # noqa: E402
 from output.arc_fitting import SHARE, fitted, stretches  # noqa: E402
 from output.program_grid import GridArc, pieces, to_grid  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
-from service import pipeline, programs  # noqa: E402
+from service import pipeline  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
+from service.stages import programs  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
 from toolpath.workingsteps import Motion  # noqa: E402

@@ -21,8 +21,8 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.parts_table import PUBLIC, Job, family_job, public_job  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service.from_wire import read_setup  # noqa: E402
-from service.prepare import Prepared, prepare  # noqa: E402
 from service.report.report import accesses_of  # noqa: E402
+from service.stages.preparation import Prepared, prepare  # noqa: E402
 
 MACHINE = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-30, 110], [-360, 360]]}
 

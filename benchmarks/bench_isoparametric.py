@@ -35,7 +35,7 @@ from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.from_wire import parse_setup, tool_bodies  # noqa: E402
-from service.prepare import clearances, placement_of, prepare  # noqa: E402
+from service.stages.preparation import clearances, placement_of, prepare  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402

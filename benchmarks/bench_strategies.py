@@ -33,7 +33,7 @@ from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
-from service.prepare import Prepared, placement_of  # noqa: E402
+from service.stages.preparation import Prepared, placement_of  # noqa: E402
 from toolpath.plan_settings import Pattern
 from toolpath.workingsteps import Motion, Workingstep  # noqa: E402
 from verify.moves import Moves

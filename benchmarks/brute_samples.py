@@ -396,7 +396,7 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     """Figures of one part: by tool and for the union of the tools, shares of the machinable area."""
     from geometry.mesh_queries.bvh import TriangleTree
     from service.from_wire import read_setup, tool_bodies
-    from service.prepare import clearances, load
+    from service.stages.preparation import clearances, load
 
     setup = read_setup(setup_path)
     part = load(path, setup)

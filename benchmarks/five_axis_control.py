@@ -44,7 +44,7 @@ from geometry.mesh import F64  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
-from service.programs import gauge_lengths  # noqa: E402
+from service.stages.programs import gauge_lengths  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.program.program import Program  # noqa: E402
 

@@ -194,7 +194,7 @@ def strips_file(seed: int, recipe: str, step: Path) -> Path | None:
 def zone_table(step: Path, setup: dict[str, Any]) -> dict[tuple[str, str, str], float]:
     """Area by kind of region, form and tool of the zones of a setup, mm²."""
     from service.from_wire import parse_setup
-    from service.prepare import prepare
+    from service.stages.preparation import prepare
 
     ready = prepare(step, parse_setup(json.dumps(setup)), lambda _stage, _share: None)
     out: dict[tuple[str, str, str], float] = {}

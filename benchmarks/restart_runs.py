@@ -51,7 +51,7 @@ from output.clamping_sequence import SPARE  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
-from service.programs import gauge_lengths  # noqa: E402
+from service.stages.programs import gauge_lengths  # noqa: E402
 from verify.gcode.reader import RAPID, read_program  # noqa: E402
 
 JOBS = {"bar on a table A/C": ("bar", "table-AC", 4.0), "bar on a table B/C": ("bar", "table-BC", 4.0),

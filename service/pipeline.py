@@ -22,11 +22,8 @@ from geometry.errors import CamError, SetupError
 from geometry.sampling import SurfaceSamples
 from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean, Setup
-from service.again import PLANS, Attempt, Learned, learned, worth_another
-from service.cautions import bent, dry, limited, lives_ended, sentences, thin_walls, uncut_centres, unheld, upright
 from service.checkpoint_store import Kept
 from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
-from service.delivery import Files, clear_results, deliver, json_bytes
 from service.from_wire import (
     check_plannable,
     check_spindle_tool,
@@ -34,12 +31,25 @@ from service.from_wire import (
     rotary_limits,
     tool_bodies,
 )
-from service.held import FREE_RATIO, band_planes, in_turn
-from service.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.pictures.proof_picture import MAP_NAME, draw_proof
-from service.prepare import Prepared, prepare, table_height
 from service.preview import draw_preview
-from service.programs import (
+from service.report import report as reporting
+from service.setup_sheet.setup_sheet import sheet_files
+from service.stages.access_plan import Look, Program, Side, in_setup_frame
+from service.stages.cautions import (
+    bent,
+    dry,
+    limited,
+    lives_ended,
+    sentences,
+    thin_walls,
+    uncut_centres,
+    unheld,
+    upright,
+)
+from service.stages.machined_mesh import MESH_NAME, MeshWish, machined_part
+from service.stages.preparation import Prepared, prepare, table_height
+from service.stages.programs import (
     access_of,
     fixture_boxes,
     gauge_lengths,
@@ -48,13 +58,13 @@ from service.programs import (
     turning_of,
     with_figures,
 )
-from service.report import report as reporting
-from service.resume import Resumed
-from service.scoring import Score, score
-from service.setup_sheet.setup_sheet import sheet_files
-from service.sides import Look, Program, Side, in_setup_frame
-from service.stepnc import stepnc_under_way
-from service.trimmed import trimmed_faces
+from service.stages.proof_samples import Score, score
+from service.stages.replanning import PLANS, Attempt, Learned, learned, worth_another
+from service.stages.result_files import Files, clear_results, deliver, json_bytes
+from service.stages.resume import Resumed
+from service.stages.stepnc_files import stepnc_under_way
+from service.stages.trimmed_faces import trimmed_faces
+from service.stages.wall_support import FREE_RATIO, band_planes, in_turn
 from service.viewdata import VIEW_NAME, plan_view, verification_view
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
 from toolpath.passes.pass_family import Target
@@ -86,10 +96,10 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
          planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
-    mesh : also write the machined part as a mesh, in the frame of the proof (``service.programs.proof_frame``)
+    mesh : also write the machined part as a mesh, in the frame of the proof (``service.stages.programs.proof_frame``)
     planner : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
     blank_path : STEP file of the blank where ``stock.kind`` is 'step'; what the setup calls it is not looked at
-    kept : what an attempt at this very job kept before and what this one keeps (``service.resume``); nothing in None
+    kept : what an attempt at this very job kept before and what this one keeps (``service.stages.resume``); nothing in None
 
     Returns
     -------

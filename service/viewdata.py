@@ -12,12 +12,12 @@ from geometry.errors import CamError
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
-from service.delivery import Files
 from service.from_wire import tool_bodies
-from service.prepare import Prepared
 from service.report.report import REMAINDER_FLOOR_MM2
-from service.scoring import Score
-from service.sides import Look
+from service.stages.access_plan import Look
+from service.stages.preparation import Prepared
+from service.stages.proof_samples import Score
+from service.stages.result_files import Files
 from service.version import VERSION
 from service.viewfile import Chunk, write_view
 from service.viewmesh import GRID as MESH_GRID
@@ -41,7 +41,7 @@ I64 = NDArray[np.int64]
 def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
               stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
-    """The view file of a planned job, as ``service.delivery`` takes it.
+    """The view file of a planned job, as ``service.stages.result_files`` takes it.
 
     scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
     zone   : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none

@@ -22,7 +22,7 @@ from geometry.trimming.facet_sheet import refined, sheet_of
 from service.from_wire import parse_setup
 from service.pictures.camera import Camera
 from service.pictures.rasterizer import Canvas
-from service.prepare import Prepared, prepare
+from service.stages.preparation import Prepared, prepare
 from zones.plan_view.channel_plan import ChannelPlan
 from zones.zoning.zone_patches import Nearest
 from zones.zoning.zones import ZoneArea

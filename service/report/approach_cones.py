@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.prepare import Prepared, clearances
+from service.stages.preparation import Prepared, clearances
 from zones.reach.approach_cones import Cone, approach, directions_over_hemisphere, zone_cone
 from zones.zoning.zones import ZoneArea
 

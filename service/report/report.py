@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
-from service.cautions import Caution
 from service.from_wire import rotary_machine
-from service.prepare import Prepared, clearances
 from service.report import approach_cones, tool_offers
+from service.stages.cautions import Caution
+from service.stages.preparation import Prepared, clearances
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan

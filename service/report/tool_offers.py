@@ -13,7 +13,7 @@ from geometry.tool_body import ToolBody
 from schemas.setup import Setup
 from schemas.tools import Tool
 from service.from_wire import tool_bodies
-from service.prepare import Prepared, clearances, tip_field
+from service.stages.preparation import Prepared, clearances, tip_field
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View
 from zones.reach.tip_field import TipField, touchable

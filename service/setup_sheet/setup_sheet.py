@@ -21,12 +21,9 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from schemas.setup import Setup
-from service.delivery import Files, listed
 from service.from_wire import material_name, tool_bodies
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
-from service.prepare import Prepared
-from service.programs import access_of, gauge_lengths, proof_frame
 from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
 from service.setup_sheet.pdf import pdf_of
 from service.setup_sheet.tables import (
@@ -43,7 +40,10 @@ from service.setup_sheet.tables import (
     tools_table,
     zones_table,
 )
-from service.sides import Look, Program
+from service.stages.access_plan import Look, Program
+from service.stages.preparation import Prepared
+from service.stages.programs import access_of, gauge_lengths, proof_frame
+from service.stages.result_files import Files, listed
 from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (

@@ -13,8 +13,8 @@ import pytest
 from geometry.mesh import F64
 from service import pipeline
 from service.from_wire import parse_setup
-from service.prepare import prepare
-from service.programs import turning_of
+from service.stages.preparation import prepare
+from service.stages.programs import turning_of
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 

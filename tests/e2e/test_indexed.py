@@ -12,7 +12,7 @@ import pytest
 from schemas.setup import Setup
 from service import pipeline
 from service.from_wire import parse_setup
-from service.prepare import prepare
+from service.stages.preparation import prepare
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 

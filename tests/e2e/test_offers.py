@@ -10,8 +10,8 @@ import pytest
 
 from schemas.setup import Setup
 from service.from_wire import parse_setup
-from service.prepare import prepare
 from service.report.report import dry_report
+from service.stages.preparation import prepare
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")

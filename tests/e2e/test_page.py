@@ -85,7 +85,7 @@ def shown(folder):
 @pytest.fixture(scope="module")
 def unproved(part, tmp_path_factory):  # noqa: F811
     """A folder with a planted gouge."""
-    from service import programs
+    from service.stages import programs
 
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FAKES))

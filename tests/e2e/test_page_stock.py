@@ -12,7 +12,7 @@ import pytest
 
 from geometry.tool_body import ToolBody
 from service import viewstock
-from service.sides import Look
+from service.stages.access_plan import Look
 from service.viewdata import tool_shape
 from service.viewfile import Chunk, read_view, write_view
 from service.viewpaths import AXIS_UNIT, path_chunks, way_of

@@ -8,8 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from service import pipeline, programs
+from service import pipeline
 from service.from_wire import parse_setup
+from service.stages import programs
 from tests.arc_plans import off
 from tests.step_files import write_step
 from toolpath.workingsteps import Motion

@@ -7,9 +7,9 @@ import json
 import pytest
 
 from service import pipeline
-from service.cautions import thin_walls
 from service.from_wire import parse_setup
-from service.prepare import prepare
+from service.stages.cautions import thin_walls
+from service.stages.preparation import prepare
 from tests.decomposition_shapes import box, plate
 
 cq = pytest.importorskip("cadquery")

@@ -9,8 +9,8 @@ import pytest
 from examples.setups import setup_with, tool
 from schemas.setup import Setup
 from service import pipeline
-from service.held import FREE_RATIO, PLANNED_RATIO, band_planes
-from service.prepare import prepare
+from service.stages.preparation import prepare
+from service.stages.wall_support import FREE_RATIO, PLANNED_RATIO, band_planes
 from tests.decomposition_shapes import box
 
 cq = pytest.importorskip("cadquery")

@@ -75,7 +75,7 @@ def test_the_way_is_that_of_the_program(demo_job):
 
 
 def test_an_unproved_job_is_shown_without_its_program(part, tmp_path, monkeypatch):  # noqa: F811
-    from service import programs
+    from service.stages import programs
 
     monkeypatch.syspath_prepend(str(FAKES))
     monkeypatch.setattr(programs, "write_program", programs.write_program)

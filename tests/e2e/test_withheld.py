@@ -9,10 +9,10 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from schemas.report import Report
-from service import programs
 from service.api.app import create_app
 from service.cli import app
 from service.settings import Settings
+from service.stages import programs
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")

@@ -12,8 +12,8 @@ import shapely
 
 from geometry.sampling import sample_surface
 from service.from_wire import parse_setup
-from service.prepare import Prepared, prepare
 from service.report.report import dry_report
+from service.stages.preparation import Prepared, prepare
 
 pytest.importorskip("cadquery")
 

@@ -7,10 +7,10 @@ import pytest
 
 from geometry.errors import CamError, SetupError
 from geometry.mesh import TriangleMesh
-from service.blank import check_against_part
 from service.errors import problem_document
 from service.from_wire import parse_setup
-from service.stock import blank_of
+from service.stages.blank_checks import check_against_part
+from service.stages.blank_model import blank_of
 from tests.unit.test_boxes import block
 
 TOOLS = [{"id": "T1", "kind": "ball", "diameter_mm": 3}]

@@ -12,8 +12,8 @@ import pytest
 from examples.demo import write_small
 from schemas.setup import Setup
 from service import pipeline
-from service.again import MOST, MOST_PACKED, Attempt, Learned, learned
-from service.sides import Look
+from service.stages.access_plan import Look
+from service.stages.replanning import MOST, MOST_PACKED, Attempt, Learned, learned
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.lines import Line

@@ -14,7 +14,7 @@ from geometry.part import Part  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
-from service.prepare import planning_samples  # noqa: E402
+from service.stages.preparation import planning_samples  # noqa: E402
 from tests.hand_parts import ball, tool  # noqa: E402
 from tests.step_files import write_step  # noqa: E402
 from zones.features.decomposition import decompose  # noqa: E402

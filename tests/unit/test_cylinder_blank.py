@@ -5,9 +5,9 @@ import pytest
 
 from geometry.errors import SetupError
 from geometry.mesh_queries.bvh import TriangleTree
-from service.blank import check_against_part
 from service.from_wire import check_plannable, parse_setup
-from service.stock import blank_of
+from service.stages.blank_checks import check_against_part
+from service.stages.blank_model import blank_of
 from tests.hand_parts import box_mesh
 from tests.pocket_case import block
 from toolpath.stock.stock_map import StockMap

@@ -12,10 +12,10 @@ from benchmarks import feeds_sweep
 from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
-from service.cautions import bent, dry, limited, uncut_centres
 from service.cutting_data import MOST_THINNING, chip_thinning, cutting_data
 from service.from_wire import parse_setup, tool_bodies
 from service.pipeline import cut_table
+from service.stages.cautions import bent, dry, limited, uncut_centres
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
 from toolpath.planning.job_plan import LATTICE_CARE

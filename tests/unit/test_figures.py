@@ -10,7 +10,7 @@ from geometry.errors import InternalError
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import write_program
 from output.gcode.proof_header import AWAITED, LINES, WIDE, filled
-from service.programs import figures_of
+from service.stages.programs import figures_of
 from tests.synthetic_plan import clamped, plan
 from verify.gcode.reader import read_program
 

@@ -10,7 +10,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.surfaces.nurbs import NurbsSurface
-from service.cautions import upright
+from service.stages.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
 from tests.unit.test_matched import measured
 from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of

@@ -13,7 +13,7 @@ from output.clamping_sequence import sections
 from output.linuxcnc import write_linuxcnc
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
-from service.cautions import lives_ended
+from service.stages.cautions import lives_ended
 from tests import synthetic_plan as made
 from toolpath.feeds.tool_life import minutes_in_cut, with_fresh_cutters, worn
 from toolpath.workingsteps import Motion, Trajectory, trajectory_seconds

@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from geometry.tool_body import HolderSegment, ToolBody
 from output.inverse_kinematics import RotaryMachine
-from service.programs import room_to_turn
+from service.stages.programs import room_to_turn
 from tests.hand_parts import box_mesh, joined
 from verify.checks.table_clearance import table_findings
 from verify.gcode.reader import read_program

@@ -15,10 +15,11 @@ import pytest
 
 from examples.demo import write_small
 from schemas.setup import Setup
-from service import pipeline, resume
+from service import pipeline
 from service.checkpoint_store import Kept
-from service.resume import Resumed
-from service.sides import Side
+from service.stages import resume
+from service.stages.access_plan import Side
+from service.stages.resume import Resumed
 from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow

@@ -15,14 +15,14 @@ import pytest
 
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
-from service.delivery import Files
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
 from service.setup_sheet.model import Facts, Section, Sheet
 from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import sheet_files
-from service.sides import Program
-from service.stock import blank_of
+from service.stages.access_plan import Program
+from service.stages.blank_model import blank_of
+from service.stages.result_files import Files
 from tests.synthetic_plan import plan, step
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import access_rotation, turned

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 from geometry.errors import CamError, PartError, SetupError, StepError
 from geometry.mesh import TriangleMesh
 from schemas.setup import canonical_json, content_hash
-from service.blank import check_against_part
 from service.cli import app
 from service.commands.arguments import blank_file
 from service.from_wire import parse_setup
-from service.prepare import load_blank, prepare
-from service.stock import blank_of
+from service.stages.blank_checks import check_against_part
+from service.stages.blank_model import blank_of
+from service.stages.preparation import load_blank, prepare
 from tests.hand_parts import as_part, box_mesh, joined, terraces
 from tests.step_files import write_step
 from zones.reach.access_view import access_rotation

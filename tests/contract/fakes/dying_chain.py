@@ -9,7 +9,7 @@ import os
 import signal
 
 import service.pipeline as chain
-import service.resume as resume
+import service.stages.resume as resume
 from service.pipeline import verify_program, zones_only  # noqa: F401
 from toolpath.plan_checkpoint import Keeper
 from toolpath.planning.job_plan import plan_job

@@ -1,7 +1,7 @@
 """The real chain with a writer that ends every program with a cut half a mm into the floor of the small step part."""
 
 import service.pipeline as chain
-import service.programs as programs
+import service.stages.programs as programs
 
 write = programs.write_program
 

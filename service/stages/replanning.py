@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from service.sides import Look, Program, Side
+from service.stages.access_plan import Look, Program, Side
 from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
 from toolpath.workingsteps import Workingstep
 from verify.model import Finding, FindingKind, Proof

@@ -24,11 +24,11 @@ from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, Stoc
 from schemas.setup import Access, Setup, setup_sha256
 from service.cutting_data import rates_of
 from service.from_wire import rotary_machine, tool_bodies
-from service.prepare import TABLE_SPARE, Prepared, table_height
 from service.report import report as reporting
-from service.sides import Look, Program, Side
-from service.stock import turned_box
-from service.trimmed import exact_faces
+from service.stages.access_plan import Look, Program, Side
+from service.stages.blank_model import turned_box
+from service.stages.preparation import TABLE_SPARE, Prepared, table_height
+from service.stages.trimmed_faces import exact_faces
 from service.version import VERSION
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import Turning

@@ -32,9 +32,9 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from schemas.setup import setup_sha256
 from service.checkpoint_store import Kept
-from service.prepare import Prepared
 from service.serialization import Known, pack, unpack
-from service.sides import Side
+from service.stages.access_plan import Side
+from service.stages.preparation import Prepared
 from service.version import code_version
 from toolpath.counterexamples import Counterexamples
 from toolpath.passes.pass_family import Target

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
-from service.prepare import Prepared, machinable_triangles
+from service.stages.preparation import Prepared, machinable_triangles
 from toolpath.passes.pass_family import Target
 from toolpath.planning.job_plan import Plan
 from zones.machinable_area import forms_of

@@ -16,7 +16,7 @@ import numpy as np
 
 from schemas.setup import Setup
 from service.cutting_data import cutting_data
-from service.prepare import Prepared
+from service.stages.preparation import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.linking.ramp_entry import LEAST_RUN
 from toolpath.plan_settings import Leaned

@@ -23,7 +23,7 @@ class Side:
     """What was planned along one access, in its frame, with its clearance plane there, mm.
 
     left : the stock as it leaves it, for what is planned after it; None where every access begins with the whole blank
-    name : of it among what is kept for another attempt at the job (``service.resume``), '' where nothing is
+    name : of it among what is kept for another attempt at the job (``service.stages.resume``), '' where nothing is
     """
 
     view: View

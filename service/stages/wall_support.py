@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from service.cautions import MOST_RATIO, walls_to_cut
 from service.from_wire import rotary_machine
-from service.prepare import Prepared
+from service.stages.cautions import MOST_RATIO, walls_to_cut
+from service.stages.preparation import Prepared
 from toolpath.counterexamples import HighWall
 from toolpath.planning.depth_bands import largest_corner, planes
 from verify.surface.slender_walls import thin_walls

@@ -12,7 +12,7 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
-from service.prepare import Prepared, placement_of
+from service.stages.preparation import Prepared, placement_of
 from toolpath.passes.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
 from zones.machinable_area import Form

@@ -20,9 +20,9 @@ from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
-from service.blank import check_against_part
 from service.from_wire import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
-from service.stock import Blank, blank_of
+from service.stages.blank_checks import check_against_part
+from service.stages.blank_model import Blank, blank_of
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces

@@ -18,7 +18,7 @@ from geometry.part import Part
 from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.from_wire import face_numbers
-from service.stock import Blank
+from service.stages.blank_model import Blank
 from verify.blank.blank import stock_on_normals
 from verify.model import ProofSetup
 from zones.machinable_area import SEEN, SEEN_SHARE
