@@ -85,7 +85,7 @@ def draw(part: Any, found: Any, out: Path, title: str) -> None:
     from service.pictures.annotation import font
     from service.pictures.camera import Camera
     from service.pictures.scene import shaded
-    from service.preview import CONNECTION, OTHER, zone_colour
+    from service.viewer.preview_picture import CONNECTION, OTHER, zone_colour
 
     colours = np.full((len(part.faces) + 1, 3), OTHER, np.float32)
     for index, wall in enumerate(found.walls):

@@ -23,10 +23,10 @@ import uvicorn
 
 from geometry.tool_body import HolderSegment, ToolBody
 from service.commands.view_command import folder_app
-from service.viewdata import tool_shape
-from service.viewfile import Chunk, Column, write_view
-from service.viewmesh import GRID, JUDGED, LEFT_UNIT, Facets, mesh_chunks
-from service.viewpaths import AXIS_UNIT, Way, path_chunks
+from service.viewer.view_data import tool_shape
+from service.viewer.view_file import Chunk, Column, write_view
+from service.viewer.view_mesh import GRID, JUDGED, LEFT_UNIT, Facets, mesh_chunks
+from service.viewer.view_paths import AXIS_UNIT, Way, path_chunks
 
 ROOT = Path(__file__).parents[1]
 WIDE = 120.0  # mm

@@ -32,7 +32,6 @@ from service.from_wire import (
     tool_bodies,
 )
 from service.pictures.proof_picture import MAP_NAME, draw_proof
-from service.preview import draw_preview
 from service.report import report as reporting
 from service.setup_sheet.setup_sheet import sheet_files
 from service.stages.access_plan import Look, Program, Side, in_setup_frame
@@ -65,7 +64,8 @@ from service.stages.resume import Resumed
 from service.stages.stepnc_files import stepnc_under_way
 from service.stages.trimmed_faces import trimmed_faces
 from service.stages.wall_support import FREE_RATIO, band_planes, in_turn
-from service.viewdata import VIEW_NAME, plan_view, verification_view
+from service.viewer.preview_picture import draw_preview
+from service.viewer.view_data import VIEW_NAME, plan_view, verification_view
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import Faces

@@ -24,9 +24,9 @@ from geometry.errors import SetupError
 from schemas.jobs import Job, JobFile, JobFiles, JobLinks
 from service.console import say
 from service.jobs.resources import file_sha256, is_program, media_type
-from service.pages import asset, page
 from service.settings import is_loopback
-from service.viewdata import VIEW_NAME
+from service.viewer.static_files import asset, page
+from service.viewer.view_data import VIEW_NAME
 
 HERE = "/v1/jobs/folder"
 

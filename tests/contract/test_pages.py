@@ -2,7 +2,7 @@
 
 import pytest
 
-from service import pages
+from service.viewer import static_files
 
 
 @pytest.fixture
@@ -11,7 +11,7 @@ def built(tmp_path, monkeypatch):
     (tmp_path / "assets").mkdir()
     (tmp_path / "index.html").write_text("<!doctype html><title>built</title>")
     (tmp_path / "assets" / "index-abc123.js").write_text("void 0;\n" * 200)
-    for function in (pages.page, pages.asset):
+    for function in (static_files.page, static_files.asset):
         monkeypatch.setattr(function, "__defaults__", (tmp_path,))
     return tmp_path
 
@@ -50,7 +50,7 @@ def test_no_name_leads_out_of_the_folder(client, built, name):
 
 
 def test_where_it_was_not_built_the_remedy_stands_there(client, tmp_path, monkeypatch):
-    monkeypatch.setattr(pages.page, "__defaults__", (tmp_path,))
+    monkeypatch.setattr(static_files.page, "__defaults__", (tmp_path,))
     answer = client.get("/")
     assert answer.status_code == 503 and "make web" in answer.text and "not built" in answer.text
     assert answer.headers["content-type"].startswith("text/html")

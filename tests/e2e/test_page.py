@@ -19,7 +19,7 @@ import uvicorn
 
 from service.api.server import background, settings_with
 from service.commands.view_command import folder_app
-from service.pages import FOLDER
+from service.viewer.static_files import FOLDER
 from tests.e2e.test_withheld import FAKES, SETUP, call, part  # noqa: F401
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from service.viewfile import read_view
+from service.viewer.view_file import read_view
 from tests.e2e.test_withheld import FAKES, PROGRAMS, call, part  # noqa: F401
 
 pytestmark = pytest.mark.timeout(900)

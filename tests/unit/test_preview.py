@@ -8,14 +8,14 @@ import pytest
 from PIL import Image
 
 from geometry.part import EdgeInfo, EdgeKind
-from service import preview
 from service.pictures import deviation_map
 from service.pictures.annotation import scale_length
 from service.pictures.camera import Camera
 from service.pictures.rasterizer import Canvas
-from service.preview import REMAINDER, SIZE, TOOLS, draw_preview, zone_colour
-from service.viewfile import Chunk, Column, write_view
-from service.viewmesh import GRID, LEFT_UNIT, Facets, edge_chunk, mesh_chunks
+from service.viewer import preview_picture
+from service.viewer.preview_picture import REMAINDER, SIZE, TOOLS, draw_preview, zone_colour
+from service.viewer.view_file import Chunk, Column, write_view
+from service.viewer.view_mesh import GRID, LEFT_UNIT, Facets, edge_chunk, mesh_chunks
 from tests.hand_parts import as_part, box_mesh, joined
 
 LOW = np.array([-5.0, -5.0, -5.0])
@@ -88,8 +88,8 @@ def test_zones_have_their_colours_and_what_stays_is_hatched(tmp_path, bridge):
         assert hues(left, zone_colour(index)) > 2000 > 4 * hues(right, zone_colour(index))
     # stripes: both of the two colours, next to each other
     red = near(left, REMAINDER, 40)
-    assert red > 150 and near(left, preview.HATCHED, 40) > 150
-    assert near(left, preview.OTHER, 60) > 2000
+    assert red > 150 and near(left, preview_picture.HATCHED, 40) > 150
+    assert near(left, preview_picture.OTHER, 60) > 2000
 
 
 def test_ways_have_the_colour_of_their_tool_and_those_up_and_down_are_faint(tmp_path, bridge):
@@ -114,9 +114,9 @@ def test_same_bytes_twice(tmp_path, bridge):
 def test_the_view_with_most_of_what_stays_is_chosen(bridge, tmp_path):
     """The bar stands between the walls: from along them it is seen, from the side it is not."""
     left, _ = draw(tmp_path, view(bridge))
-    from service.viewfile import read_view
+    from service.viewer.view_file import read_view
 
-    camera = preview._camera(preview.Drawn.of(*read_view(view(bridge)), 0), (400, 400))
+    camera = preview_picture._camera(preview_picture.Drawn.of(*read_view(view(bridge)), 0), (400, 400))
     across = abs(camera.basis[2] @ [0.0, 1.0, 0.0])
     assert across < 0.6 and near(left, REMAINDER, 40) > 150
 
@@ -124,10 +124,10 @@ def test_the_view_with_most_of_what_stays_is_chosen(bridge, tmp_path):
 def test_reasons_are_told_once_with_their_area():
     rows = [{"reason": "corner", "area_mm2": 2.0}, {"reason": "undercut", "area_mm2": 30.0},
             {"reason": "corner", "area_mm2": 3.5}]
-    assert preview._reasons(rows) == ["30 mm2 stay: undercut", "5.5 mm2 stay: corner (2 places)"]
+    assert preview_picture._reasons(rows) == ["30 mm2 stay: undercut", "5.5 mm2 stay: corner (2 places)"]
     many = [{"reason": f"r{k}", "area_mm2": 10.0 - k} for k in range(8)]
-    assert len(preview._reasons(many)) == preview.MOST_REASONS
-    assert preview._reasons(many)[-1] == "18.0 mm2 for 4 more reasons"
+    assert len(preview_picture._reasons(many)) == preview_picture.MOST_REASONS
+    assert preview_picture._reasons(many)[-1] == "18.0 mm2 for 4 more reasons"
 
 
 def test_colours_and_classes_are_those_of_the_page():
@@ -138,8 +138,8 @@ def test_colours_and_classes_are_those_of_the_page():
         numbers = [float(v) for v in re.findall(r"\d+(?:\.\d+)?", body)]
         return np.array(numbers).reshape(-1, 3)
 
-    assert np.allclose(rows("TOOLS"), preview.TOOLS) and np.allclose(rows("REMAINDER"), [preview.REMAINDER])
-    assert np.allclose(rows("OTHER"), [preview.OTHER]) and np.allclose(rows("CONNECTION"), [preview.CONNECTION])
+    assert np.allclose(rows("TOOLS"), preview_picture.TOOLS) and np.allclose(rows("REMAINDER"), [preview_picture.REMAINDER])
+    assert np.allclose(rows("OTHER"), [preview_picture.OTHER]) and np.allclose(rows("CONNECTION"), [preview_picture.CONNECTION])
     assert np.allclose(rows("CLASSES"), deviation_map.COLOURS[:deviation_map.UNCUT])
     assert np.allclose(rows("UNCUT"), [deviation_map.COLOURS[deviation_map.UNCUT]])
     assert f"STEPS = [{deviation_map.STEPS[0]:g}, {deviation_map.STEPS[1]:g}]" in source

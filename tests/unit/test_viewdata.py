@@ -1,6 +1,6 @@
 """What the file of a page says beside the picture."""
 
-from service.viewdata import _minded
+from service.viewer.view_data import _minded
 
 
 def test_what_is_to_be_minded_is_told_once():

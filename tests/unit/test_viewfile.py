@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from geometry.errors import InternalError
-from service.viewfile import MAGIC, Chunk, Column, read_view, write_view
+from service.viewer.view_file import MAGIC, Chunk, Column, read_view, write_view
 
 WHOLE = arrays(np.int64, st.tuples(st.integers(0, 40), st.integers(1, 3)), elements=st.integers(-2**29, 2**29))
 

@@ -7,9 +7,9 @@ import pytest
 
 from geometry.sampling import sample_surface
 from geometry.step_import.reader import read_part
-from service.viewdata import tool_shape
-from service.viewfile import read_view, write_view
-from service.viewmesh import (
+from service.viewer.view_data import tool_shape
+from service.viewer.view_file import read_view, write_view
+from service.viewer.view_mesh import (
     JUDGED,
     LEFT_UNIT,
     NOBODY,

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.tool_body import ToolBody
-from service.viewpaths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
+from service.viewer.view_paths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
 from tests.hand_parts import as_part, box_mesh
 from verify.checks.program_sequence import read_all
 from verify.model import NcProgram, ProofSetup

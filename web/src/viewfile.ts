@@ -1,4 +1,4 @@
-// Reads view.bin as it arrives; the form is told in service/viewfile.py.
+// Reads view.bin as it arrives; the form is told in service/viewer/view_file.py.
 
 export interface ColumnEntry extends Array<string | number> {
   0: string;

@@ -9,7 +9,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from service.pages import asset, page
+from service.viewer.static_files import asset, page
 
 router = APIRouter(tags=["page"], include_in_schema=False)
 

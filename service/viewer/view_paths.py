@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from service.viewfile import Chunk, Column
+from service.viewer.view_file import Chunk, Column
 from verify.checks.program_sequence import Reading
 from verify.gcode.reader import FEED
 from verify.model import NcProgram

@@ -35,8 +35,8 @@ from service.pictures.annotation import (
 from service.pictures.camera import Camera
 from service.pictures.rasterizer import F32, Canvas
 from service.pictures.scene import lit, segments
-from service.viewfile import read_view
-from service.viewpaths import CUT, RAPID
+from service.viewer.view_file import read_view
+from service.viewer.view_paths import CUT, RAPID
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
@@ -66,7 +66,7 @@ class Drawn:
     mesh  : facets; their face ids are labels, from ``FIRST``
     face  : (t,) int64, number of the face each is of
     edges : polylines (k, 3)
-    ways  : of each step (n, 3) places, (n,) kinds as ``service.viewpaths`` has them, and (n, 3) or (3,) tool axes
+    ways  : of each step (n, 3) places, (n,) kinds as ``service.viewer.view_paths`` has them, and (n, 3) or (3,) tool axes
     """
 
     head: Mapping[str, Any]
@@ -112,7 +112,7 @@ class Drawn:
 def draw_preview(view: bytes, out_path: str | Path, title: str, facts: Mapping[str, str] | None = None) -> None:
     """Draw a view file into a PNG of 1760 x 960 pixels.
 
-    view     : bytes of ``view.bin`` (``service.viewfile``)
+    view     : bytes of ``view.bin`` (``service.viewer.view_file``)
     out_path : file to write
     title    : one line of text
     facts    : pairs for the legend, for example {'coverage': '97.2 %'}

@@ -13,7 +13,7 @@ import numpy as np
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from service.stages.access_plan import Look
-from service.viewfile import Chunk, Column
+from service.viewer.view_file import Chunk, Column
 from verify.checks.program_sequence import Reading
 from verify.material.machined_part import LEVELS, stock_in_time
 from verify.model import ProofSetup

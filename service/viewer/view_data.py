@@ -19,12 +19,12 @@ from service.stages.preparation import Prepared
 from service.stages.proof_samples import Score
 from service.stages.result_files import Files
 from service.version import VERSION
-from service.viewfile import Chunk, write_view
-from service.viewmesh import GRID as MESH_GRID
-from service.viewmesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
-from service.viewpaths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
-from service.viewpaths import GRID as PATH_GRID
-from service.viewstock import stock_chunk
+from service.viewer.view_file import Chunk, write_view
+from service.viewer.view_mesh import GRID as MESH_GRID
+from service.viewer.view_mesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
+from service.viewer.view_paths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
+from service.viewer.view_paths import GRID as PATH_GRID
+from service.viewer.view_stock import stock_chunk
 from verify.checks.program_sequence import Reading, read_all
 from verify.model import NcProgram, Proof, ProofSetup
 from zones.reach.access_view import turned_samples

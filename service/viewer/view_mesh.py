@@ -19,7 +19,7 @@ from geometry.part import EdgeKind, Part
 from geometry.sampling import SurfaceSamples
 from geometry.trimming.facet_sheet import Sheet, refined, sheet_of, sides_of
 from geometry.trimming.label_query import Asker, bisect
-from service.viewfile import Chunk, Column
+from service.viewer.view_file import Chunk, Column
 
 PITCH, MOST = 0.8, 120_000  # mm between nodes, wider where that would be more facets
 NEAR = 0.1  # mm, how near a border is to the change of label
