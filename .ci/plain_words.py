@@ -35,7 +35,7 @@ IMAGE = re.compile(r"!\[((?:[^\[\]]|\[[^\]]*\])*)\](?:\([^()]*(?:\([^()]*\)[^()]
 LINK = re.compile(r"\[((?:[^\[\]]|\[[^\]]*\])*)\](?:\([^()]*(?:\([^()]*\)[^()]*)*\)|\[[^\]]*\])")
 TAG = re.compile(r"<(?:(?P<url>https?://[^>\s]+)|/?[A-Za-z][^<>]*)>")
 STOP = re.compile(r"(?<=[.!?])[\"'”’)\]]*\s+")
-NO_END = re.compile(r"(?:^|[\s(\"'“])(?:e\.g|i\.e|cf|vs|approx|resp|incl|[Ff]igs?|[Ee]qs?|[Ss]ec|ch|pp?|Dr|Mr|Ms|St)\.$")
+NO_END = re.compile(r"(?:^|[\s(\"'“])(?:e\.g|i\.e|cf|vs|approx|resp|incl|[Ff]igs?|[Ee]qs?|[Ss]ec|ch|pp?|Dr|Mr|Ms)\.$")
 MAYBE_END = re.compile(r"(?:\.\.\.|…|\betc\.|\bal\.)[\"'”’)\]]*$")
 SPAN = "\N{OBJECT REPLACEMENT CHARACTER}"
 
