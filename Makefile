@@ -64,8 +64,8 @@ check: $(STAMP)
 test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
 
-# The everyday tests with the share of Python lines they run. Kernels are left out: they run as machine code, and without
-# compiling (NUMBA_DISABLE_JIT=1) the tests would take days.
+# The everyday tests with the share of Python lines they run. Kernels are left out: they run as machine code, whose lines
+# Python cannot count, and uncompiled (NUMBA_DISABLE_JIT=1) they are too slow for these tests.
 test-cov: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal --cov --cov-report=term $(if $(K),-k "$(K)")
 
