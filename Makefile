@@ -112,4 +112,4 @@ third-party: $(STAMP)
 	$(BIN)/python .ci/third_party.py requirements.lock web/package-lock.json
 
 clean:
-	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .coverage
