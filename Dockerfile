@@ -21,7 +21,7 @@ WORKDIR /app
 COPY requirements.lock ./
 RUN pip install --requirement requirements.lock "psycopg[binary]>=3.2"
 
-COPY pyproject.toml README.md ./
+COPY pyproject.toml README.md LICENSE ./
 COPY geometry geometry
 COPY zones zones
 COPY toolpath toolpath

@@ -11,7 +11,7 @@ PORT ?= 8000
 # uv installs into a given interpreter; plain pip is called by the interpreter itself.
 INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 
-.PHONY: setup peers check types test test-slow soak clients audit golden bench docs demo serve lock clean
+.PHONY: setup hooks peers check types test test-cov test-slow soak clients audit golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -20,7 +20,7 @@ NPM = $(if $(NODE),npm,PATH="$(CURDIR)/$(BIN):$$PATH" npm)
 
 .PHONY: web page
 
-setup: $(STAMP) page
+setup: $(STAMP) hooks page
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; try make PYTHON=python3.12 setup"; exit 1; }
@@ -35,6 +35,10 @@ $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
 	$(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
+
+# The check of commit messages, where this is a git clone that has no hooks of its own.
+hooks:
+	@.ci/install-hooks
 
 # Programs by others that judge ours; tests that want them skip without, with the reason.
 peers: $(BENCH_STAMP)
@@ -59,6 +63,11 @@ check: $(STAMP)
 
 test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
+
+# The everyday tests with the share of Python lines they run. Kernels are left out: they run as machine code, whose lines
+# Python cannot count, and uncompiled (NUMBA_DISABLE_JIT=1) they are too slow for these tests.
+test-cov: $(STAMP) page
+	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal --cov --cov-report=term $(if $(K),-k "$(K)")
 
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
@@ -99,5 +108,8 @@ lock:
 	uv pip compile pyproject.toml --extra dev $(LOCK_FLAGS) -o requirements.lock
 	uv pip compile pyproject.toml --extra dev --extra bench $(LOCK_FLAGS) -c requirements.lock -o requirements-bench.lock
 
+third-party: $(STAMP)
+	$(BIN)/python .ci/third_party.py requirements.lock web/package-lock.json
+
 clean:
-	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .coverage

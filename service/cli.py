@@ -16,6 +16,7 @@ import typer
 
 from service.commands import key_commands
 from service.commands.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
+from service.version import VERSION
 
 if TYPE_CHECKING:
     from schemas.setup import Setup
@@ -30,6 +31,19 @@ SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="
 MeshBox = Annotated[str | None, typer.Option(metavar="x0,y0,z0,x1,y1,z1", help="Mesh this window only, mm in the "
                                              "coordinates of the program; small ones take steps down to 0.002.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
+
+
+def show_version(wanted: bool) -> None:
+    """Print the version and leave, where ``--version`` stands on the command line."""
+    if wanted:
+        typer.echo(f"zonemill {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(version: Annotated[bool, typer.Option("--version", callback=show_version, is_eager=True,
+                                               help="Print the version and exit.")] = False) -> None:
+    """Options that stand before a command."""
 
 
 @app.command()

@@ -6,7 +6,7 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service")
 
 

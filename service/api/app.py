@@ -22,8 +22,8 @@ from service.api.principals import PostRate
 from service.api.routes import capabilities, events, health, jobs, keys, library, submissions, view
 from service.jobs.engine import Engine
 from service.settings import Settings
+from service.version import VERSION
 
-VERSION = "0.1.0"
 DESCRIPTION = """From a STEP part of walls and internal connections to a milling job that a simulator has proved.
 
 POST a part with its setup, follow the events, fetch report and files. Lengths are mm; every number carries its unit

@@ -68,7 +68,7 @@ ANSWERS: dict[str, Any] = {
                   "inputs": {"part_sha256": SHA, "setup_sha256": SHA}, "steps": [], "findings": [],
                   "coverage": 0.9991, "reach_coverage": 1.0, "machining_time_s": 4740.0, "tools": [],
                   "files": [{"name": "program.linuxcnc.ngc", "kind": "nc", "access": "A1", "dialect": "linuxcnc",
-                             "sha256": SHA}], "version": "0.1.0"},
+                             "sha256": SHA}], "version": "0.2.0"},
     "listFiles": JobFiles(items=[JobFile(name="program.linuxcnc.ngc", size_bytes=1793307, sha256=SHA,
                                          media_type="text/plain; charset=utf-8",
                                          href=f"{PATH}/files/program.linuxcnc.ngc")]),
@@ -82,7 +82,7 @@ ANSWERS: dict[str, Any] = {
     "putMaterial": MaterialEntry(**ABOUT, entry=MATERIAL),
     "listKeys": KeyList(items=[KEY]), "createKey": MadeKey(key=NO_KEY, about=KEY),
     "capabilities": {
-        "version": "0.1.0", "code": SHA, "kinds": ["plan", "zones", "verify"], "stepnc": ["AP238", "ISO 14649"],
+        "version": "0.2.0", "code": SHA, "kinds": ["plan", "zones", "verify"], "stepnc": ["AP238", "ISO 14649"],
         "dialects": [{"name": "linuxcnc", "extension": "ngc"}], "tools": ["ball", "flat", "bull"],
         "machines": ["3-axis", "5-axis"], "kinematics": ["table-table-AC"], "stock": ["part_offset", "box"],
         "materials": ["Ti-6Al-4V"], "webhooks": True, "slots": 4, "principal": "mes", "scopes": ["submit", "read"],

@@ -19,10 +19,19 @@ def test_relative_links_exist(page):
     assert not dead, f"{page.name} links to {dead}"
 
 
-def test_the_readme_names_only_verbs_the_makefile_has():
+@pytest.mark.parametrize(("page", "some"), [("README.md", {"demo", "test"}), ("CONTRIBUTING.md", {"setup", "check"})])
+def test_the_first_pages_name_only_verbs_the_makefile_has(page, some):
     verbs = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    named = set(re.findall(r"(?:^|`)make ([a-z-]+)", (ROOT / "README.md").read_text(), flags=re.MULTILINE))
-    assert {"demo", "test"} <= named <= verbs
+    named = set(re.findall(r"(?:^|`)make ([a-z-]+)", (ROOT / page).read_text(), flags=re.MULTILINE))
+    assert some <= named <= verbs
+
+
+def test_the_index_has_one_line_for_each_page():
+    docs = ROOT / "docs"
+    rows = [line for line in (docs / "README.md").read_text().splitlines() if line.startswith("| [")]
+    linked = [target for line in rows for target in LINK.findall(line)]
+    pages = {p.relative_to(docs).as_posix() for p in docs.rglob("*.md")} - {"README.md"} | {"bibliography.bib"}
+    assert sorted(linked) == sorted(pages), "docs/README.md and the pages under docs/ differ"
 
 
 def test_adrs_have_their_four_parts():
