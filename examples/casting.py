@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-import geometry.kernels.cache  # noqa: F401  keys numba's cache before the first kernel is met
+import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
 from examples.splines import F64
 from examples.walls import LEFT, RIGHT, WallSpec
 

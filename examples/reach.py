@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-import geometry.kernels.cache  # noqa: F401  keys numba's cache before the first kernel is met
+import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
 from examples.splines import F64
 
 STEP, CHORD = 0.12, 0.01

@@ -1,102 +1,178 @@
-"""Where compiled kernels are kept: a folder of its own for every state of the kernel sources.
+"""Where compiled kernels are kept: one folder for every state of a module and of all it depends on.
 
 Numba asks of a compiled function only whether the file it stands in has changed, not the files it takes other kernels
-from. Left at that, an update can leave old machine code inlined in a new kernel. So numba's folder is named here by a
-digest of all kernel sources together, and a change to any of them compiles all of them anew.
+from. Left at that, an update can leave old machine code inlined in a new kernel. Here the folder of a module bears the
+digest of ``geometry.kernels.sources``: an edit compiles again what depends on it, and nothing else. No path and no time
+goes into it, so that every checkout with the same sources takes the same machine code.
 
-Every ``kernels`` package imports this before its first kernel, for numba reads the folder when a function is decorated.
+Every ``kernels`` package imports this before its first kernel, for numba finds the folder when a function is decorated.
+The processor and its features are part of numba's own key: several machines may share a folder.
 """
 
 from __future__ import annotations
 
-import hashlib
+import contextlib
 import os
 import re
 import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from numba import config
+from numba.core import caching
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("geometry", "zones", "toolpath", "verify")
-# compiled functions that stand outside the packages of kernels
-BESIDE = ("service/pictures/rasterizer.py", "examples/casting.py", "examples/reach.py")
-DAY_S = 86400.0
+from geometry.kernels.sources import ROOT, Sources
 
-_DIGEST = re.compile(r"[0-9a-f]{16}")
+WEEK_S = 7 * 86400.0
 
-
-def kernel_sources(root: Path = ROOT) -> list[Path]:
-    """Every source file whose functions numba compiles, by name; ``root`` is the folder that holds the packages."""
-    files = [p for name in PACKAGES for p in (root / name / "kernels").glob("*.py")]
-    return sorted(files + [p for p in (root / name for name in BESIDE) if p.is_file()])
-
-
-def sources_digest(root: Path = ROOT) -> str:
-    """First 16 hex digits of a SHA-256 over names and contents of the kernel sources."""
-    digest = hashlib.sha256()
-    for path in kernel_sources(root):
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())
-        digest.update(content)
-    return digest.hexdigest()[:16]
+_FOLDER = re.compile(r"(?:[\w.]+-)?[0-9a-f]{16}")  # one digest of all kernels names the folders of earlier releases
 
 
 def bases(given: str, root: Path = ROOT) -> list[Path]:
-    """Folders the one of this state may be made in, best first: numba's own order of places.
+    """Folders that the folders of modules may be made in, best first.
 
     given : NUMBA_CACHE_DIR as numba read it, "" where it is not set
+
+    The second is shared by all checkouts of a user. The last is in the tree, for users without a home.
     """
     found = [Path(given)] if given else []
-    found.append(root / "geometry" / "kernels" / "__pycache__" / "numba")
-    return [*found, Path(os.path.expanduser("~"), ".cache", "zonemill", "numba")]
+    found.append(Path(os.path.expanduser("~"), ".cache", "zonemill", "numba"))
+    return [*found, root / "geometry" / "kernels" / "__pycache__" / "numba"]
 
 
-def _usable(folder: Path) -> bool:
-    """Whether files can be written there, by numba's own test; a folder that can is marked as used now."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-        os.utime(folder)
-    except OSError:
-        return False
-    return True
+@cache
+def writable_base(given: str) -> Path | None:
+    """The first of ``bases`` that files can be written in, by numba's own test; None where there is none."""
+    for base in bases(given):
+        with contextlib.suppress(OSError):
+            base.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=base).close()
+            return base
+    return None
 
 
-def key_cache(root: Path = ROOT) -> Path | None:
-    """Point numba at the folder of this state of the sources; None, and numba left alone, where none can be written.
+@cache
+def sources() -> Sources:
+    """The sources of this checkout as this process found them."""
+    return Sources()
 
-    Processes may do so at the same time. What keyed numba already for this state is found in place.
+
+@cache
+def module_folder(name: str, running_as: str, given: str) -> Path | None:
+    """Folder of a module's compiled functions, made and marked as used now; None where none can be written.
+
+    running_as : ``__main__`` or the module's name; machine code finds its module by it, so the folders differ
     """
-    digest, given = sources_digest(root), str(config.CACHE_DIR)
-    if Path(given).name == digest:
-        return Path(given)
-    folder = next((base / digest for base in bases(given, root) if _usable(base / digest)), None)
-    if folder is not None:
-        config.CACHE_DIR = str(folder)
+    base = writable_base(given)
+    if base is None:
+        return None
+    label = name if running_as == name else f"{name}.{running_as}"
+    folder = base / f"{label}-{sources().digest(name)}"
+    folder.mkdir(exist_ok=True)
+    os.utime(folder)
     return folder
 
 
-def remove_stale(folder: Path, age_s: float = DAY_S) -> list[Path]:
-    """Remove the folders of other states beside ``folder`` that nobody has begun to use for ``age_s`` seconds.
+class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
+    """Tells numba where the machine code of a function of the project is kept, and when it is out of date."""
 
-    Returns those removed. Whatever is not named like a digest stays; a process that still runs on a removed folder
-    compiles again and is not wrong.
+    def __init__(self, py_func: Any, py_file: str, folder: Path) -> None:
+        self._py_file = py_file
+        self._folder = folder
+        self._line = py_func.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> KernelLocator | None:
+        """Locator of a function; None for one that is not the project's, which numba then keeps its own way.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            The function's module depends on a module of the project that has no file.
+        """
+        name = sources().name_of(Path(py_file))
+        if name is None:
+            return None
+        folder = module_folder(name, py_func.__module__, str(config.CACHE_DIR))
+        return cls(py_func, py_file, folder) if folder is not None else None
+
+    def get_cache_path(self) -> str:
+        """The module's folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """The digest in the folder's name."""
+        return self._folder.name
+
+    def get_disambiguator(self) -> str:
+        """Line of the function: two of one name may stand in one module."""
+        return str(self._line)
+
+
+class LockedIndex(caching.IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's index of the machine code of one function, written by one process at a time.
+
+    Two processes that compile a function for different arguments would otherwise give both files the same number, and
+    the index of one could lead to the machine code of the other.
     """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Add an entry."""
+        with locked(Path(self._cache_path, "lock")):
+            super().save(key, data)
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold a lock file, where the system has such locks."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with open(path, "ab") as file:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def remove_stale(given: str | None = None, age_s: float = WEEK_S) -> list[Path]:
+    """Remove the folders of other states of the modules that no process has begun to use for ``age_s`` seconds.
+
+    given : NUMBA_CACHE_DIR; None takes numba's
+
+    Returns those removed. Whatever is not named like a folder of a module stays; a process that still runs on a removed
+    folder compiles again and is not wrong.
+    """
+    ours = {sources().digest(name) for name in sources().compiled()}
     removed = []
-    for other in sorted(folder.parent.iterdir()):
-        if other == folder or not _DIGEST.fullmatch(other.name) or other.is_symlink() or not other.is_dir():
-            continue
-        try:
-            idle_s = time.time() - other.stat().st_mtime
-        except FileNotFoundError:  # somebody else removes at the same time
-            continue
-        if idle_s > age_s:
-            shutil.rmtree(other, ignore_errors=True)
-            removed.append(other)
+    for base in bases(str(config.CACHE_DIR) if given is None else given):
+        for other in sorted(base.iterdir()) if base.is_dir() else []:
+            if other.name[-16:] in ours or not _FOLDER.fullmatch(other.name):
+                continue
+            if other.is_symlink() or not other.is_dir():
+                continue
+            try:
+                idle_s = time.time() - other.stat().st_mtime
+            except FileNotFoundError:  # another process removes at the same time
+                continue
+            if idle_s > age_s:
+                shutil.rmtree(other, ignore_errors=True)
+                removed.append(other)
     return removed
 
 
-FOLDER = key_cache()
+def install() -> None:
+    """Put our locator before numba's, and our index in place of numba's."""
+    caching.CacheImpl._locator_classes.insert(0, KernelLocator)
+    chosen = str(getattr(config, "CACHE_LOCATOR_CLASSES", ""))  # a list of the user's own would go before it
+    if chosen:
+        config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__},{chosen}"
+    caching.IndexDataCacheFile = LockedIndex
+
+
+install()

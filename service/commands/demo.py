@@ -53,7 +53,7 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
 def run_warm() -> None:
     """Compile every kernel by planning and proving a small part, so that no job waits for it.
 
-    What earlier versions of the kernels left compiled is removed once a day has passed since its last use.
+    What other versions of the kernels left compiled is removed a week after its last use.
 
     Raises
     ------
@@ -61,12 +61,11 @@ def run_warm() -> None:
         The small part was not proved: this machine must not plan others.
     """
     from examples.demo import write_small
-    from geometry.kernels.cache import FOLDER, remove_stale
+    from geometry.kernels.cache import remove_stale
     from service.from_wire import read_setup
     from service.pipeline import plan
 
-    if FOLDER is not None:
-        remove_stale(FOLDER)
+    remove_stale()
     with tempfile.TemporaryDirectory(prefix="zonemill-warm-") as folder:
         step, setup = write_small(folder)
         report = plan(step, read_setup(setup), Path(folder, "out"), lambda _stage, _share: None)
