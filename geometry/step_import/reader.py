@@ -18,6 +18,8 @@ from geometry.errors import PartError, ResourceError, SetupError
 from geometry.part import Part
 from geometry.setup_frame import Placement
 
+READER_MODULE = "geometry.step_import.reader_process"
+
 
 def read_part(path: str | os.PathLike[str], *, placement: Placement | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
@@ -48,7 +50,7 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
 
 def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
     """What the child of ``geometry.step_import.reader_process`` answers; limits in s and bytes, errors as ``read_part`` has them."""
-    command = [sys.executable, "-m", "geometry.step_import.reader_process"]
+    command = [sys.executable, "-m", READER_MODULE]
     try:
         return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
     except ResourceError as error:

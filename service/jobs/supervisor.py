@@ -26,6 +26,7 @@ import psutil  # type: ignore[import-untyped]
 from geometry.errors import CancelledError, ResourceError, error_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
+JOB_MODULE = "service.jobs.job_process"
 # Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
 ADDRESS_ROOM = 8_000_000_000
 _SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
@@ -77,7 +78,7 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
         reading, writing = os.pipe()
         try:
             with log.open("wb") as out, closing_fd(writing):
-                child = subprocess.Popen([sys.executable, "-m", "service.jobs.job_process", str(path), str(writing)],
+                child = subprocess.Popen([sys.executable, "-m", JOB_MODULE, str(path), str(writing)],
                                          pass_fds=(writing,), stdin=subprocess.DEVNULL, stdout=out, stderr=out,
                                          start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
             try:

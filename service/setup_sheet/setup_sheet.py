@@ -52,7 +52,7 @@ ZONE_WORDS = (
     "Scallop: what stands over the surface between two passes, mm; as asked for, what 99 % of the samples keep, and "
     "the most.",
     "Covered: share of the zone that the proof found within the budget.")
-HTML_NAME, PDF_NAME = "template.html", "sheet.pdf"
+HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
 
 
 def sheet_files(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any], files: Files) -> Files:

@@ -26,12 +26,14 @@ from typing import Any
 import httpx
 import psutil
 
+from service.jobs.supervisor import JOB_MODULE
 from tests.contract.servers import Postgres, free_port, until_open
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
 LEASE_S = 5.0
 FINAL = ("proved", "unproved", "done", "failed", "cancelled")
+
 
 
 class Kept:
@@ -220,7 +222,7 @@ class Service:
         for kept in self.kept:
             try:
                 found += [p for p in psutil.Process(kept.process.pid).children(recursive=True)
-                          if "service.jobs.job_process" in p.cmdline()]
+                          if JOB_MODULE in p.cmdline()]
             except psutil.Error:
                 pass
         return found

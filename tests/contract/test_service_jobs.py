@@ -12,6 +12,7 @@ import pytest
 
 from schemas.setup import content_hash
 from service.from_wire import parse_setup
+from service.jobs.supervisor import JOB_MODULE
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 
@@ -167,7 +168,7 @@ def test_cancel_frees_the_worker_in_under_a_second(client, post, finish, setup_j
     assert time.monotonic() - started < 1.0
     assert finish(client, waiting)["state"] == "proved"
     assert client.get(job["links"]["report"]).json()["code"] == "no_result"
-    assert not [p for p in psutil.Process().children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
+    assert not [p for p in psutil.Process().children(recursive=True) if JOB_MODULE in " ".join(p.cmdline())]
     assert client.delete(waiting["links"]["self"]).json()["state"] == "proved"  # an end stays
 
 
@@ -241,7 +242,7 @@ def test_a_child_that_cannot_be_started_for_want_of_handles_is_waited_for(client
     popen, left = subprocess.Popen, [errno.EMFILE, errno.EAGAIN]
 
     def starts(*args, **kwargs):
-        if "service.jobs.job_process" in args[0] and left:
+        if JOB_MODULE in args[0] and left:
             raise OSError(left.pop(), "none left")
         return popen(*args, **kwargs)
 

@@ -13,10 +13,12 @@ import httpx
 import psutil
 import pytest
 
+from service.jobs.supervisor import JOB_MODULE
 from tests.contract.servers import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
+
 
 
 @pytest.fixture
@@ -46,7 +48,7 @@ def _asleep(client, job):
 
 
 def _job_children(process):
-    return [p for p in psutil.Process(process.pid).children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
+    return [p for p in psutil.Process(process.pid).children(recursive=True) if JOB_MODULE in " ".join(p.cmdline())]
 
 
 def test_a_killed_service_leaves_no_child_and_resumes_its_job(serve, post, finish):

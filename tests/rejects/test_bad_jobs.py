@@ -19,7 +19,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from geometry.step_import.occ.loading import load_part
+from geometry.step_import.reader import READER_MODULE
 from service.api.app import create_app
+from service.jobs.supervisor import JOB_MODULE
 from service.logs import configure
 from service.settings import Settings
 from tests.step_files import write_step
@@ -199,7 +201,7 @@ def submit(client, parts):
         while job["state"] in ("queued", "running") and time.monotonic() < deadline:
             time.sleep(0.05)
             job = client.get(job["links"]["self"]).json()
-        assert not [p for p in psutil.Process().children(recursive=True) if "service.jobs.job_process" in " ".join(p.cmdline())]
+        assert not [p for p in psutil.Process().children(recursive=True) if JOB_MODULE in " ".join(p.cmdline())]
         return answer, job
 
     return send
@@ -271,5 +273,5 @@ def test_the_command_ends_with_3_where_no_tool_fits(command, parts):
 def test_no_process_outlives_the_jobs():
     """The reader runs in a child of a child; after all of the above none of them is left."""
     left = [p for p in psutil.Process().children(recursive=True)
-            if any(word in " ".join(p.cmdline()) for word in ("service.jobs.job_process", "step_child"))]
+            if any(word in " ".join(p.cmdline()) for word in (JOB_MODULE, READER_MODULE))]
     assert left == []
