@@ -35,7 +35,6 @@ LEASE_S = 5.0
 FINAL = ("proved", "unproved", "done", "failed", "cancelled")
 
 
-
 class Kept:
     """A process that is started again a moment after it ended, until ``close``."""
 
