@@ -23,7 +23,7 @@ import shapely  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
 from benchmarks.bench_scallop import ball, random_surface  # noqa: E402
-from examples.family import make_part  # noqa: E402
+from examples.family.recipes import make_part  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402

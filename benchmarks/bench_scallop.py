@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 
-from examples.thesis import surface as thesis_surface  # noqa: E402
+from examples.family.thesis import surface as thesis_surface  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402

@@ -27,7 +27,7 @@ from numpy.typing import NDArray  # noqa: E402
 import service.pipeline as chain  # noqa: E402
 import toolpath.planning.job_plan as planner  # noqa: E402
 import toolpath.planning.zone_finishing as finish  # noqa: E402
-from examples.family import make_part  # noqa: E402
+from examples.family.recipes import make_part  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402

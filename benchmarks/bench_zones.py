@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 
-from examples.family import FamilyPart, make_part  # noqa: E402
+from examples.family.recipes import FamilyPart, make_part  # noqa: E402
 
 SIZES = ((2, 1), (3, 3), (4, 5), (6, 9), (8, 12), (10, 16))
 SEEDS = 60
@@ -30,7 +30,7 @@ SEEDS = 60
 
 def part_with(walls: int, connections: int) -> FamilyPart:
     """The first part of the recipe with exactly so many walls and connections."""
-    from examples.layout import LayoutError
+    from examples.family.layout import LayoutError
 
     for seed in range(SEEDS):
         try:

@@ -441,7 +441,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=SAMPLES)
     parser.add_argument("--json", type=Path, default=None, help="where to write all figures")
     args = parser.parse_args()
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     head = [f"{c} (worst tool)" for c in COLUMNS[1:]] + [f"union {c}" for c in ("reached", "differs", "wrong", "play")]
     print("| part | " + " | ".join(head) + " | s |\n|" + "---|" * (len(head) + 2), flush=True)

@@ -44,7 +44,7 @@ def digest_of(folders: list[str]) -> str:
 
 def made_part(recipe: str, seed: int, cache: Path) -> tuple[Path, dict[str, Any], float]:
     """STEP path, truth and seconds of a part, made once."""
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     folder = cache / f"parts-{digest_of(SOURCES['make'])}"
     name = f"{recipe}-{seed}"

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from examples.family import draw_layout, truth_of
+from examples.family.recipes import draw_layout, truth_of
 from examples.setups import suggest_setup
 from output.header_text import decimal
 from schemas.materials import MATERIALS

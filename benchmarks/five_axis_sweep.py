@@ -38,7 +38,7 @@ AIM, REACHED = 0.95, 0.98
 
 def planned(seed: int, folder: Path) -> dict[str, Any]:
     """Make, plan and prove one part: plain data."""
-    from examples.family import make_part
+    from examples.family.recipes import make_part
     from geometry.errors import CamError
     from schemas.setup import Setup
     from service import pipeline

@@ -179,7 +179,7 @@ def inch_file(step: Path) -> Path:
 
 def strips_file(seed: int, recipe: str, step: Path) -> Path | None:
     """The part with every side of its free walls cut into five faces; None where no wall can be."""
-    from examples.family import build_solid, make_part, step_bytes
+    from examples.family.recipes import build_solid, make_part, step_bytes
 
     path = step.with_suffix(".strips.step")
     if not path.exists():

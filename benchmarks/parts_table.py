@@ -72,7 +72,7 @@ def _processor_seconds() -> float:
 def family_job(name: str, folder: Path) -> Job:
     """Write a part of the family, 'recipe:seed', into a folder."""
     from examples.demo import demo_setup
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     recipe, seed = name.split(":")
     made = make_part(int(seed), recipe)

@@ -35,7 +35,7 @@ sys.path.insert(0, str(ROOT))
 import cadquery as cq  # noqa: E402
 import numpy as np  # noqa: E402
 
-from examples.family import RECIPES, make_part  # noqa: E402
+from examples.family.recipes import RECIPES, make_part  # noqa: E402
 from geometry.errors import CamError  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402

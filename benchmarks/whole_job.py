@@ -55,7 +55,7 @@ def planned(part: str, axes: str, plan: str, folder: Path, spacing: float | None
     """
     from benchmarks import baseline_plan
     from examples.demo import demo_setup
-    from examples.family import make_part
+    from examples.family.recipes import make_part
     from geometry.errors import CamError
     from schemas.setup import Setup
     from service import pipeline

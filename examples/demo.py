@@ -21,7 +21,7 @@ def write_demo(directory: str | Path) -> tuple[Path, Path]:
 
     Returns the two paths.
     """
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     return _write(directory, "demo", make_part(0, "demo").shape, demo_setup())
 
@@ -44,7 +44,7 @@ def write_small(directory: str | Path) -> tuple[Path, Path]:
 
 
 def _write(directory: str | Path, name: str, shape: Any, setup: dict[str, Any]) -> tuple[Path, Path]:
-    from examples.family import step_bytes
+    from examples.family.recipes import step_bytes
 
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from examples.layout import Layout
+from examples.family.layout import Layout
 
 HOLDER = [
     {"diameter_mm": 14.0, "diameter_top_mm": 20.0, "length_mm": 12.0},

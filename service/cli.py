@@ -211,8 +211,8 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
     """
     import inspect
 
-    from examples.family import RECIPES, make_part
-    from examples.layout import LayoutError
+    from examples.family.layout import LayoutError
+    from examples.family.recipes import RECIPES, make_part
     from geometry.errors import InputError
 
     if recipe not in RECIPES:

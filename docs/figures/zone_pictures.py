@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw
 
-from examples.family import make_part
+from examples.family.recipes import make_part
 from geometry.mesh import F64
 from geometry.trimming.facet_sheet import refined, sheet_of
 from service.from_wire import parse_setup

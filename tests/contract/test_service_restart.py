@@ -20,7 +20,6 @@ ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
 
 
-
 @pytest.fixture
 def serve(tmp_path):
     """Start the service in a process; returns the process and a client."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.thesis import Kind, surface
+from examples.family.thesis import Kind, surface
 from geometry.surfaces.faceting import facet_deviation
 
 

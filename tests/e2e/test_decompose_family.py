@@ -22,7 +22,7 @@ SWEEP += [("impeller", 0), ("wavy", 0), ("narrow", 0), ("leaning_pair", 0)] + [(
 
 def compare(recipe: str, seed: int, folder: Path, fillet: float = 0.0) -> None:
     """Counts exact, walls of every connection right, every primary channel found with its gap within 2 %."""
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     made = make_part(seed, recipe, fillet=fillet)
     part = read_part(made.write(folder)[0], chord=0.004)
@@ -43,7 +43,7 @@ def compare(recipe: str, seed: int, folder: Path, fillet: float = 0.0) -> None:
 def compare_mixed(seed: int, folder: Path, **overrides: object) -> None:
     """Walls, connections, primary gaps and, where there is a classifier, profile types of a mixed part all right."""
     from benchmarks.family_score import compare as hold_against
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     made = make_part(seed, "mixed", **overrides)
     part = read_part(made.write(folder)[0], chord=0.004)

@@ -44,7 +44,7 @@ def test_it_is_proved_without_a_finding(report):
 
 
 def test_its_walls_and_connections_are_the_generators(report):
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     truth = make_part(0, "demo").truth
     assert len(report["walls"]) == len(truth["walls"])

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from examples.thesis import Kind, surface
+from examples.family.thesis import Kind, surface
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.oracle.published_scallop import published_passes, published_scallop

@@ -22,7 +22,7 @@ SWEEP = [("demo", 1), ("impeller", 2), ("wavy", 3), ("leaning_pair", 4), ("three
 
 
 def prepared(recipe: str, seed: int, folder: Path) -> Prepared:
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     made = make_part(seed, recipe)
     return prepare(made.write(folder)[0], parse_setup(json.dumps(made.setup)), lambda _stage, _share: None)

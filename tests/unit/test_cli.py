@@ -173,8 +173,8 @@ def drawn(monkeypatch):
     """The family with a maker that builds nothing."""
     from pathlib import Path
 
-    from examples import family
-    from examples.layout import LayoutError
+    from examples.family import recipes
+    from examples.family.layout import LayoutError
 
     class Part:
         def __init__(self, name):
@@ -191,7 +191,7 @@ def drawn(monkeypatch):
             raise LayoutError("the family has 2 to 12 walls and 0 to 16 connections")
         return Part(f"{recipe}-{seed}")
 
-    monkeypatch.setattr(family, "make_part", make)
+    monkeypatch.setattr(recipes, "make_part", make)
 
 
 def test_family_writes_three_files_a_part_and_lists_them(drawn, tmp_path):

@@ -9,13 +9,13 @@ import pytest
 from shapely.geometry import Polygon, box
 
 from examples.demo import write_demo
-from examples.family import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
-from examples.freewall import FreeWall
-from examples.gaps import channels
-from examples.joins import fork, join, within_hub
-from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
-from examples.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
-from examples.walls import LEFT, RIGHT, WallSpec
+from examples.family.freewall import FreeWall
+from examples.family.gaps import channels
+from examples.family.joins import fork, join, within_hub
+from examples.family.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
+from examples.family.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
+from examples.family.recipes import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
+from examples.family.walls import LEFT, RIGHT, WallSpec
 
 cq = pytest.importorskip("cadquery")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from examples.thesis import Kind, control_points, surface
+from examples.family.thesis import Kind, control_points, surface
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.setup_frame import Placement

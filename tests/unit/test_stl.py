@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.thesis import Kind, surface
+from examples.family.thesis import Kind, surface
 from geometry.errors import GeometryError, InputError
 from geometry.mesh import TriangleMesh
 from geometry.stl import StlForm, read_stl, stl_bytes, write_stl

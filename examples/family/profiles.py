@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 from scipy.interpolate import BSpline
 
-from examples.splines import F64
+from examples.family.splines import F64
 
 ORDER, POINTS = 5, 10
 UP, DOWN = 1, -1

@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 
 import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
-from examples.splines import F64
-from examples.walls import LEFT, RIGHT, WallSpec
+from examples.family.splines import F64
+from examples.family.walls import LEFT, RIGHT, WallSpec
 
 Blocked = Callable[[F64, F64], np.ndarray]
 """(n, 3) start and (n, 3) end of rays, mm -> (n,) bool, whether something that is no wall stands between."""

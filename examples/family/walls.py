@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from shapely.geometry import Polygon
 
-from examples.splines import F64, interpolate, to_edge
+from examples.family.splines import F64, interpolate, to_edge
 
 BURIED = 0.5
 """Depth, mm, by which a wall reaches into the plate so that the union is clean."""

@@ -1,9 +1,9 @@
 """True channels and gaps, by dense rays between the generating surfaces of the walls.
 
-From a grid of points on each side of each wall a ray leaves along the normal (``examples.casting``); the
+From a grid of points on each side of each wall a ray leaves along the normal (``examples.family.casting``); the
 first other wall it meets inside that wall's sides decides the channel, and the
 shortest such ray is the gap. Connections are left out, as in the definition of the gap.
-The shortest ray may begin on a border of a side, or end on one (``examples.rims``). Where a wall is one face all
+The shortest ray may begin on a border of a side, or end on one (``examples.family.rims``). Where a wall is one face all
 round, its round ends belong to its sides.
 """
 
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from examples.casting import Blocked, cast
-from examples.rims import on_borders
-from examples.splines import F64
-from examples.walls import LEFT, RIGHT, WallSpec
+from examples.family.casting import Blocked, cast
+from examples.family.rims import on_borders
+from examples.family.splines import F64
+from examples.family.walls import LEFT, RIGHT, WallSpec
 
 ZOOMS = 3
 """Times the grid is drawn again, eight times finer, round the shortest ray."""

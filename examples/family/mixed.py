@@ -9,12 +9,12 @@ from numpy.random import Generator
 from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
-from examples.freewall import FreeWall
-from examples.gaps import Gap
-from examples.joins import draw_joins, takes_fillets
-from examples.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
-from examples.profiles import CLOSED_TYPES, OPEN_TYPES, Profile, clear, draw_closed, draw_hairpin, draw_open
-from examples.walls import LEFT, RIGHT
+from examples.family.freewall import FreeWall
+from examples.family.gaps import Gap
+from examples.family.joins import draw_joins, takes_fillets
+from examples.family.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
+from examples.family.profiles import CLOSED_TYPES, OPEN_TYPES, Profile, clear, draw_closed, draw_hairpin, draw_open
+from examples.family.walls import LEFT, RIGHT
 
 KINDS = ("round_bar", "bar", "web", "arch", "bow", "fork")
 CHORD: dict[str | None, tuple[float, float]] = {

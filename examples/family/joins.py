@@ -14,12 +14,12 @@ from numpy.random import Generator
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
-from examples.connections import ConnectionSpec
-from examples.freewall import FreeWall
-from examples.gaps import Gap
-from examples.layout import HubDisc, LayoutError, Plate, clear_of, settled
-from examples.splines import F64
-from examples.walls import WallSpec
+from examples.family.connections import ConnectionSpec
+from examples.family.freewall import FreeWall
+from examples.family.gaps import Gap
+from examples.family.layout import HubDisc, LayoutError, Plate, clear_of, settled
+from examples.family.splines import F64
+from examples.family.walls import WallSpec
 
 LONGEST = 12.5
 """mm; connections do not span more."""
@@ -152,7 +152,7 @@ def join(
     """Connection from the side of a wall square across the channel.
 
     walls : of the layout; the connection leaves wall ``i`` on ``side`` (LEFT or RIGHT) at parameter ``u``
-    z, width, depth, bend : mm, see ``examples.layout.connect``
+    z, width, depth, bend : mm, see ``examples.family.layout.connect``
     Raises LayoutError where there is nothing opposite, the ends cannot be buried, or other material is in the way.
     """
     first = walls[i]

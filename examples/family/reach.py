@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
-from examples.splines import F64
+from examples.family.splines import F64
 
 STEP, CHORD = 0.12, 0.01
 SAMPLES = 40_000

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.interpolate import BSpline
 from shapely.geometry import Polygon
 
-from examples.profiles import Profile
-from examples.splines import F64, interpolate, interpolate_closed, to_edge
-from examples.walls import BURIED, LEFT, RIGHT, WallSpec
+from examples.family.profiles import Profile
+from examples.family.splines import F64, interpolate, interpolate_closed, to_edge
+from examples.family.walls import BURIED, LEFT, RIGHT, WallSpec
 
 SECTION_SAMPLES = 321
 CAP_NODES = 7

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from examples.gaps import channels
-from examples.layout import Layout, LayoutError, Plate, check, connect, try_connections
-from examples.splines import F64, interpolate
-from examples.walls import WallSpec
+from examples.family.gaps import channels
+from examples.family.layout import Layout, LayoutError, Plate, check, connect, try_connections
+from examples.family.splines import F64, interpolate
+from examples.family.walls import WallSpec
 
 ALL_KINDS = ("round_bar", "bar", "web", "arch", "bow")
 

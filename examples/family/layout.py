@@ -10,10 +10,10 @@ import numpy as np
 from numpy.random import Generator
 from shapely.geometry import LineString, Point, Polygon
 
-from examples.connections import ConnectionSpec
-from examples.gaps import Gap, channels
-from examples.splines import F64
-from examples.walls import WallSpec
+from examples.family.connections import ConnectionSpec
+from examples.family.gaps import Gap, channels
+from examples.family.splines import F64
+from examples.family.walls import WallSpec
 
 
 class LayoutError(ValueError):
@@ -182,7 +182,7 @@ class Layout:
     features: tuple[str, ...] = ()
 
     def gaps(self, **sampling: Any) -> list[Gap]:
-        """True channels between the walls, see ``examples.gaps.channels``."""
+        """True channels between the walls, see ``examples.family.gaps.channels``."""
         if any(w.sees_itself for w in self.walls):
             return channels(self.walls, self.base.blocked, foot=self.fillet, **{"n_u": 241, "n_v": 7, **sampling})
         return channels(self.walls, self.base.blocked, **sampling)

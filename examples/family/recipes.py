@@ -18,17 +18,17 @@ import numpy as np
 from shapely.errors import GEOSException
 from shapely.geometry import Point
 
-from examples import linear
-from examples.connections import TRUTH_KIND, ConnectionSpec
-from examples.fillets import filleted
-from examples.freewall import FreeWall
-from examples.gaps import Gap
-from examples.impeller import impeller
-from examples.joins import ForkSpec, takes_fillets
-from examples.layout import Layout, LayoutError, WindowSpec, check
-from examples.mixed import mixed, mixed_linear, mixed_radial
+from examples.family import linear
+from examples.family.connections import TRUTH_KIND, ConnectionSpec
+from examples.family.fillets import filleted
+from examples.family.freewall import FreeWall
+from examples.family.gaps import Gap
+from examples.family.impeller import impeller
+from examples.family.joins import ForkSpec, takes_fillets
+from examples.family.layout import Layout, LayoutError, WindowSpec, check
+from examples.family.mixed import mixed, mixed_linear, mixed_radial
+from examples.family.walls import WallSpec
 from examples.setups import suggest_setup
-from examples.walls import WallSpec
 
 RECIPES: dict[str, Callable[..., Layout]] = {
     "random": linear.random,
@@ -74,7 +74,7 @@ class FamilyPart:
     def write(self, directory: str | Path, *, reach: bool = False) -> tuple[Path, Path, Path]:
         """Write NAME.step, NAME.truth.json and NAME.setup.json; the same part gives the same bytes.
 
-        reach : whether the truth also says what the setup can reach, see ``examples.reach`` (some seconds)
+        reach : whether the truth also says what the setup can reach, see ``examples.family.reach`` (some seconds)
         Returns the three paths.
         """
         folder = Path(directory)
@@ -83,7 +83,7 @@ class FamilyPart:
         step.write_bytes(step_bytes(self.shape, self.name))
         facts = dict(self.truth)
         if reach:
-            from examples.reach import reach_of
+            from examples.family.reach import reach_of
 
             facts["reach"] = reach_of(step, self.setup)
         truth.write_text(json.dumps(facts, indent=1) + "\n")

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from examples.layout import HubDisc, Layout, connect
-from examples.splines import F64
-from examples.walls import WallSpec
+from examples.family.layout import HubDisc, Layout, connect
+from examples.family.splines import F64
+from examples.family.walls import WallSpec
 
 CHORDS = 9
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from shapely.geometry import LineString, Point, Polygon
 
-from examples.splines import F64
-from examples.walls import WallSpec
+from examples.family.splines import F64
+from examples.family.walls import WallSpec
 
 KINDS = ("round_bar", "bar", "web", "arch", "bow")
 """round bar; square bar; flat web; strut bent in the vertical plane; strut bent in plan."""

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from examples.casting import SKIN, Blocked, cast, met, stopped
-from examples.splines import F64
-from examples.walls import LEFT, RIGHT, WallSpec
+from examples.family.casting import SKIN, Blocked, cast, met, stopped
+from examples.family.splines import F64
+from examples.family.walls import LEFT, RIGHT, WallSpec
 
 BORDER_PLACES = 161
 """Places on each border of a side from which, and to which, rays are looked for first."""

@@ -1,6 +1,6 @@
 """Fillets in a process of their own, because the CAD kernel crashes on some of them.
 
-    python -m examples.fillets IN.brep OUT.brep RADIUS EDGE [EDGE ...]
+    python -m examples.family.fillets IN.brep OUT.brep RADIUS EDGE [EDGE ...]
 
 Edges are numbered in the order in which the kernel lists them.
 """
@@ -27,9 +27,9 @@ def filleted(solid: Any, radius: float, edges: list[int]) -> Any | None:
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder, "before.brep"), Path(folder, "after.brep")
         cq.Shape.exportBrep(solid, str(before))
-        command = [sys.executable, "-m", "examples.fillets", str(before), str(after), repr(radius), *map(str, edges)]
+        command = [sys.executable, "-m", "examples.family.fillets", str(before), str(after), repr(radius), *map(str, edges)]
         try:
-            done = subprocess.run(command, cwd=Path(__file__).resolve().parent.parent, capture_output=True,
+            done = subprocess.run(command, cwd=Path(__file__).resolve().parents[2], capture_output=True,
                                   timeout=TIME_LIMIT)
         except subprocess.TimeoutExpired:
             return None
