@@ -91,7 +91,7 @@ golden: $(STAMP)
 	git --no-pager diff --stat -- tests/golden
 
 bench: $(BENCH_STAMP)
-	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	@for script in benchmarks/*/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 # The documentation is Markdown read in place; this proves that no link in it is dead.
 docs: $(STAMP)

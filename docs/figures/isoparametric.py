@@ -1,7 +1,7 @@
 """Draw docs/images/iso-case-1.svg, iso-case-2.svg and iso-chord.svg: grids, passes, chordal error along a pass.
 
 Run from the root of the repository: python docs/figures/isoparametric.py. The regions are those of
-benchmarks/bench_isoparametric.py; what is drawn is what the program computes.
+benchmarks/passes/bench_isoparametric.py; what is drawn is what the program computes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np  # noqa: E402
 
-from benchmarks.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
+from benchmarks.passes.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
 from toolpath.passes.forward_step import Profile, arc_rule, steps  # noqa: E402

@@ -42,7 +42,7 @@ def compare(recipe: str, seed: int, folder: Path, fillet: float = 0.0) -> None:
 
 def compare_mixed(seed: int, folder: Path, **overrides: object) -> None:
     """Walls, connections, primary gaps and, where there is a classifier, profile types of a mixed part all right."""
-    from benchmarks.family_score import compare as hold_against
+    from benchmarks.reach.family_score import compare as hold_against
     from examples.family.recipes import make_part
 
     made = make_part(seed, "mixed", **overrides)

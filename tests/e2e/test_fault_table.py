@@ -1,4 +1,4 @@
-"""Planted faults, the everyday share of ``benchmarks/fault_table.py``: every kind, found where it is and as deep.
+"""Planted faults, the everyday share of ``benchmarks/faults/fault_table.py``: every kind, found where it is and as deep.
 
 Whether a fault is one, on which line and how deep, is said by the benchmark's brute-force twin, which takes its time:
 every day the right pocket alone, faults and other parts in the slow set; dome and cone are for the benchmark.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.fault_kinds import KINDS
-from benchmarks.fault_table import PARTS, clean, run, uncovered
+from benchmarks.faults.fault_kinds import KINDS
+from benchmarks.faults.fault_table import PARTS, clean, run, uncovered
 
 SLOW = [pytest.param(part, marks=pytest.mark.slow) for part in PARTS if part != "pocket"]
 

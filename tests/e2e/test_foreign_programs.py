@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.foreign_cases import CASES, paths, samples_root
-from benchmarks.foreign_programs import RAISED, run
-from benchmarks.foreign_twin import SPACING, envelope
+from benchmarks.foreign.foreign_cases import CASES, paths, samples_root
+from benchmarks.foreign.foreign_programs import RAISED, run
+from benchmarks.foreign.foreign_twin import SPACING, envelope
 from verify.model import FindingKind
 
 ROOT = samples_root()

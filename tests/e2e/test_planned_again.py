@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.five_axis_gain import MACHINE
+from benchmarks.five_axis.five_axis_gain import MACHINE
 from examples.family.recipes import make_part
 from service import pipeline
 from service.from_wire import parse_setup

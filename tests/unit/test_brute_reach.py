@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks import brute_reach
+from benchmarks.reach import brute_reach
 from tests.pocket_case import block
 
 STEP = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from benchmarks import brute_samples as brute
+from benchmarks.reach import brute_samples as brute
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface

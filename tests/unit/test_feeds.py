@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks import feeds_sweep
-from benchmarks.feeds_sweep import MACHINES, OVERRIDES, faults, varied
+from benchmarks.passes import feeds_sweep
+from benchmarks.passes.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
 from service.cutting_data import MOST_THINNING, chip_thinning, cutting_data
