@@ -59,7 +59,7 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -q tests/unit/test_docstrings.py tests/unit/test_dependencies.py
+	$(BIN)/python -m pytest -q tests/unit/house/test_docstrings.py tests/unit/house/test_dependencies.py
 
 test: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal
@@ -95,7 +95,7 @@ bench: $(BENCH_STAMP)
 
 # The documentation is Markdown read in place; this proves that no link in it is dead.
 docs: $(STAMP)
-	$(BIN)/python -m pytest -q tests/unit/test_docs.py
+	$(BIN)/python -m pytest -q tests/unit/house/test_docs.py
 
 demo: $(STAMP) page
 	$(BIN)/zonemill demo --out $(OUT)

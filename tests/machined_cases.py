@@ -16,13 +16,12 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from tests.hand_parts import box_mesh
 from verify.material.material import machined
 from verify.material.stock_field import Field
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes
-
-from .hand_parts import box_mesh
 
 BOX = np.array([[-6.0, -5.0, -6.0], [6.0, 5.0, 0.0]])
 SIDES = 4.0 * (12.0 + 10.0 + 6.0)

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from drop_shapes import CUTTERS, SHAPES, smooth, soup
-from naive_drop import drop, lift_of_points
 
 from geometry.kernels.drop import drop_tip_below
 from geometry.mesh import TriangleMesh
@@ -11,6 +9,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many, drop_contacts, drop_grid, drop_tips
 from geometry.mesh_queries.height_field import heights
 from geometry.sampling import sample_surface
+from tests.oracle.drop_shapes import CUTTERS, SHAPES, smooth, soup
+from tests.oracle.naive_drop import drop, lift_of_points
 
 
 def _points(mesh, n, seed=0):

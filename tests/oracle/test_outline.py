@@ -7,7 +7,6 @@ import math
 import numba
 import numpy as np
 import pytest
-from drop_shapes import CUTTERS, SHAPES, smooth
 
 from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
@@ -17,6 +16,7 @@ from geometry.mesh_queries.drop import FEW, drop_tips
 from geometry.mesh_queries.outline_drop import drop_turned, turned_contacts
 from geometry.mesh_queries.revolved_outline import CHORD, Arc, Line, Outline, heights
 from geometry.tool_body import HolderSegment, ToolBody
+from tests.oracle.drop_shapes import CUTTERS, SHAPES, smooth
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 

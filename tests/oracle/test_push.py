@@ -7,8 +7,6 @@ import math
 import numba
 import numpy as np
 import pytest
-from drop_shapes import CUTTERS, SHAPES, box, smooth, soup
-from naive_drop import drop as naive
 from test_outline import TURNED
 
 from geometry.errors import GeometryError
@@ -16,6 +14,8 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import FEW
 from geometry.mesh_queries.revolved_outline import heights
+from tests.oracle.drop_shapes import CUTTERS, SHAPES, box, smooth, soup
+from tests.oracle.naive_drop import drop as naive
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_contacts, drop_cutter, push_contacts, push_cutter
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from drop_shapes import SHAPES, box, smooth
-from naive_drop import dilate, first_hit
 
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
@@ -11,6 +9,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.dilate import Rounding, dilate_disc
 from geometry.mesh_queries.height_field import height_grid, heights
 from geometry.mesh_queries.rays import first_hits
+from tests.oracle.drop_shapes import SHAPES, box, smooth
+from tests.oracle.naive_drop import dilate, first_hit
 
 
 @pytest.mark.parametrize("shape", ["smooth", "walls", "soup"])

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
-from drop_shapes import CUTTERS, SHAPES, walls
 
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many
 from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
+from tests.oracle.drop_shapes import CUTTERS, SHAPES, walls
 
 SPECIAL = [[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [1e-9, 0, -1], [1e-7, 1e-7, 1]]
 HOLDER = (3.0, 0.0, 5.0)

@@ -11,7 +11,7 @@ from service.errors import problem_document
 from service.from_wire import parse_setup
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import blank_of
-from tests.unit.test_boxes import block
+from tests.unit.geometry.mesh_queries.test_box_overlap import block
 
 TOOLS = [{"id": "T1", "kind": "ball", "diameter_mm": 3}]
 PART = SimpleNamespace(mesh=block([-10, -5, 0], [10, 5, 8]), bounds=np.array([[-10.0, -5, 0], [10, 5, 8]]),

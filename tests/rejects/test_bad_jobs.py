@@ -1,7 +1,7 @@
 """Whole jobs that are wrong by themselves, at both doors: exit code, problem type, words, nothing left running.
 
 What the reader says of each bad STEP file is in ``test_bad_step``, what the setup schema says in
-``tests/unit/test_setup_schema``; here the real chain runs behind the command line and behind HTTP.
+``tests/unit/schemas/test_setup``; here the real chain runs behind the command line and behind HTTP.
 """
 
 import json

@@ -12,8 +12,18 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.surfaces.nurbs import NurbsSurface
 from service.stages.cautions import upright
 from tests.hand_parts import ball, box_mesh, joined, samples_of, tool
-from tests.unit.test_matched import measured
-from tests.unit.test_matched_strategy import FEED, FREE, HOLLOW, LIFT, LOOP, SCALLOP, SURFACE, cuts, settings_of
+from tests.unit.toolpath.five_axis.test_matched_passes import measured
+from tests.unit.toolpath.strategies.test_curvature_matched import (
+    FEED,
+    FREE,
+    HOLLOW,
+    LIFT,
+    LOOP,
+    SCALLOP,
+    SURFACE,
+    cuts,
+    settings_of,
+)
 from toolpath.five_axis.axis_smoothing import Limits
 from toolpath.five_axis.oriented_motion import SKIMMED, Surroundings, free_parts
 from toolpath.five_axis.oriented_pass import enters

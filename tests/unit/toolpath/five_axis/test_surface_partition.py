@@ -9,7 +9,7 @@ from scipy.interpolate import make_interp_spline
 from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
-from tests.unit.test_matched import bowl, measured, passes_along_y, random_surface
+from tests.unit.toolpath.five_axis.test_matched_passes import bowl, measured, passes_along_y, random_surface
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
 from toolpath.five_axis.matched_passes import Matched, Wanted
 from toolpath.five_axis.surface_partition import (

@@ -11,7 +11,7 @@ from service.jobs.database import connect, migrate
 from service.jobs.engine import Engine
 from service.settings import Settings, is_loopback
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "settings.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "settings.md"
 
 
 def test_every_setting_stands_in_the_page_with_its_meaning():

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, joined, samples_of, slope_field, tool
-from tests.unit.test_matched import bowl, measured
+from tests.unit.toolpath.five_axis.test_matched_passes import bowl, measured
 from toolpath.five_axis.oriented_motion import LAYER, THICK, Surroundings, _leads, lowered, with_ways
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.five_axis.oriented_piece import Piece

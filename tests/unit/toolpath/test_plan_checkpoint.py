@@ -17,7 +17,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from service.serialization import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
-from tests.unit.test_isoparametric_strategy import bowl
+from tests.unit.toolpath.strategies.test_isoparametric import bowl
 from toolpath.passes.pass_family import Target
 from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
 from toolpath.plan_settings import CutData

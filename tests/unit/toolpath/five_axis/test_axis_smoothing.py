@@ -5,7 +5,7 @@ import pytest
 
 from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import ball
-from tests.unit.test_posed import CHORD, SCALLOP, opposite, tree_of, wall
+from tests.unit.toolpath.five_axis.test_oriented_pass import CHORD, SCALLOP, opposite, tree_of, wall
 from toolpath.five_axis.axis_smoothing import FAN, SPACING, Limits, fan, steered
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
 from toolpath.passes.cutter_locations import tips
