@@ -47,7 +47,7 @@ def cutting(*ways, **changes) -> Workplan:
         moves = (line(Motion.RAPID, *top), line(Motion.APPROACH, top[1], tuple(a), feed=240.0),
                  Trajectory(Motion.CUT, way, 600.0), line(Motion.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
                  line(Motion.RAPID, (b[0], b[1], b[2] + 1.0), (b[0], b[1], CLEAR)))
-        steps.append(replace(step(k, BALL, "zlevel", trajectories=moves), chordal_tolerance=HALF))
+        steps.append(replace(step(k, BALL, "waterline", trajectories=moves), chordal_tolerance=HALF))
     return plan(*steps, labels={"order": "4711"}, comments=(), **changes)
 
 

@@ -49,7 +49,7 @@ def step(number: int, tool: ToolBody, strategy: str, *, zone: str | None = "Z3",
     words = [ident, zone or "", strategy, tool.id, *(f"F{f}" for f in faces)]
     return Workingstep(
         id=ident, name=" ".join(filter(None, words)), zone=zone, faces=faces,
-        operation="roughing" if strategy == "layers" else "finishing", strategy=strategy, tool=tool,
+        operation="roughing" if strategy == "depth_layers" else "finishing", strategy=strategy, tool=tool,
         spindle_rpm=12000.0, feed=600.0, side_step=0.25, scallop_height=0.01, chordal_tolerance=0.002,
         trajectories=passes(x, z) if trajectories is None else trajectories,
         outline=np.array([[x, 0.0], [x + 2.0, 0.0], [x + 2.0, 20.0], [x, 20.0], [x, 0.0]]), top=z + 6.0, bottom=z)
@@ -57,11 +57,11 @@ def step(number: int, tool: ToolBody, strategy: str, *, zone: str | None = "Z3",
 
 def plan(*steps: Workingstep, **changes: object) -> Workplan:
     chosen = steps or (
-        step(1, BULL, "layers", zone=None, faces=(), x=2.0, z=8.0),
-        step(2, FLAT, "floor", zone="Z1", faces=(4,)),
-        step(3, BALL, "zlevel"),
+        step(1, BULL, "depth_layers", zone=None, faces=(), x=2.0, z=8.0),
+        step(2, FLAT, "planar_floor", zone="Z1", faces=(4,)),
+        step(3, BALL, "waterline"),
         step(4, BALL, "zigzag", zone="Z4", faces=(20, 21, 22), x=11.0, z=3.0),
-        step(5, BULL, "layers", zone="Z5", faces=(30,), x=15.0, z=6.0),
+        step(5, BULL, "depth_layers", zone="Z5", faces=(30,), x=15.0, z=6.0),
     )
     values: dict[str, object] = dict(
         name="demo", steps=chosen, tools=(BALL, FLAT, BULL), clearance_plane=CLEAR, work_offset="G54",
@@ -82,7 +82,7 @@ def tiny() -> Workplan:
         line(Motion.LIFT, (-0.00001, 2.5, 4.5), (0.0, 2.5, 6.0), feed=600.0),
         line(Motion.RAPID, (0.0, 2.5, 6.0), (0.0, 2.5, CLEAR)),
     )
-    return plan(step(1, BALL, "zlevel", trajectories=cut), labels={"order": "4711"}, comments=())
+    return plan(step(1, BALL, "waterline", trajectories=cut), labels={"order": "4711"}, comments=())
 
 
 def long_plan(points: int, rows: int = 300) -> Workplan:
@@ -117,10 +117,10 @@ def clamped(kind: str = "table-table-AC", tcp: bool = True, swings: bool = True)
         frames[name] = Frame(access_rotation(direction), 40.0)
     pivots = ((5.0, 0.0, -80.0), (7.0, 3.0, -20.0)) if kind.startswith("table") else ((0.0, 0.0, 150.0), (20.0, -7, 0))
     machine = RotaryMachine(kind, pivots[:1] if kind.startswith("head-head") else pivots, None, tcp)
-    steps = [replace(step(1, FLAT, "layers", zone=None, faces=(), x=2.0, z=8.0), access="A1"),
-             replace(step(2, FLAT, "floor", zone="Z1", faces=(4,)), access="I1"),
-             replace(step(3, BALL, "zlevel"), access="I1"), replace(step(4, BALL, "zigzag", x=11.0), access="I2"),
-             replace(step(5, BALL, "zlevel", trajectories=leaning(4.0, 5.0) if swings else None), access="I1")]
+    steps = [replace(step(1, FLAT, "depth_layers", zone=None, faces=(), x=2.0, z=8.0), access="A1"),
+             replace(step(2, FLAT, "planar_floor", zone="Z1", faces=(4,)), access="I1"),
+             replace(step(3, BALL, "waterline"), access="I1"), replace(step(4, BALL, "zigzag", x=11.0), access="I2"),
+             replace(step(5, BALL, "waterline", trajectories=leaning(4.0, 5.0) if swings else None), access="I1")]
     clamping = Clamping(machine, frames, np.array([15.0, 10.0, 7.5]), 60.0, {1: 75.0, 2: 70.0})
     return plan(*steps, clamping=clamping, labels={"order": "4711"}, comments=())
 

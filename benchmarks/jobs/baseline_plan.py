@@ -101,5 +101,5 @@ def _levels(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
     if not linker.passes:
         return []
     ids = " ".join(z.id for z in zones)
-    return [step_of(step_id, f"{step_id} levels {tool.id} {ids}", None, zones, "roughing", "layers", tool, cut,
+    return [step_of(step_id, f"{step_id} levels {tool.id} {ids}", None, zones, "roughing", "depth_layers", tool, cut,
                     0.8 * tool.radius, linker.finish(), settings)]

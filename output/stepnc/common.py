@@ -215,7 +215,7 @@ def surfaces_of(plan: Workplan, step: Workingstep) -> list[tuple[int, NurbsSurfa
 
     All of its faces or none: a feature of some would be too small.
     """
-    if step.strategy not in ("isoparametric", "flank", "matched", "led"):
+    if step.strategy not in ("isoparametric", "flank", "curvature_matched", "inclined_axis"):
         return []
     found = [(n, plan.surfaces[n]) for n in step.faces if n in plan.surfaces]
     return found if len(found) == len(step.faces) else []

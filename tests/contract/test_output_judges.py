@@ -37,7 +37,7 @@ RESTART = {"restart points": lambda: replace(plan(), restart=True),
 
 def flat_step():
     """A floor: no height between top and bottom, no chordal tolerance, no side step."""
-    floor = step(1, BALL, "floor")
+    floor = step(1, BALL, "planar_floor")
     for name, value in (("top", floor.bottom), ("chordal_tolerance", 0.0), ("side_step", 0.0)):
         object.__setattr__(floor, name, value)
     return floor

@@ -72,7 +72,7 @@ def test_every_zone_keeps_the_budget(report):
     for z in report["zones"]:
         s = z["scallop_mm"]
         assert 0 <= z["gouge_mm"] <= 0.01 and s["p50"] <= s["p99"] <= s["max"] <= s["requested"] == 0.02, z["id"]
-        assert z["coverage"] == pytest.approx(1) and (z["passes"] > 0) == (z["strategy"] != "layers")
+        assert z["coverage"] == pytest.approx(1) and (z["passes"] > 0) == (z["strategy"] != "depth_layers")
         assert steps[z["step"]]["tool"] == z["tool"] and set(z["faces"]) <= set(steps[z["step"]]["faces"])
         assert z["depth_mm"][0] >= z["depth_mm"][1]
 
@@ -137,7 +137,7 @@ def lowered(program, report):
 
     A line of the finishing pass on the base that names X or Y alone stands on the base, or no higher than a touch.
     """
-    zone = next(z for z in report["zones"] if z["region"] == "floor" and z["strategy"] == "floor")
+    zone = next(z for z in report["zones"] if z["region"] == "floor" and z["strategy"] == "planar_floor")
     height = zone["depth_mm"][1]
     lines = program.split("\n")
     begin = next(k for k, line in enumerate(lines) if line.startswith(f"({zone['step']} "))

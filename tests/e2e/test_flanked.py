@@ -57,7 +57,7 @@ def test_leaning_walls_are_cut_by_the_flank_and_proved(job: tuple[Path, dict[str
     flanked = [z for z in report["zones"] if z["strategy"] == "flank"]
     assert flanked and all(z["coverage"] > 0.99 for z in flanked)
     for zone in flanked:  # walked with all that follows, and held against levels alone
-        (levels,) = [r for r in zone["rejected"] if r["strategy"] == "zlevel"]
+        (levels,) = [r for r in zone["rejected"] if r["strategy"] == "waterline"]
         assert "takes longer" in levels["reason"] and levels["value"] > levels["limit"]
 
 

@@ -51,11 +51,11 @@ def test_the_hollow_is_finished_leaning_and_proved(job: tuple[Path, dict[str, An
     report = job[1]
     assert report["state"] == "proved", report["findings"]
     zones = [z for z in report["zones"] if z["form"] == "shallow"]
-    assert zones and all(z["strategy"] == "led" and z["coverage"] > 0.99 for z in zones)
+    assert zones and all(z["strategy"] == "inclined_axis" and z["coverage"] > 0.99 for z in zones)
     assert report["gouge_max_mm"] <= 0.01
     assert not [w for w in report["warnings"] if w["kind"] == "upright"]
     own = [s for s in report["steps"] if s["id"] in {i for z in zones for i in z["steps"]}]
-    upright = sum(s["cutting_length_mm"] for s in own if s["strategy"] != "led")
+    upright = sum(s["cutting_length_mm"] for s in own if s["strategy"] != "inclined_axis")
     assert upright < 0.1 * sum(s["cutting_length_mm"] for s in own)  # what is left in the corners of the post
 
 

@@ -44,7 +44,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def test_the_hollow_is_cut_by_the_tilted_end_and_proved(report: dict[str, Any]) -> None:
     assert report["state"] == "proved", report["findings"]
     (zone,) = [z for z in report["zones"] if z["form"] == "shallow"]
-    assert zone["strategy"] == "matched" and zone["coverage"] > 0.999
+    assert zone["strategy"] == "curvature_matched" and zone["coverage"] > 0.999
     assert zone["scallop_mm"]["max"] <= 0.02
     assert report["gouge_max_mm"] <= 0.01
 

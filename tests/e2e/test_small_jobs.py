@@ -138,7 +138,7 @@ def test_warm_plans_a_part_on_which_every_strategy_has_something_to_do(monkeypat
     monkeypatch.setattr(pipeline, "plan", listening)
     assert CliRunner().invoke(app, ["warm"]).exit_code == 0
     assert {s["strategy"] for s in reports[0]["steps"]} == {
-        "layers", "floor", "zlevel", "zigzag", "isoparametric"}
+        "depth_layers", "planar_floor", "waterline", "zigzag", "isoparametric"}
     assert reports[0]["state"] == "proved"
 
 

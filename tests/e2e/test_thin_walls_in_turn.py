@@ -50,7 +50,7 @@ def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_pa
     assert support["walls"] == 1 and support["places"] > 100 and support["places_over"] == 0
     assert support["most_ratio"] <= PLANNED_RATIO + 1.0 and support["limit_ratio"] == FREE_RATIO
     steps = [s["strategy"] for s in banded["steps"]]
-    assert steps.count("layers") == 2 and steps.index("zlevel") < len(steps) - 1 - steps[::-1].index("layers")
+    assert steps.count("depth_layers") == 2 and steps.index("waterline") < len(steps) - 1 - steps[::-1].index("depth_layers")
     monkeypatch.setattr(pipeline, "band_planes", lambda *_: ())
     monkeypatch.setattr(pipeline, "PLANS", 1)
     whole = plan(wall, tmp_path / "whole", setup())
@@ -65,7 +65,7 @@ def test_a_wall_that_is_held_otherwise_is_cut_as_it_comes_and_told_of(wall, tmp_
     ready = prepare(wall, asked, lambda *_: None)
     assert band_planes(ready, ready.views[0]) == ()
     report = plan(wall, tmp_path, asked)
-    assert report["state"] == "proved" and [s["strategy"] for s in report["steps"]].count("layers") == 1
+    assert report["state"] == "proved" and [s["strategy"] for s in report["steps"]].count("depth_layers") == 1
     (told,) = [w for w in report["warnings"] if w["kind"] == "support"]
     assert told["measured"] > 14.0 and told["limit"] == FREE_RATIO
     assert told["at_mm"][2] == pytest.approx(12.5, abs=0.4) and told["message"] in " ".join(report["part"]["warnings"])

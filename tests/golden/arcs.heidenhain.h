@@ -22,7 +22,7 @@
     Q339=+1 ;DATUM NUMBER
 21 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
 22 TOOL CALL 1 Z S12000
-23 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+23 ; S01 Z3 finishing waterline T1: F12 F13; Z 10 down to 4
 24 M3
 25 M8
 26 L Z+25 R0 FMAX

@@ -27,7 +27,7 @@
 25 L Z+0 R0 FMAX M91
 26 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
 27 TOOL CALL 1 Z S12000
-28 ; S01 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4
+28 ; S01 Z3 finishing waterline T1: F12 F13; Z 10 down to 4
 29 M3
 30 M8
 31 L Z+25 R0 FMAX

@@ -7,7 +7,6 @@ import math
 import numba
 import numpy as np
 import pytest
-from test_outline import TURNED
 
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
@@ -16,6 +15,7 @@ from geometry.mesh_queries.drop import FEW
 from geometry.mesh_queries.revolved_outline import heights
 from tests.oracle.drop_shapes import CUTTERS, SHAPES, box, smooth, soup
 from tests.oracle.naive_drop import drop as naive
+from tests.oracle.test_outline import TURNED
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_contacts, drop_cutter, push_contacts, push_cutter
 

@@ -169,7 +169,7 @@ def test_steep_and_shallow_passes_overlap_where_they_meet():
     h = c.settings.scallop_height
     assert brute_residual(fresh.points, c.moves(Motion.CUT)).max() <= h
     lean = np.degrees(np.arccos(fresh.normals[:, 2]))  # waterlines from 45 degrees on
-    for strategies, low, high in ((("zigzag", "spiral"), 42.0, 52.0), (("zlevel",), 42.0, 48.0)):
+    for strategies, low, high in ((("zigzag", "spiral"), 42.0, 52.0), (("waterline",), 42.0, 48.0)):
         near = (low < lean) & (lean < high)
         assert near.sum() > 400
         alone = brute_residual(fresh.points[near], cut_by(c, *strategies))
@@ -201,7 +201,7 @@ def turn_round_walls(c: Case) -> tuple[float, float]:
     """Length walked with material on the right and on the left beside upright walls in the finish, mm."""
     right = left = 0.0
     for s in c.plan.steps:
-        if s.strategy != "zlevel":
+        if s.strategy != "waterline":
             continue
         for t in s.trajectories:
             if t.motion is not Motion.CUT:
@@ -249,7 +249,7 @@ def test_conventional_also_turns_the_walls_round_floors_and_the_layers():
         return total
 
     one = [plan_part(corner(), [tool(4.0, 0.0)], climb=climb) for climb in (True, False)]
-    for strategy in ("floor", "layers"):
+    for strategy in ("planar_floor", "depth_layers"):
         assert sense(one[0], strategy) > 5 and sense(one[1], strategy) < -5, strategy
 
 

@@ -342,8 +342,8 @@ class _Layers:
         if not linker.passes:
             return []
         step_id, tool, ids = f"S{number:02d}", self.field.tool, " ".join(z.id for z in self.zones)
-        kind, cut = ("layers", self.cut) if operation == "roughing" else ("between layers", self._thinner())
-        return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "layers", tool,
+        kind, cut = ("depth_layers", self.cut) if operation == "roughing" else ("between layers", self._thinner())
+        return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "depth_layers", tool,
                         cut, 0.8 * tool.radius, linker.finish(), self.settings)]
 
 

@@ -369,7 +369,7 @@ class Finish:
     def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
         """Walk lines of round k and measure them."""
         tool, settings = self.field.tool, self.settings
-        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if self.strategy.name == "floor" else None
+        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if self.strategy.name == "planar_floor" else None
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:
@@ -472,13 +472,13 @@ def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
                 levels = waterline.lowest_of_groups(tips[:, 2], window)
             return waterline.waterlines(field, tips, levels, 1.001 * window, chord)
 
-        return _Strategy("zlevel", step, waterlines, False)
+        return _Strategy("waterline", step, waterlines, False)
     if _has_floor(zone, tool):
 
         def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
             return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MOST_FINER else []
 
-        return _Strategy("floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
+        return _Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
     layout = zigzag.laid(field, checks, promise, settings.pattern, settings.climb or settings.either_way)

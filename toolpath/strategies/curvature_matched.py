@@ -30,7 +30,7 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
 
-NAME = "matched"
+NAME = "curvature_matched"
 LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind
 SHARE = 0.25  # of the chordal tolerance: how deep the nose may be, and what leaving out poses may add
 LAID_SHARE = 0.8  # of the scallop, given to the strips; chords and facets take the rest

@@ -31,7 +31,7 @@ from toolpath.strategies.isoparametric import Stretch, course
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
 
-NAME = "led"
+NAME = "inclined_axis"
 LAID_SHARE = 0.8  # of the scallop, given to the distance between passes; chords and facets take the rest
 CHORD_SHARE = 0.5  # of the chordal tolerance, given to locations; leaving out poses takes a quarter
 LIMITS = Limits(math.radians(45.0), math.radians(4.0))

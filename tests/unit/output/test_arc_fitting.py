@@ -119,7 +119,7 @@ def test_links_and_a_tool_that_turns_are_not_touched():
     same = fitted(replace(work, steps=(replace(work.steps[0], trajectories=ways),)), HALF)
     assert same.steps[0].trajectories == ways
     swings = clamped()
-    swings = replace(swings, steps=(replace(step(1, BALL, "zlevel", trajectories=leaning(4.0, 5.0)), access="I1"),))
+    swings = replace(swings, steps=(replace(step(1, BALL, "waterline", trajectories=leaning(4.0, 5.0)), access="I1"),))
     cuts = [t for t in fitted(swings, HALF).steps[0].trajectories if t.axes is not None]
     assert cuts and cuts[0] is swings.steps[0].trajectories[2]
 

@@ -146,16 +146,16 @@ def test_order_of_words_at_a_tool_change():
 
 
 def test_safe_before_every_tool_change_and_at_the_end():
-    low = step(1, FLAT, "floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
-    text = write_linuxcnc(plan(low, step(2, BALL, "zlevel")))
+    low = step(1, FLAT, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    text = write_linuxcnc(plan(low, step(2, BALL, "waterline")))
     at = moves(text[: text.index("T1 M6")])
     assert at[-1][0] == 0 and at[-1][2][2] == CLEAR
     assert moves(write_linuxcnc(plan(low)))[-1] == (0, 100.0, (5.0, 0.0, CLEAR))
 
 
 def test_rapids_never_slant_and_steps_that_do_not_join_go_over_the_clearance_plane():
-    a = step(1, BALL, "floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
-    b = step(2, BALL, "floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
+    a = step(1, BALL, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    b = step(2, BALL, "planar_floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
     path = moves(write_linuxcnc(plan(a, b)))
     for (_, _, p), (g, _, q) in zip(path, path[1:], strict=False):
         if g == 0 and None not in p:
@@ -165,7 +165,7 @@ def test_rapids_never_slant_and_steps_that_do_not_join_go_over_the_clearance_pla
 
 
 def test_path_mode_is_never_looser_than_half_the_chord():
-    fine = step(1, BALL, "zlevel")
+    fine = step(1, BALL, "waterline")
     object.__setattr__(fine, "chordal_tolerance", 0.0008)
     assert path_tolerance(plan()) == 0.001
     assert path_tolerance(plan(fine)) == pytest.approx(0.0004)
@@ -180,7 +180,7 @@ def reject(code_wanted, *steps, **changes):
 
 
 def moving(*trajectories):
-    return step(1, BALL, "zlevel", trajectories=trajectories)
+    return step(1, BALL, "waterline", trajectories=trajectories)
 
 
 def test_rejects():
@@ -193,8 +193,8 @@ def test_rejects():
     reject("bad_feed", moving(line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=float("nan"))))
     reject("bad_coordinate", moving(line(Motion.CUT, (0, 0, 0), (float("nan"), 0, 0), feed=100)))
     reject("bad_trajectory", moving(Trajectory(Motion.CUT, np.zeros((1, 3)), 100.0)))
-    reject("empty_step", step(1, BALL, "zlevel", trajectories=()))
-    reject("id_twice", step(1, BALL, "zlevel"), step(1, BALL, "floor"))
+    reject("empty_step", step(1, BALL, "waterline", trajectories=()))
+    reject("id_twice", step(1, BALL, "waterline"), step(1, BALL, "planar_floor"))
     reject("bad_work_offset", work_offset="G60")
     with pytest.raises(OutputError):
         write_linuxcnc(plan(steps=()))

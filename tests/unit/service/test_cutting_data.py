@@ -131,9 +131,9 @@ def test_what_layers_leave_is_what_the_planner_leaves():
 
 def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
     far, near = Bend(0.4, 0.05, 0.2, 0.12), Bend(0.06, 0.05, 0.8, 0.05)
-    steps = [replace(step(1, SLIM, "layers"), bend=near), replace(step(2, SLIM, "layers"), bend=far),
-             replace(step(3, SLIM, "zlevel"), bend=Bend(0.004, 0.005, 1.0, 0.004)), step(4, SLIM, "zigzag"),
-             replace(step(5, SLIM, "zlevel"), bend=Bend(0.02, 0.005, 1.0, 0.02, fixed=True))]
+    steps = [replace(step(1, SLIM, "depth_layers"), bend=near), replace(step(2, SLIM, "depth_layers"), bend=far),
+             replace(step(3, SLIM, "waterline"), bend=Bend(0.004, 0.005, 1.0, 0.004)), step(4, SLIM, "zigzag"),
+             replace(step(5, SLIM, "waterline"), bend=Bend(0.02, 0.005, 1.0, 0.02, fixed=True))]
     told = bent(steps)
     assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]
     assert told[0].sentence == ("tool T1 in S02 layers and 1 other steps, roughing: its tip would bend 0.400 mm "
@@ -147,8 +147,8 @@ def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_in
                        {"id": "T2", "kind": "flat", "diameter_mm": 4.0}]}
     wanted = parse_setup(json.dumps(asked))
     t1, t2 = tool_bodies(wanted)
-    layers = [replace(step(k, t, "layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
+    layers = [replace(step(k, t, "depth_layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
     (told,) = uncut_centres(wanted, layers)
     assert told.kind == "center_cutting" and told.subjects == ("T1",) and told.measured == 0.75
     assert "drill" in told.remedy and told.limit == 6.0
-    assert not uncut_centres(wanted, [step(1, t1, "zlevel"), layers[1]])
+    assert not uncut_centres(wanted, [step(1, t1, "waterline"), layers[1]])

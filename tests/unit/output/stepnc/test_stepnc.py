@@ -140,8 +140,8 @@ def test_arm_outline_is_closed():
 
 
 def test_steps_with_one_tool_that_do_not_join_are_linked_over_the_clearance_plane():
-    a = step(1, BALL, "floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
-    b = step(2, BALL, "floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
+    a = step(1, BALL, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    b = step(2, BALL, "planar_floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
     wanted = np.array([[5, 0, 1], [5, 0, 25], [9, 3, 25], [9, 3, 2]], dtype=float)
     for write in WRITERS.values():
         data = instances(write(plan(a, b)))
@@ -240,11 +240,11 @@ def test_strings_and_reals():
 def test_rejects(write):
     cut = line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=100)
     bad = {
-        "slanted_rapid": plan(step(1, BALL, "zlevel", trajectories=(line(Motion.RAPID, (0, 0, 0), (1, 0, 1)),))),
-        "gap_in_path": plan(step(1, BALL, "zlevel", trajectories=(cut, cut))),
-        "empty_step": plan(step(1, BALL, "zlevel", trajectories=(line(Motion.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
+        "slanted_rapid": plan(step(1, BALL, "waterline", trajectories=(line(Motion.RAPID, (0, 0, 0), (1, 0, 1)),))),
+        "gap_in_path": plan(step(1, BALL, "waterline", trajectories=(cut, cut))),
+        "empty_step": plan(step(1, BALL, "waterline", trajectories=(line(Motion.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
         "bad_stock": plan(stock=StockBox(np.zeros(3), np.array([1.0, 1.0, 0.0]))),
-        "id_twice": plan(step(1, BALL, "zlevel"), step(1, BALL, "floor")),
+        "id_twice": plan(step(1, BALL, "waterline"), step(1, BALL, "planar_floor")),
     }
     for code, job in bad.items():
         with pytest.raises(OutputError) as e:

@@ -34,12 +34,12 @@ def planned(monkeypatch):
 
 def test_a_zone_counts_all_its_workingsteps(planned):
     got = planned(step(2, BALL, "zigzag", zone="Z1", trajectories=cut(30.0, 600.0)),
-                  step(3, BALL, "zlevel", zone="Z2", trajectories=cut(500.0, 600.0)),
+                  step(3, BALL, "waterline", zone="Z2", trajectories=cut(500.0, 600.0)),
                   step(4, BALL, "zigzag", zone="Z1", trajectories=cut(20.0, 300.0)))
     assert (got["step"], got["steps"], got["passes"]) == ("S02", ["S02", "S04"], 5)
     assert (got["cutting_length_mm"], got["machining_time_s"]) == (50.0, 7.0)
 
 
 def test_a_zone_nothing_was_planned_for_has_none(planned):
-    got = planned(step(3, BALL, "zlevel", zone="Z2", trajectories=cut(500.0, 600.0)))
+    got = planned(step(3, BALL, "waterline", zone="Z2", trajectories=cut(500.0, 600.0)))
     assert got["steps"] == [] and "step" not in got and got["machining_time_s"] == 0.0

@@ -73,13 +73,13 @@ def pdf_text(data: bytes) -> str:
 def steps() -> tuple[Workingstep, ...]:
     from service.from_wire import tool_bodies
     one, two, _ = tool_bodies(parse_setup(json.dumps(SETUP)))
-    return (step(1, two, "layers", zone=None, faces=(), z=8.0), step(2, one, "zlevel", zone="Z1"),
+    return (step(1, two, "depth_layers", zone=None, faces=(), z=8.0), step(2, one, "waterline", zone="Z1"),
             step(3, one, "zigzag", zone="Z2", z=-4.0))
 
 
 def report_of(state: str, findings: list[dict[str, Any]]) -> dict[str, Any]:
     zones = [{"id": f"Z{k}", "kind": "SCZ", "profile": "C4", "level": "simple", "access": "A1", "tool": "T1",
-              "form": "steep", "strategy": "zlevel", "area_mm2": 10.0 * k,
+              "form": "steep", "strategy": "waterline", "area_mm2": 10.0 * k,
               "faces": FACES.split() if k == 2 else ["F12"],
               "scallop_mm": {"requested": 0.0125, "p50": None, "p99": 0.0117, "max": 0.0119}, "coverage": 0.99999,
               "steps": [f"S0{k + 1}"], "machining_time_s": 66.0} for k in (1, 2)]

@@ -31,7 +31,7 @@ def found(kind, line=3, tip=(1.0, 2.0, 3.0), depth=0.3, near=False):
 
 
 def attempt(*findings, counts=None, proved=(True,) * 6, answered=(1, 1, 0, 2, 2, 2)):
-    steps = [SimpleNamespace(id="S01", tool=TOOL, strategy="layers"),
+    steps = [SimpleNamespace(id="S01", tool=TOOL, strategy="depth_layers"),
              SimpleNamespace(id="S02", tool=TOOL, strategy="flank")]
     side = SimpleNamespace(view=SimpleNamespace(id="A1", rotation=TILT), made=SimpleNamespace(steps=steps))
     program = SimpleNamespace(name="p.ngc", text=TEXT, work=SimpleNamespace(steps=steps))

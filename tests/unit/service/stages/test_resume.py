@@ -175,7 +175,7 @@ class Prepared:
         """A plan, with the stock as it leaves it."""
         self.made += 1
         left = StockMap(Lattice(0.0, 0.0, 0.5, 3, 2), np.arange(6.0).reshape(2, 3))
-        return Side(self.view, Plan((step(1, self.tool, "zlevel"),), ()), 12.5, left)
+        return Side(self.view, Plan((step(1, self.tool, "waterline"),), ()), 12.5, left)
 
     def proof(self) -> Proof:
         """A proof that found nothing."""

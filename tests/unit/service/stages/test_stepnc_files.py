@@ -18,7 +18,7 @@ from toolpath.workingsteps import Motion
 
 @pytest.fixture
 def job():
-    work = plan(step(1, BALL, "zlevel"))
+    work = plan(step(1, BALL, "waterline"))
     return [Program("A1", work, write_linuxcnc(work))], block(), [BALL], SETUP
 
 

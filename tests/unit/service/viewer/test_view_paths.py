@@ -34,8 +34,8 @@ G1 X9 F600
 G0 Z20
 M2
 """
-STEPS = [{"id": "S01", "zone": None, "operation": "roughing", "strategy": "layers"},
-         {"id": "S02", "zone": "Z1", "operation": "finishing", "strategy": "zlevel"}]
+STEPS = [{"id": "S01", "zone": None, "operation": "roughing", "strategy": "depth_layers"},
+         {"id": "S02", "zone": "Z1", "operation": "finishing", "strategy": "waterline"}]
 
 
 def farthest(place, rows):

@@ -103,15 +103,15 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
     first = fresh()
     (step,) = first.walk("S05")
     assert not len(first.plan().left) and first.plan().step == "S05"
-    part = replace(step, id="S02", strategy="layers", trajectories=step.trajectories[:len(step.trajectories) // 2])
+    part = replace(step, id="S02", strategy="depth_layers", trajectories=step.trajectories[:len(step.trajectories) // 2])
     half, whole = fresh(), fresh()
     half.measure(part)
-    assert half.walk("S06") and half.plan().strategy == "zlevel" and half.plan().step == "S06"
+    assert half.walk("S06") and half.plan().strategy == "waterline" and half.plan().step == "S06"
     whole.measure(replace(part, trajectories=step.trajectories))
     whole._along_borders = None  # not even asked
     assert whole.walk("S06") == []
     made = whole.plan()
-    assert (made.step, made.strategy, made.passes, len(made.left)) == ("S02", "layers", 0, 0)
+    assert (made.step, made.strategy, made.passes, len(made.left)) == ("S02", "depth_layers", 0, 0)
 
 
 def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
@@ -150,7 +150,7 @@ def test_steps_are_numbered_and_named_after_zone_strategy_tool_and_faces(name):
         words = s.name.split()
         if s.operation == "roughing":
             mine = [z for z in c.zones if z.tool.id == s.tool.id]
-            assert words == [s.id, "layers", s.tool.id, *(z.id for z in mine)] and s.zone is None
+            assert words == [s.id, "depth_layers", s.tool.id, *(z.id for z in mine)] and s.zone is None
             assert set(s.faces) == {f for z in mine for f in z.faces}
         else:
             z = zones[s.zone]
@@ -194,7 +194,7 @@ def test_what_became_of_a_zone_agrees_with_its_step(name):
         assert p.passes == sum(b and not a for a, b in zip([False, *cuts], cuts, strict=False)) > 0
         flat = p.zone.tool.radius - p.zone.tool.corner_radius
         dragged = {"zigzag", "spiral"}
-        want = {Form.STEEP: {"zlevel"}, Form.LEVEL: {"floor"} if flat > 0 else dragged, Form.SHALLOW: dragged}
+        want = {Form.STEEP: {"waterline"}, Form.LEVEL: {"planar_floor"} if flat > 0 else dragged, Form.SHALLOW: dragged}
         assert p.strategy in want[p.zone.form]
 
 
@@ -243,7 +243,7 @@ def test_finishing_switched_off_leaves_the_layers_alone():
     """At the same heights, and more of them along walls (below)."""
     full = replanned(case("corner"))
     c = replanned(full, finishing=False)
-    assert c.plan.zones == () and {s.strategy for s in c.plan.steps} == {"layers"}
+    assert c.plan.zones == () and {s.strategy for s in c.plan.steps} == {"depth_layers"}
     ways = [[np.vstack([w.points for w in s.trajectories if w.motion is Motion.CUT]) for s in plan.steps
              if s.operation == "roughing" and s.tool.id == "T2"] for plan in (full.plan, c.plan)]
     levels = [{round(z, 6) for p in way for z, flat in zip(p[1:, 2], np.diff(p[:, 2]) == 0.0, strict=True) if flat}
@@ -316,7 +316,7 @@ def test_what_no_pass_gets_to_is_told_and_nothing_else():
 @pytest.mark.parametrize("name", ["corner", "corner by bull"])
 def test_no_sample_of_a_level_area_stays_uncovered_by_the_flat(name):
     c = case(name)
-    floors = [p for p in c.plan.zones if p.strategy == "floor"]
+    floors = [p for p in c.plan.zones if p.strategy == "planar_floor"]
     assert floors
     for p in floors:
         body = p.zone.tool

@@ -208,12 +208,12 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
         return SimpleNamespace(zone=name, strategy=strategy, trajectories=[
             Trajectory(Motion.CUT, points[:2], FEED), Trajectory(Motion.LIFT, points[1:], FEED)])
 
-    zones = [zone("Z1", Form.SHALLOW, "led"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
-             zone("Z3", Form.STEEP, "zlevel"), zone("Z4", Form.SHALLOW, "layers"),
+    zones = [zone("Z1", Form.SHALLOW, "inclined_axis"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
+             zone("Z3", Form.STEEP, "waterline"), zone("Z4", Form.SHALLOW, "depth_layers"),
              zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
-             zone("Z7", Form.SHALLOW, "led"), zone("Z8", Form.SHALLOW, "matched", "too slow")]
-    steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "layers"]
-    steps += [step(None, "layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
+             zone("Z7", Form.SHALLOW, "inclined_axis"), zone("Z8", Form.SHALLOW, "curvature_matched", "too slow")]
+    steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "depth_layers"]
+    steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
     first, second, third, fourth = upright(TILTED, zones, steps)
     assert first.subjects == ("Z2", "T1") and "stays upright (a reason; another)" in first.message
     assert (first.measured, first.limit) == (30.0, 15.0)

@@ -148,9 +148,9 @@ def test_a_sharp_end_gets_none():
 
 @pytest.mark.parametrize(("left", "seconds", "kept", "reason"), [
     ((3, 0), (10.0, 10.4), "isoparametric", "more samples are left above the scallop"),
-    ((0, 3), (10.4, 10.0), "zlevel", "more samples are left above the scallop"),
+    ((0, 3), (10.4, 10.0), "waterline", "more samples are left above the scallop"),
     ((2, 2), (10.4, 10.0), "isoparametric", "takes longer at equal scallop, s"),
-    ((0, 0), (10.0, 10.4), "zlevel", "takes longer at equal scallop, s"),
+    ((0, 0), (10.0, 10.4), "waterline", "takes longer at equal scallop, s"),
     ((4, 4), (None, 10.4), "isoparametric", "no pass is walked")])
 def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_faster(left, seconds, kept, reason):
     ways = [Line(np.array([[0.0, y, 1.0], [5.0, y, 1.0]]), False) for y in (1.0, 2.0)]
@@ -161,7 +161,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             self.settings = SimpleNamespace(scallop_height=0.02, found=NONE, turning=None)
             self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
             self.residual = SimpleNamespace(residual=np.ones(4))
-            self.strategy, self.depths = _Strategy("zlevel", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
+            self.strategy, self.depths = _Strategy("waterline", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
             self.settled = False
 
         def _along_borders(self):
@@ -182,8 +182,8 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
     finish.walk("S01")
     assert finish.walked is remembered and finish.depths is depths  # the zones of a tool share them
     assert [depths.lowest(way.points[0]) for way in ways] == [1.0 if kept == name else np.inf
-                                                              for name in ("zlevel", "isoparametric")]
-    assert [not remembered.fresh(way).any() for way in ways] == [kept == "zlevel", kept == "isoparametric"]
+                                                              for name in ("waterline", "isoparametric")]
+    assert [not remembered.fresh(way).any() for way in ways] == [kept == "waterline", kept == "isoparametric"]
     assert finish.strategy.name == kept
     assert finish.strategy.rejected[-1]["reason"] == reason
     assert finish.strategy.rejected[-1]["strategy"] != kept

@@ -109,7 +109,7 @@ def test_pieces_are_small_and_make_the_file(stream):
 @both
 def test_what_differs_is_found(write):
     """Each plan is the first but for one thing; its STEP-NC must not pass for that of the first program."""
-    good = plan(step(1, BALL, "zlevel"))
+    good = plan(step(1, BALL, "waterline"))
     cut = good.steps[0].trajectories[2]
     moved = cut.points.copy()
     moved[3, 2] += 0.0012
@@ -127,7 +127,7 @@ def test_what_differs_is_found(write):
         "speed": plan(replace(good.steps[0], spindle_rpm=11999.0)),
         "tool": plan(replace(good.steps[0], tool=replace(BALL, number=2))),
         "end": plan(replace(good.steps[0], trajectories=good.steps[0].trajectories[:3])),
-        "more": plan(good.steps[0], replace(step(2, BALL, "floor"), trajectories=(
+        "more": plan(good.steps[0], replace(step(2, BALL, "planar_floor"), trajectories=(
             line(Motion.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))),
         "plane": replace(good, clearance_plane=26.0),
     }
@@ -144,7 +144,7 @@ def test_a_line_with_other_points_is_the_same_line():
     ways = [line(Motion.CUT, (0, 0, 5), (4, 0, 5), (10, 0, 5), feed=600.0)]
     bent = [line(Motion.CUT, (0, 0, 5), (4, 0.002, 5), (10, 0, 5), feed=600.0)]
     short = [line(Motion.CUT, (0, 0, 5), (10, 0, 5), feed=600.0)]
-    jobs = [plan(step(1, BALL, "floor", trajectories=tuple(w))) for w in (ways, bent, short)]
+    jobs = [plan(step(1, BALL, "planar_floor", trajectories=tuple(w))) for w in (ways, bent, short)]
     read = [read_stepnc(write_stepnc_aim(j)) for j in jobs]
     check_agreement(nc_of(jobs[2]), read[0])
     check_agreement(nc_of(jobs[0]), read[2])
@@ -204,7 +204,7 @@ def test_other_directives_of_strings(given, meant):
 @both
 def test_a_text_set_otherwise_is_the_same_job(write):
     """Comments, blanks, statements over lines or all in one, instances in another order: nothing of it counts."""
-    wanted = plan(step(1, BALL, "zlevel"), step(2, BALL, "zigzag", x=11.0))
+    wanted = plan(step(1, BALL, "waterline"), step(2, BALL, "zigzag", x=11.0))
     plain = write(wanted)
     head, data = plain.split("DATA;\n")
     rows = data.removesuffix("ENDSEC;\nEND-ISO-10303-21;\n").replace(",\n", ",").splitlines()
@@ -228,7 +228,7 @@ def test_what_is_step_nc_is_known_by_its_header():
 
 def test_units_of_the_file_are_heeded():
     """The same job in metres and seconds: mm and minutes come out."""
-    wanted = plan(step(1, BALL, "zlevel"))
+    wanted = plan(step(1, BALL, "waterline"))
     text_ = write_stepnc_aim(wanted)
     seconds = text_.replace("TIME_MEASURE(60.)", "TIME_MEASURE(1.)")
     assert np.nanmax(read_moves(seconds).feed) == pytest.approx(60.0 * np.nanmax(read_moves(text_).feed))
@@ -274,7 +274,7 @@ def pocket(lines):
         if np.abs(p.end[k] - p.start[k]).max() > 0.0:
             ways.append(Trajectory(Motion.RAPID if rapid else Motion.CUT, np.array([p.start[k], p.end[k]]),
                                    0.0 if rapid else float(p.feed[k])))
-    made = replace(step(1, TOOL, "layers", trajectories=tuple(ways)), spindle_rpm=8000.0, feed=400.0)
+    made = replace(step(1, TOOL, "depth_layers", trajectories=tuple(ways)), spindle_rpm=8000.0, feed=400.0)
     return plan(made, tools=(TOOL,), clearance_plane=20.0,
                 stock=StockBox(np.array([-20.5, -15.5, -10.0]), np.array([20.5, 15.5, 0.5])))
 
