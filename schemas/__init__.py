@@ -1,1 +1,4 @@
-"""Wire models: what travels as JSON, every number with its unit in its name."""
+"""Wire models: everything that travels as JSON, each number with its unit in its name.
+
+No rule of planning stands here; only ``service`` imports these models.
+"""

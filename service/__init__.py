@@ -1,1 +1,4 @@
-"""HTTP, command line, jobs and the engine: the only layer that may import all others."""
+"""Command line, HTTP, jobs and the pipeline: the only package that may import all others.
+
+No geometry is computed here.
+"""

@@ -1,1 +1,4 @@
-"""The independent witness: reads an NC program, simulates it, reports. Imports geometry only."""
+"""The independent proof: it reads a program, simulates it and returns findings.
+
+It imports ``geometry`` only, and never the drop kernels that the planner uses.
+"""

@@ -1,1 +1,4 @@
-"""Walls, connections, channels and the machinable zones between cutting planes."""
+"""Walls, connections, channels and the machinable zones between cutting planes.
+
+No path is laid here, and no stock is known.
+"""

@@ -1,39 +1,47 @@
-"""ARCHITECTURE.md names every module there is, and none that is gone."""
+"""ARCHITECTURE.md has one row for each folder there is, and folders stay small enough to see through."""
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "service", "examples")
+from tests.source_tree import PACKAGES, ROOT
+
+LARGEST = 16
+"""Modules a folder holds at most, ``__init__.py`` not counted."""
+OF_ONE_KIND = {"examples/family"}
+"""Folders whose modules are all of one kind may hold more."""
 
 
-def named() -> set[str]:
-    """Modules of the table, as package/path; `folder/` before a bracket stands before the names in it."""
+def folders() -> dict[str, list[Path]]:
+    """Every folder of the product that holds modules, with its modules."""
+    found: dict[str, list[Path]] = {}
+    for path in (p for name in PACKAGES for p in (ROOT / name).rglob("*.py")):
+        if path.name != "__init__.py":
+            found.setdefault(path.parent.relative_to(ROOT).as_posix(), []).append(path)
+    return found
+
+
+def test_the_table_has_one_row_for_each_folder() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text()
-    table = text[text.index("Every module"):text.index("## Invariants")]
-    out: set[str] = set()
-    package = ""
-    for line in table.splitlines():
-        head = re.match(r"\| \*\*(\w+)\*\*", line)
-        package = head.group(1) if head else package
-        if not package or head or not line.startswith("|"):
-            continue
-        folder = before = ""
-        for token in re.findall(r"`[^`]+`|[()]", line.split("|")[1]):
-            if token == "(":
-                folder = before
-            elif token == ")":
-                folder = ""
-            else:
-                before = token.strip("`")
-                out |= {f"{package}/{folder}{before}"} if before.endswith(".py") else set()
-    return out
+    table = text[text.index("Each folder"):text.index("## Invariants")]
+    rows = [m[1].rstrip("/") for m in re.finditer(r"^\| `([\w/]+)` \|", table, re.MULTILINE)]
+    there = set(folders())
+    assert len(there) > 40
+    assert sorted(rows) == sorted(there | {"web", "tests", "benchmarks"})
 
 
-def test_the_table_of_modules_is_that_of_the_tree() -> None:
-    there = {p.relative_to(ROOT).as_posix() for name in PACKAGES for p in (ROOT / name).rglob("*.py")
-             if p.name != "__init__.py"}
-    assert len(there) > 100
-    assert named() == there
+def test_no_folder_is_crowded() -> None:
+    crowded = {name: len(files) for name, files in folders().items() if len(files) > LARGEST and name not in OF_ONE_KIND}
+    assert not crowded, "a folder this full hides a second room"
+
+
+def test_every_room_says_what_lives_there_and_what_must_not() -> None:
+    silent = []
+    for name in folders():
+        path = ROOT / name / "__init__.py"
+        text = ast.get_docstring(ast.parse(path.read_text())) if path.is_file() else None
+        if not name.startswith("examples") and "migrations" not in name and not (text and len(text) > 30):
+            silent.append(name)
+    assert not silent
