@@ -103,10 +103,13 @@ demo: $(STAMP) page
 serve: $(STAMP) page
 	$(BIN)/zonemill serve --port $(PORT)
 
+# Development installs cadquery, whose kernel wheel has the same files as that of the product: no lock holds both.
 LOCK_FLAGS = --universal --python-version 3.11 --no-header --no-emit-index-url --no-annotate -q
+DEV_LOCK_FLAGS = $(LOCK_FLAGS) --group dev --no-emit-package cadquery-ocp-novtk
 lock:
-	uv pip compile pyproject.toml --extra dev $(LOCK_FLAGS) -o requirements.lock
-	uv pip compile pyproject.toml --extra dev --extra bench $(LOCK_FLAGS) -c requirements.lock -o requirements-bench.lock
+	uv pip compile pyproject.toml $(DEV_LOCK_FLAGS) -o requirements.lock
+	uv pip compile pyproject.toml $(DEV_LOCK_FLAGS) --group bench -c requirements.lock -o requirements-bench.lock
+	uv pip compile pyproject.toml $(LOCK_FLAGS) --extra cluster -c requirements.lock -o requirements-runtime.lock
 
 third-party: $(STAMP)
 	$(BIN)/python .ci/third_party.py requirements.lock web/package-lock.json
