@@ -8,6 +8,10 @@ from typing import Any
 
 import pytest
 
+from tests.no_skip import pytest_make_collect_report, pytest_runtest_makereport
+
+__all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]  # hooks
+
 SHARED_PARTS = Path(__file__).resolve().parents[2] / "shared" / "parts"
 
 
@@ -22,7 +26,6 @@ def shared_parts() -> Path:
 @pytest.fixture(scope="session")
 def demo_files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The demo part and its setup, written once per run: (step_path, setup_path)."""
-    pytest.importorskip("cadquery")
     from examples.demo import write_demo
 
     return write_demo(tmp_path_factory.mktemp("demo"))
