@@ -11,7 +11,7 @@ PORT ?= 8000
 # uv installs into a given interpreter; plain pip is called by the interpreter itself.
 INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 
-.PHONY: setup hooks peers check types test test-cov test-slow soak clients audit golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak clients audit golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -71,6 +71,23 @@ test-cov: $(STAMP) page
 
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
+
+# The tests on the runtime lock, in an environment without cadquery; make test-runtime RUNTIME_TESTS=tests runs every
+# everyday test that draws no part itself. The development environment writes the parts beforehand.
+RUNTIME := .venv-runtime
+RUNTIME_TESTS ?= tests/runtime
+test-runtime: $(STAMP) $(RUNTIME)/.installed
+	$(BIN)/python -m tests.runtime.write_parts build/runtime-parts
+	ZONEMILL_PARTS=$(CURDIR)/build/runtime-parts ZONEMILL_NO_SKIP=cadquery \
+	$(RUNTIME)/bin/python -m pytest -q -m "not slow and not soak" $(RUNTIME_TESTS)
+
+$(RUNTIME)/.installed: requirements-runtime.lock requirements.lock pyproject.toml
+	$(PYTHON) -m venv --clear $(RUNTIME)
+	$(RUNTIME)/bin/python -m pip install --progress-bar off --no-deps -r requirements-runtime.lock
+	$(RUNTIME)/bin/python -m pip install -q --no-deps -e .
+	$(RUNTIME)/bin/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']['test'], sep='\n')" >$(RUNTIME)/test-tools
+	$(RUNTIME)/bin/python -m pip install --progress-bar off -r $(RUNTIME)/test-tools -c requirements.lock
+	@touch $@
 
 # What takes longer than CI waits; each test prints its figures. K chooses among them, SOAK_COUNT=50, FAULT_REPEAT=5 and
 # LOAD_MINUTES=2 are for a quick look.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from examples import demo
-from geometry.step import read_part
+from geometry.step_import.reader import read_part
 from tests.source_tree import ROOT
 
 DRAWN = {"demo": demo.draw_demo, "small": demo.draw_small}

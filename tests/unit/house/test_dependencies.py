@@ -74,7 +74,7 @@ def test_the_runtime_lock_has_the_versions_of_the_development_lock():
 
 def test_the_runtime_lock_holds_nothing_of_development():
     heavy = {"cadquery", "vtk", "casadi", "trame", "matplotlib", "nlopt", "ezdxf", "s3fs", "aiohttp"}
-    tools = declared(PROJECT["dependency-groups"]["dev"]) - {"psycopg"}
+    tools = {name for group in ("dev", "test") for name in declared(PROJECT["dependency-groups"][group])} - {"psycopg"}
     assert {"pytest", "mypy", "ruff", "schemathesis"} <= tools
     assert not (heavy | tools) & set(locked("requirements-runtime.lock"))
 
