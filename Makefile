@@ -8,15 +8,18 @@ BENCH_STAMP := $(VENV)/.bench-installed
 UV := $(shell uv --version >/dev/null 2>&1 && echo uv)
 OUT ?= out/demo
 PORT ?= 8000
-# uv installs into a given interpreter; plain pip is called by the interpreter itself.
-INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
+# uv installs into a given interpreter; plain pip is called by the interpreter itself. Both without bars: SHOW makes a
+# line of their output, so that no stretch over 5 s is silent.
+PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
+INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
+SHOW := $(PYTHON) .ci/progress.py
 
 .PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak clients audit golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
 NODE := $(shell npm --version >/dev/null 2>&1 && node -e 'const [a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' >/dev/null 2>&1 && echo yes)
-NPM = $(if $(NODE),npm,PATH="$(CURDIR)/$(BIN):$$PATH" npm)
+PAGE_PATH = $(if $(NODE),,PATH="$(CURDIR)/$(BIN):$$PATH")
 
 .PHONY: web page
 
@@ -24,16 +27,16 @@ setup: $(STAMP) hooks page
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; try make PYTHON=python3.12 setup"; exit 1; }
-	$(if $(UV),uv venv -q --python $(PYTHON) $(VENV),$(PYTHON) -m venv $(VENV))
+	@$(SHOW) "making $(VENV)" $(if $(UV),uv venv -q --python $(PYTHON) $(VENV),$(PYTHON) -m venv $(VENV))
 
 $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
-	$(INSTALL) --no-deps -r requirements.lock
-	$(INSTALL) --no-deps -e .
+	@$(SHOW) --of requirements.lock "installing requirements.lock (about 2 GB)" $(INSTALL) --no-deps -r requirements.lock
+	@$(SHOW) "installing zonemill" $(INSTALL) --no-deps -e .
 	$(BIN)/zonemill warm
 	@touch $@
 
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
-	$(INSTALL) --no-deps -r requirements-bench.lock
+	@$(SHOW) --of requirements-bench.lock "installing requirements-bench.lock" $(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
 
 # The check of commit messages, where this is a git clone that has no hooks of its own.
@@ -46,9 +49,9 @@ peers: $(BENCH_STAMP)
 web: $(PAGE)
 
 $(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requirements-web.lock | $(BIN)/python
-	$(if $(NODE),,$(INSTALL) --no-deps -r requirements-web.lock)
-	cd web && $(NPM) ci --loglevel=error
-	cd web && $(NPM) run --silent build
+	$(if $(NODE),,@$(SHOW) "installing Node for the page" $(INSTALL) --no-deps -r requirements-web.lock)
+	@$(PAGE_PATH) $(SHOW) "installing the packages of the page" npm --prefix web ci --loglevel=http
+	@$(PAGE_PATH) $(SHOW) "building the page" npm --prefix web run build
 	@touch $@
 
 # Whoever cannot get the packages of the page has everything but the page, and is told.
@@ -82,11 +85,13 @@ test-runtime: $(STAMP) $(RUNTIME)/.installed
 	$(RUNTIME)/bin/python -m pytest -q -m "not slow and not soak" $(RUNTIME_TESTS)
 
 $(RUNTIME)/.installed: requirements-runtime.lock requirements.lock pyproject.toml
-	$(PYTHON) -m venv --clear $(RUNTIME)
-	$(RUNTIME)/bin/python -m pip install --progress-bar off --no-deps -r requirements-runtime.lock
-	$(RUNTIME)/bin/python -m pip install -q --no-deps -e .
-	$(RUNTIME)/bin/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']['test'], sep='\n')" >$(RUNTIME)/test-tools
-	$(RUNTIME)/bin/python -m pip install --progress-bar off -r $(RUNTIME)/test-tools -c requirements.lock
+	@$(SHOW) "making $(RUNTIME)" $(PYTHON) -m venv --clear $(RUNTIME)
+	@$(SHOW) --of requirements-runtime.lock "installing requirements-runtime.lock (about 0.9 GB)" \
+	  $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) --no-deps -r requirements-runtime.lock
+	@$(SHOW) "installing zonemill" $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) --no-deps -e .
+	@$(RUNTIME)/bin/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']['test'], sep='\n')" >$(RUNTIME)/test-tools
+	@$(SHOW) "installing the tools of tests" \
+	  $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) -r $(RUNTIME)/test-tools -c requirements.lock
 	@touch $@
 
 # What takes longer than CI waits; each test prints its figures. K chooses among them, SOAK_COUNT=50, FAULT_REPEAT=5 and
