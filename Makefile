@@ -14,7 +14,7 @@ PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
 INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
 SHOW := $(PYTHON) .ci/progress.py
 
-.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak clients audit golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak image clients audit golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -98,6 +98,10 @@ $(RUNTIME)/.installed: requirements-runtime.lock requirements.lock pyproject.tom
 # LOAD_MINUTES=2 are for a quick look.
 soak: $(STAMP)
 	$(BIN)/python -m pytest -q -s -m soak $(if $(K),-k "$(K)")
+
+# The container image where an engine answers; elsewhere the stages of the Dockerfile in folders below build/image.
+image:
+	@if docker info >/dev/null 2>&1; then docker build --tag zonemill:local .; else $(PYTHON) .ci/image_stages.py build/image; fi
 
 # Clients in four languages: generated, compiled, each runs a whole job; skips, with the reason, what is not installed.
 clients: $(STAMP)
