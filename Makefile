@@ -138,7 +138,7 @@ lock:
 	uv pip compile pyproject.toml $(LOCK_FLAGS) --extra cluster -c requirements.lock -o requirements-runtime.lock
 
 third-party: $(STAMP)
-	$(BIN)/python .ci/third_party.py requirements.lock web/package-lock.json
+	$(BIN)/python .ci/third_party.py requirements-runtime.lock requirements.lock web/package-lock.json
 
 clean:
 	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .coverage
