@@ -51,7 +51,7 @@ def demo_truth() -> dict[str, Any]:
     """What the generator knows about the demo part: drawn anew, or as written beforehand."""
     if WRITTEN_PARTS:
         return dict(json.loads(Path(WRITTEN_PARTS, "demo-0.truth.json").read_text()))
-    from examples.family import make_part
+    from examples.family.recipes import make_part
 
     return make_part(0, "demo").truth
 

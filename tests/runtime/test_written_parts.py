@@ -34,7 +34,7 @@ def test_this_is_the_environment_of_the_runtime_lock():
 
 def test_every_module_of_the_product_can_be_imported():
     names = [n.removesuffix(".__init__") for n, _ in modules() if not n.endswith("__main__")]
-    names = [n for n in names if not n.startswith(("examples.clients", "service.migrations"))]
+    names = [n for n in names if not n.startswith("examples.clients") and ".migrations" not in n]
     assert len(names) > 300
     for name in names:
         importlib.import_module(name)

@@ -42,7 +42,7 @@ def as_planned(folder: Path) -> dict[str, str]:
 
 def write(folder: Path) -> None:
     """Draw every part into a folder and keep the digests beside them."""
-    from examples.family import make_part
+    from examples.family.recipes import make_part
     from tests import decomposition_shapes
     from tests.step_files import write_step
 
