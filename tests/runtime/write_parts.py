@@ -31,8 +31,8 @@ def as_read(step: Path) -> dict[str, str]:
 def as_planned(folder: Path) -> dict[str, str]:
     """Digests of every file of the small part, planned and proved into a folder."""
     from examples.demo import write_small
-    from service.pipeline import plan
     from service.from_wire import read_setup
+    from service.pipeline import plan
 
     step, setup = write_small(folder)
     shutil.rmtree(folder / "out", ignore_errors=True)
