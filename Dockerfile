@@ -10,16 +10,16 @@ RUN mkdir /build/service && npm run build
 # One image for api, worker and scheduler. The numba kernels are compiled while it is built, so a container starts warm.
 FROM python:3.11-slim
 
-# OpenCASCADE's wheels want these two even where nothing is drawn.
+# The OpenCASCADE wheel links these libraries even where nothing is drawn.
 RUN apt-get update \
-    && apt-get install --yes --no-install-recommends libgl1 libxrender1 \
+    && apt-get install --yes --no-install-recommends libexpat1 libgl1 libx11-6 \
     && rm -rf /var/lib/apt/lists/*
 
 ENV PYTHONUNBUFFERED=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /app
 
-COPY requirements.lock ./
-RUN pip install --requirement requirements.lock "psycopg[binary]>=3.2"
+COPY requirements-runtime.lock ./
+RUN pip install --no-deps --requirement requirements-runtime.lock
 
 COPY pyproject.toml README.md LICENSE ./
 COPY geometry geometry

@@ -8,15 +8,18 @@ BENCH_STAMP := $(VENV)/.bench-installed
 UV := $(shell uv --version >/dev/null 2>&1 && echo uv)
 OUT ?= out/demo
 PORT ?= 8000
-# uv installs into a given interpreter; plain pip is called by the interpreter itself.
-INSTALL = $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
+# uv installs into a given interpreter; plain pip is called by the interpreter itself. Both without bars: SHOW makes a
+# line of their output, so that no stretch over 5 s is silent.
+PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
+INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
+SHOW := $(PYTHON) .ci/progress.py
 
-.PHONY: setup hooks peers check types test test-cov test-slow soak clients audit golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak image clients audit golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
 NODE := $(shell npm --version >/dev/null 2>&1 && node -e 'const [a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' >/dev/null 2>&1 && echo yes)
-NPM = $(if $(NODE),npm,PATH="$(CURDIR)/$(BIN):$$PATH" npm)
+PAGE_PATH = $(if $(NODE),,PATH="$(CURDIR)/$(BIN):$$PATH")
 
 .PHONY: web page
 
@@ -24,16 +27,16 @@ setup: $(STAMP) hooks page
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; try make PYTHON=python3.12 setup"; exit 1; }
-	$(if $(UV),uv venv -q --python $(PYTHON) $(VENV),$(PYTHON) -m venv $(VENV))
+	@$(SHOW) "making $(VENV)" $(if $(UV),uv venv -q --python $(PYTHON) $(VENV),$(PYTHON) -m venv $(VENV))
 
 $(STAMP): requirements.lock pyproject.toml | $(BIN)/python
-	$(INSTALL) --no-deps -r requirements.lock
-	$(INSTALL) --no-deps -e .
+	@$(SHOW) --of requirements.lock "installing requirements.lock (about 2 GB)" $(INSTALL) --no-deps -r requirements.lock
+	@$(SHOW) "installing zonemill" $(INSTALL) --no-deps -e .
 	$(BIN)/zonemill warm
 	@touch $@
 
 $(BENCH_STAMP): requirements-bench.lock $(STAMP)
-	$(INSTALL) --no-deps -r requirements-bench.lock
+	@$(SHOW) --of requirements-bench.lock "installing requirements-bench.lock" $(INSTALL) --no-deps -r requirements-bench.lock
 	@touch $@
 
 # The check of commit messages, where this is a git clone that has no hooks of its own.
@@ -46,9 +49,9 @@ peers: $(BENCH_STAMP)
 web: $(PAGE)
 
 $(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requirements-web.lock | $(BIN)/python
-	$(if $(NODE),,$(INSTALL) --no-deps -r requirements-web.lock)
-	cd web && $(NPM) ci --loglevel=error
-	cd web && $(NPM) run --silent build
+	$(if $(NODE),,@$(SHOW) "installing Node for the page" $(INSTALL) --no-deps -r requirements-web.lock)
+	@$(PAGE_PATH) $(SHOW) "installing the packages of the page" npm --prefix web ci --loglevel=http
+	@$(PAGE_PATH) $(SHOW) "building the page" npm --prefix web run build
 	@touch $@
 
 # Whoever cannot get the packages of the page has everything but the page, and is told.
@@ -72,10 +75,33 @@ test-cov: $(STAMP) page
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
 
+# The tests on the runtime lock, in an environment without cadquery; make test-runtime RUNTIME_TESTS=tests runs every
+# everyday test that draws no part itself. The development environment writes the parts beforehand.
+RUNTIME := .venv-runtime
+RUNTIME_TESTS ?= tests/runtime
+test-runtime: $(STAMP) $(RUNTIME)/.installed
+	$(BIN)/python -m tests.runtime.write_parts build/runtime-parts
+	ZONEMILL_PARTS=$(CURDIR)/build/runtime-parts ZONEMILL_NO_SKIP=cadquery \
+	$(RUNTIME)/bin/python -m pytest -q -m "not slow and not soak" $(RUNTIME_TESTS)
+
+$(RUNTIME)/.installed: requirements-runtime.lock requirements.lock pyproject.toml
+	@$(SHOW) "making $(RUNTIME)" $(PYTHON) -m venv --clear $(RUNTIME)
+	@$(SHOW) --of requirements-runtime.lock "installing requirements-runtime.lock (about 0.9 GB)" \
+	  $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) --no-deps -r requirements-runtime.lock
+	@$(SHOW) "installing zonemill" $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) --no-deps -e .
+	@$(RUNTIME)/bin/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']['test'], sep='\n')" >$(RUNTIME)/test-tools
+	@$(SHOW) "installing the tools of tests" \
+	  $(RUNTIME)/bin/python -m pip $(PIP_OPTIONS) -r $(RUNTIME)/test-tools -c requirements.lock
+	@touch $@
+
 # What takes longer than CI waits; each test prints its figures. K chooses among them, SOAK_COUNT=50, FAULT_REPEAT=5 and
 # LOAD_MINUTES=2 are for a quick look.
 soak: $(STAMP)
 	$(BIN)/python -m pytest -q -s -m soak $(if $(K),-k "$(K)")
+
+# The container image where an engine answers; elsewhere the stages of the Dockerfile in folders below build/image.
+image:
+	@if docker info >/dev/null 2>&1; then docker build --tag zonemill:local .; else $(PYTHON) .ci/image_stages.py build/image; fi
 
 # Clients in four languages: generated, compiled, each runs a whole job; skips, with the reason, what is not installed.
 clients: $(STAMP)
@@ -103,13 +129,16 @@ demo: $(STAMP) page
 serve: $(STAMP) page
 	$(BIN)/zonemill serve --port $(PORT)
 
+# Development installs cadquery, whose kernel wheel has the same files as that of the product: no lock holds both.
 LOCK_FLAGS = --universal --python-version 3.11 --no-header --no-emit-index-url --no-annotate -q
+DEV_LOCK_FLAGS = $(LOCK_FLAGS) --group dev --no-emit-package cadquery-ocp-novtk
 lock:
-	uv pip compile pyproject.toml --extra dev $(LOCK_FLAGS) -o requirements.lock
-	uv pip compile pyproject.toml --extra dev --extra bench $(LOCK_FLAGS) -c requirements.lock -o requirements-bench.lock
+	uv pip compile pyproject.toml $(DEV_LOCK_FLAGS) -o requirements.lock
+	uv pip compile pyproject.toml $(DEV_LOCK_FLAGS) --group bench -c requirements.lock -o requirements-bench.lock
+	uv pip compile pyproject.toml $(LOCK_FLAGS) --extra cluster -c requirements.lock -o requirements-runtime.lock
 
 third-party: $(STAMP)
-	$(BIN)/python .ci/third_party.py requirements.lock web/package-lock.json
+	$(BIN)/python .ci/third_party.py requirements-runtime.lock requirements.lock web/package-lock.json
 
 clean:
 	rm -rf service/page web/node_modules web/src/wire.ts build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .coverage

@@ -207,7 +207,8 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
     ------
     InputError
         There is no such recipe (``unknown_recipe``), it lets one choose nothing of the kind (``not_of_this_recipe``),
-        or no draw kept the rules of the family (``impossible_layout``).
+        no draw kept the rules of the family (``impossible_layout``), or cadquery is not installed
+        (``generator_not_installed``).
     """
     import inspect
 
@@ -224,6 +225,12 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
                          subjects=tuple(wanted), remedy="leave --walls and --connections out, or take recipe mixed")
     try:
         return make_part(seed, recipe, **wanted).write(out, reach=reach)
+    except ModuleNotFoundError as error:
+        if error.name != "cadquery":
+            raise
+        raise InputError("the part family needs cadquery, which is not installed", code="generator_not_installed",
+                         subjects=("cadquery",), remedy="run it in the development environment (make setup); the "
+                         "runtime environment cannot hold cadquery") from None
     except LayoutError as error:
         raise InputError(f"no part for recipe {recipe} and seed {seed}: {error}", code="impossible_layout",
                          remedy="take another seed, or fewer walls and connections") from None

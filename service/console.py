@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
 from typing import Any
 
@@ -11,6 +12,8 @@ from geometry.errors import CamError
 from service.errors import mapping_of, problem_document
 
 MEASURED_SHOWN = 20
+LIVE_EVERY_S, LINE_EVERY_S = 1.0, 5.0  # between two lines of one stage, on a terminal and elsewhere
+REWRITE_S = 0.25  # between two rewrites of a line on a terminal
 
 
 def say(text: str) -> None:
@@ -19,29 +22,48 @@ def say(text: str) -> None:
 
 
 class Progress:
-    """Progress lines on stderr: every new stage with its time, on a terminal also the percentage."""
+    """Progress lines on stderr: every new stage with its time and percentage, and again while the stage lasts.
 
-    def __init__(self) -> None:
-        self.started, self.stage, self.shown = time.monotonic(), "", 0.0
+    every_s : s between two lines of one stage; by default 1 on a terminal, where the line is rewritten, and 5 elsewhere
+    """
+
+    def __init__(self, every_s: float | None = None) -> None:
+        self.started, self.stage, self.fraction, self.shown = time.monotonic(), "", 0.0, 0.0
         self.live = sys.stderr.isatty()
+        self.every = every_s if every_s is not None else LIVE_EVERY_S if self.live else LINE_EVERY_S
+        self._lock, self._closed = threading.Lock(), threading.Event()
+        self._ticker: threading.Thread | None = None
 
     def __call__(self, stage: str, fraction: float) -> None:
-        now = time.monotonic()
-        if stage != self.stage:
-            self.stage = stage
-            self._print(f"{now - self.started:7.1f} s  {100 * fraction:3.0f} %  {stage}", new=True)
-        elif self.live and now - self.shown > 0.25:
-            self._print(f"{now - self.started:7.1f} s  {100 * fraction:3.0f} %  {stage}", new=False)
+        with self._lock:
+            new, self.stage, self.fraction = stage != self.stage, stage, fraction
+            if new or (self.live and time.monotonic() - self.shown > REWRITE_S):
+                self._print(new=new)
+        if self._ticker is None:
+            self._ticker = threading.Thread(target=self._tick, name="progress", daemon=True)
+            self._ticker.start()
 
-    def _print(self, text: str, *, new: bool) -> None:
+    def _tick(self) -> None:
+        while not self._closed.wait(self.every / 4):
+            with self._lock:
+                if time.monotonic() - self.shown >= self.every:
+                    self._print(new=False)
+
+    def _print(self, *, new: bool) -> None:
         self.shown = time.monotonic()
+        text = f"{self.shown - self.started:7.1f} s  {100 * self.fraction:3.0f} %  {self.stage}"
         if self.live:
             print(("\n" if new else "") + "\r\x1b[K" + text, end="", file=sys.stderr, flush=True)
         else:
             say(text)
 
     def close(self) -> None:
-        """End the line."""
+        """End the line; later calls do nothing."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        if self._ticker is not None:
+            self._ticker.join()
         if self.live and self.stage:
             say("")
 

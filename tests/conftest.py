@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.no_skip import pytest_make_collect_report, pytest_runtest_makereport
+
+__all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]  # hooks
+
+HERE = Path(__file__).resolve()
+WRITTEN_PARTS = os.environ.get("ZONEMILL_PARTS")  # set where the environment has no cadquery (make test-runtime)
+DRAWS = 'importorskip("cadquery")'
 SHARED_PARTS = Path(__file__).resolve().parents[2] / "shared" / "parts"
 
 
@@ -19,10 +28,37 @@ def shared_parts() -> Path:
     return SHARED_PARTS
 
 
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """With parts written beforehand: no module that draws. Without: none of ``tests/runtime``, which compares them."""
+    if collection_path.suffix != ".py":
+        return None
+    if WRITTEN_PARTS:
+        return True if DRAWS in collection_path.read_text(encoding="utf-8") and collection_path != HERE else None
+    return True if collection_path.parent == HERE.parent / "runtime" else None
+
+
+def pytest_report_header() -> str | None:
+    """How many modules of tests are left out because they draw their parts."""
+    if not WRITTEN_PARTS:
+        return None
+    modules = list(HERE.parent.rglob("test_*.py"))
+    draw = sum(DRAWS in p.read_text(encoding="utf-8") for p in modules)
+    return f"runtime environment: {draw} of {len(modules)} modules of tests draw parts with cadquery and are left out"
+
+
+@pytest.fixture(scope="session")
+def demo_truth() -> dict[str, Any]:
+    """What the generator knows about the demo part: drawn anew, or as written beforehand."""
+    if WRITTEN_PARTS:
+        return dict(json.loads(Path(WRITTEN_PARTS, "demo-0.truth.json").read_text()))
+    from examples.family.recipes import make_part
+
+    return make_part(0, "demo").truth
+
+
 @pytest.fixture(scope="session")
 def demo_files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The demo part and its setup, written once per run: (step_path, setup_path)."""
-    pytest.importorskip("cadquery")
     from examples.demo import write_demo
 
     return write_demo(tmp_path_factory.mktemp("demo"))

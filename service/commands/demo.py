@@ -33,6 +33,7 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
         step, setup = (Path(p) for p in write_demo(Path(folder, "sample")))
         settings = settings_with({"host": "127.0.0.1", "port": 0, "data_dir": Path(folder, "data"), "auth": "auto"})
         configure("warning", settings.log_format)
+        say("starting the service")
         with background(settings, chain) as url:
             say(f"serving on {url}")
             job = _post(url, step, setup)
@@ -105,10 +106,13 @@ def _post(url: str, step: Path, setup: Path) -> dict[str, Any]:
 
 def _follow(url: str, job: dict[str, Any]) -> dict[str, Any]:
     progress = Progress()
-    with _open(urllib.request.Request(url + job["links"]["events"])) as stream:
-        for event in _data_lines(stream):
-            progress(event["stage"], event["progress"])
-    progress.close()
+    progress(job["stage"], job["progress"])
+    try:
+        with _open(urllib.request.Request(url + job["links"]["events"])) as stream:
+            for event in _data_lines(stream):
+                progress(event["stage"], event["progress"])
+    finally:
+        progress.close()
     with _open(urllib.request.Request(url + job["links"]["self"])) as answer:
         return dict(json.loads(answer.read()))
 

@@ -46,7 +46,8 @@ from zones.reach.access_view import View
 
 log = structlog.get_logger(__name__)
 
-COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", "cadquery-ocp")  # whose versions a plan hangs on
+KERNEL_WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")  # an environment holds one of them
+COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", *KERNEL_WHEELS)  # whose versions a plan depends on
 PLAN, ACTS, PROOF = "plan", "acts", "proof"
 ACTS_EVERY_S = 15.0  # how often a plan under way is kept at most
 ACTS_PAUSE = 60.0  # and not for so many times as long as that took the last time

@@ -3,12 +3,11 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import yaml
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.source_tree import PACKAGES, ROOT
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +64,45 @@ def test_no_password_or_token_is_written_down(compose):
                 assert value.startswith("${") and ":?" in value
 
 
-def test_the_image_runs_as_nobody_in_particular_and_copies_what_is_there():
-    lines = (ROOT / "Dockerfile").read_text().splitlines()
-    last = max(k for k, line in enumerate(lines) if line.startswith("FROM "))
-    assert lines[last].startswith("FROM python:3.11-slim")
-    lines = lines[last:]  # what comes before builds the page
-    assert [line for line in lines if line.startswith("USER ")] == ["USER zonemill"]
-    for line in (x for x in lines if x.startswith("COPY ") and "--from" not in x):
-        for source in line.split()[1:-1]:
-            if source not in ("requirements.lock", "README.md"):
-                assert (ROOT / source).exists(), source
+def dockerfile() -> list[list[str]]:
+    """Lines of the Dockerfile, continued ones joined, one list a stage."""
+    stages: list[list[str]] = []
+    for line in (ROOT / "Dockerfile").read_text().replace("\\\n", " ").splitlines():
+        if line.startswith("FROM "):
+            stages.append([])
+        if line and not line.startswith("#"):
+            stages[-1].append(" ".join(line.split()))
+    return stages
+
+
+def copied(stage: list[str]) -> list[str]:
+    """What a stage copies out of the checkout."""
+    return [source for line in stage if line.startswith("COPY ") and "--from" not in line
+            for source in line.split()[1:-1]]
+
+
+def test_the_image_runs_as_a_user_without_rights():
+    last = dockerfile()[-1]
+    assert last[0].startswith("FROM python:3.11-slim")
+    assert [line for line in last if line.startswith("USER ")] == ["USER zonemill"]
+
+
+def test_the_image_copies_files_that_exist_and_that_docker_is_given():
+    left_out = [line.rstrip("/") for line in (ROOT / ".dockerignore").read_text().splitlines()]
+    sources = [source for stage in dockerfile() for source in copied(stage)]
+    assert len(sources) > 12
+    for source in sources:
+        assert (ROOT / source).exists(), f"the Dockerfile copies {source}, which does not exist"
+        assert source not in left_out and source.split("/")[0] not in left_out, source
+
+
+def test_the_image_holds_every_package_of_the_product():
+    assert set(PACKAGES) <= set(copied(dockerfile()[-1]))
+
+
+def test_the_image_installs_the_runtime_lock_and_nothing_beside_it():
+    last = dockerfile()[-1]
+    installs = [line for line in last if line.startswith("RUN pip install")]
+    assert installs == ["RUN pip install --no-deps --requirement requirements-runtime.lock",
+                        "RUN pip install --no-deps --editable ."]
+    assert {s for s in copied(last) if s.endswith(".lock")} == {"requirements-runtime.lock"}

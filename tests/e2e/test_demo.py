@@ -43,10 +43,8 @@ def test_it_is_proved_without_a_finding(report):
     assert report["findings"] == [] and report["finding_counts"] == {}
 
 
-def test_its_walls_and_connections_are_the_generators(report):
-    from examples.family.recipes import make_part
-
-    truth = make_part(0, "demo").truth
+def test_its_walls_and_connections_are_the_generators(report, demo_truth):
+    truth = demo_truth
     assert len(report["walls"]) == len(truth["walls"])
     assert len(report["connections"]) == len(truth["connections"])
     wanted = sorted(c["gap_min"] for c in truth["channels"])

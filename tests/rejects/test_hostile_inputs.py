@@ -25,7 +25,6 @@ SETUP = {"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 3, "flute_length_
 
 @pytest.fixture(scope="session")
 def small(tmp_path_factory):
-    pytest.importorskip("cadquery")
     from examples.demo import write_small
 
     return write_small(tmp_path_factory.mktemp("small"))[0].read_bytes()

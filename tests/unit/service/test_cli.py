@@ -210,6 +210,12 @@ def test_family_says_what_it_cannot_draw(drawn, tmp_path, args, code):
     assert got.exit_code == 2 and code in got.stderr and got.stdout == ""
 
 
+def test_family_names_the_package_it_lacks(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cadquery", None)  # as if it were not installed
+    got = call("family", "--recipe", "demo", "--out", tmp_path / "parts")
+    assert got.exit_code == 2 and "generator_not_installed" in got.stderr and "cadquery" in got.stderr
+
+
 def test_what_a_verification_found_is_said_in_words():
     from service.console import verification_summary
 
