@@ -45,7 +45,7 @@ peers: $(BENCH_STAMP)
 
 web: $(PAGE)
 
-$(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requirements-web.lock | $(BIN)/python
+$(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/* web/src/*/*) openapi.yaml requirements-web.lock | $(BIN)/python
 	$(if $(NODE),,$(INSTALL) --no-deps -r requirements-web.lock)
 	cd web && $(NPM) ci --loglevel=error
 	cd web && $(NPM) run --silent build

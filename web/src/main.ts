@@ -1,7 +1,7 @@
 // One document for every path of the page; the path says what is shown.
 import "./style.css";
-import { jobPage } from "./jobpage";
-import { listPage } from "./listpage";
+import { jobPage } from "./pages/job-page";
+import { listPage } from "./pages/job-list";
 
 const app = document.getElementById("app")!;
 const job = /^\/v1\/jobs\/([^/]+)\/view\/?$/.exec(location.pathname);

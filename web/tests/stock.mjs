@@ -12,10 +12,10 @@ const module_ = async (name, ...replaced) => {
   const { outputText } = ts.transpileModule(text, { compilerOptions: { target: "ES2022", module: "ESNext", verbatimModuleSyntax: true } });
   return `data:text/javascript;base64,${Buffer.from(outputText).toString("base64")}`;
 };
-const field = await module_("field.ts");
+const field = await module_("scene/distance-field.ts");
 const { noNet, surface } = await import(field);
-const { States } = await import(await module_("states.ts", ['"./field"', JSON.stringify(field)]));
-const { readView } = await import(await module_("viewfile.ts"));
+const { States } = await import(await module_("scene/stock-states.ts", ['"./distance-field"', JSON.stringify(field)]));
+const { readView } = await import(await module_("shared/view-file.ts"));
 
 const [file, ...seconds] = process.argv.slice(2);
 const ways = new Map();

@@ -1,5 +1,5 @@
 // How one looks at a job, as it stands in the address.
-import type { Mode } from "./scene";
+import type { Mode } from "../scene/scene";
 
 export interface Look {
   c?: number[];

@@ -1,8 +1,8 @@
 // A dry check has no picture: what the tools reach, what stays and why, and the tools to add, as tables.
-import { get, type Job, type JobFiles } from "./api";
-import { el, figure } from "./dom";
-import type { ViewRest, ViewZone } from "./viewfile";
-import { fileList, needs, slender } from "./words";
+import { get, type Job, type JobFiles } from "../shared/api";
+import { el, figure } from "../shared/dom";
+import type { ViewRest, ViewZone } from "../shared/view-file";
+import { fileList, needs, slender } from "../shared/wording";
 
 interface Zones {
   machinable_area_mm2?: number;

@@ -1,6 +1,6 @@
 // The stock at any second: the verifier's state before it, cut further by the tool along the way that is drawn.
-import { sweep, type Cutter, type Grid } from "./field";
-import type { ChunkEntry, Table, ToolShape } from "./viewfile";
+import { sweep, type Cutter, type Grid } from "./distance-field";
+import type { ChunkEntry, Table, ToolShape } from "../shared/view-file";
 
 /** Rows of a way: places in the setup frame, seconds, kinds (2: a cut leads here), axes where they change. */
 export interface Course {

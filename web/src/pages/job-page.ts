@@ -1,11 +1,11 @@
 // One job: progress while it runs, then the picture with all that belongs to it.
-import { FINAL, Refusal, ask, follow, get, type Job, type JobFiles } from "./api";
-import { el, fill } from "./dom";
-import { dryCheck } from "./drycheck";
-import { head, showRefusal } from "./frame";
-import { JobView } from "./jobview";
-import { BrokenView, readView } from "./viewfile";
-import { STATE_WORDS, fileList, stateBadge } from "./words";
+import { FINAL, Refusal, ask, follow, get, type Job, type JobFiles } from "../shared/api";
+import { el, fill } from "../shared/dom";
+import { dryCheck } from "./dry-check";
+import { head, showRefusal } from "../shared/page-frame";
+import { JobView } from "../job-view/job-view";
+import { BrokenView, readView } from "../shared/view-file";
+import { STATE_WORDS, fileList, stateBadge } from "../shared/wording";
 
 const PICTURES = [["preview.png", "The part with its zones, and the tool paths"], ["deviation.png", "What the proof measured on the part"]] as const;
 

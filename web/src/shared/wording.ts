@@ -1,7 +1,7 @@
 // What is said of jobs, findings and what stays.
 import { ask, type JobFiles } from "./api";
 import { el, percent } from "./dom";
-import type { ViewFinding, ViewHead, ViewRest } from "./viewfile";
+import type { ViewFinding, ViewHead, ViewRest } from "./view-file";
 
 export const STATE_WORDS: Record<string, string> = {
   queued: "waiting", running: "running", proved: "proved", unproved: "not proved", done: "done", failed: "failed",

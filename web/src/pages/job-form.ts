@@ -1,7 +1,7 @@
 // A part and a setup without JSON: the fields most jobs need, a table of tools, and the rest as text for who wants it.
-import { Refusal, ask, type Job, type Setup, type Tool } from "./api";
-import { add, el, field, fill } from "./dom";
-import { keep, kept } from "./kept";
+import { Refusal, ask, type Job, type Setup, type Tool } from "../shared/api";
+import { add, el, field, fill } from "../shared/dom";
+import { keep, kept } from "../shared/browser-storage";
 
 type ToolRow = Partial<Record<keyof Tool, unknown>> & { id: string; kind: string; diameter_mm: number; holder?: unknown };
 

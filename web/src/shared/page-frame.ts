@@ -1,7 +1,7 @@
 // What every page has: its head, its theme, the field for a key, and words for what was refused.
 import { Refusal, hasKey, useKey } from "./api";
 import { el, fill } from "./dom";
-import { keep, kept } from "./kept";
+import { keep, kept } from "./browser-storage";
 
 export type Theme = "auto" | "light" | "dark";
 const THEME = "zonemill-theme";

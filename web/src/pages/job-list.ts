@@ -1,9 +1,9 @@
 // All jobs with their progress as it goes, and the form for a new one.
-import { FINAL, Refusal, ask, follow, get, type Job, type JobPage } from "./api";
-import { el, fill } from "./dom";
-import { head, showRefusal } from "./frame";
-import { jobForm } from "./jobform";
-import { stateBadge } from "./words";
+import { FINAL, Refusal, ask, follow, get, type Job, type JobPage } from "../shared/api";
+import { el, fill } from "../shared/dom";
+import { head, showRefusal } from "../shared/page-frame";
+import { jobForm } from "./job-form";
+import { stateBadge } from "../shared/wording";
 
 export async function listPage(app: HTMLElement): Promise<void> {
   document.title = "Jobs · zonemill";

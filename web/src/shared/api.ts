@@ -1,6 +1,6 @@
 // The HTTP interface, with the key of whoever looks at the page. The key is kept for this tab only.
-import { keep, kept } from "./kept";
-import type { components } from "./wire";
+import { keep, kept } from "./browser-storage";
+import type { components } from "../wire";
 
 export type Job = components["schemas"]["Job"];
 export type JobPage = components["schemas"]["JobPage"];

@@ -1,14 +1,14 @@
 // A job that has ended: the picture, and beside it all that belongs to it.
 import { Vector3 } from "three";
-import { ask, type Job, type JobFiles } from "./api";
-import { css, toolColour, zoneColour } from "./colours";
-import { add, duration, el, figure, fill, percent, swatch } from "./dom";
-import { colourOf, onTheme, reducedMotion } from "./frame";
+import { ask, type Job, type JobFiles } from "../shared/api";
+import { css, toolColour, zoneColour } from "../scene/colours";
+import { add, duration, el, figure, fill, percent, swatch } from "../shared/dom";
+import { colourOf, onTheme, reducedMotion } from "../shared/page-frame";
 import { legendOf } from "./legend";
-import { lookOf, type Look } from "./look";
-import { Picture, type Mode, type P3, type Place } from "./scene";
-import type { ViewFinding, ViewHead } from "./viewfile";
-import { fileList, keyTable, needs, slender, toolWords, whereOf } from "./words";
+import { lookOf, type Look } from "./view-link";
+import { Picture, type Mode, type P3, type Place } from "../scene/scene";
+import type { ViewFinding, ViewHead } from "../shared/view-file";
+import { fileList, keyTable, needs, slender, toolWords, whereOf } from "../shared/wording";
 
 /** Findings of the report, those it counts only included. */
 function foundIn(h: ViewHead): number {

@@ -6,11 +6,11 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER, STEPS, STOCK, UNCUT, toolColour, wallColour, zoneColour, type RGB } from "./colours";
-import { CutFace } from "./cutface";
+import { CutFace } from "./cut-face";
 import { PART_FRAGMENT, PART_VERTEX, WAY_FRAGMENT, WAY_VERTEX } from "./shaders";
-import type { Course } from "./states";
+import type { Course } from "./stock-states";
 import { Stock } from "./stock";
-import type { ChunkEntry, Table, ViewHead } from "./viewfile";
+import type { ChunkEntry, Table, ViewHead } from "../shared/view-file";
 
 
 export type Mode = "zones" | "walls" | "deviation";

@@ -1,9 +1,9 @@
 // The stock as it is drawn. To look at only: the proof has a finer model.
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial, Sphere, Vector3 } from "three";
 import { STOCK } from "./colours";
-import { noNet, surface, type Net } from "./field";
-import { States, type Course } from "./states";
-import type { ChunkEntry, Table } from "./viewfile";
+import { noNet, surface, type Net } from "./distance-field";
+import { States, type Course } from "./stock-states";
+import type { ChunkEntry, Table } from "../shared/view-file";
 
 const VERTEX = /* glsl */ `
 in float spare; out vec3 vPlace; out vec3 vEye; out vec3 vNormal_; out float vSpare;

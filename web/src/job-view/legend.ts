@@ -1,8 +1,8 @@
 // What the colours of the picture mean.
-import { CLASSES, CONNECTION, STEPS, STOCK, UNCUT, css, toolColour, wallColour, zoneColour } from "./colours";
-import { add, el, swatch } from "./dom";
-import type { Mode } from "./scene";
-import type { ViewHead } from "./viewfile";
+import { CLASSES, CONNECTION, STEPS, STOCK, UNCUT, css, toolColour, wallColour, zoneColour } from "../scene/colours";
+import { add, el, swatch } from "../shared/dom";
+import type { Mode } from "../scene/scene";
+import type { ViewHead } from "../shared/view-file";
 
 /** What the colours mean; `drawn` are the T numbers whose ways are shown, `stock` says whether stock is. */
 export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>, stock: boolean): (Node | null)[] {
