@@ -18,7 +18,7 @@ PAGE := service/page/index.html
 NODE := $(shell npm --version >/dev/null 2>&1 && node -e 'const [a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' >/dev/null 2>&1 && echo yes)
 NPM = $(if $(NODE),npm,PATH="$(CURDIR)/$(BIN):$$PATH" npm)
 
-.PHONY: web page
+.PHONY: web page lint-web
 
 setup: $(STAMP) hooks page
 
@@ -54,6 +54,11 @@ $(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/* web/src/*/*) openap
 # Whoever cannot get the packages of the page has everything but the page, and is told.
 page: | $(BIN)/python
 	@$(MAKE) --no-print-directory -s web || echo "The page was not built, for the reason above. All else works. Remedy: make web"
+
+# The linter of the page; it says so and goes on where the packages of the page are missing.
+lint-web:
+	@if [ -f web/node_modules/eslint/package.json ] && [ -f web/src/wire.ts ]; then cd web && $(NPM) run --silent lint; \
+	else echo "web/ is not linted: the packages of the page are not installed. Remedy: make web"; fi
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -1,9 +1,17 @@
-// All jobs with their progress as it goes, and the form for a new one.
-import { FINAL, Refusal, ask, follow, get, type Job, type JobPage } from "../shared/api";
+// The start page: the form of a new job, and all jobs with their progress.
+import { FINAL, RequestError, ask, get, type Job, type JobPage } from "../shared/api";
 import { el, fill } from "../shared/dom";
-import { head, showRefusal } from "../shared/page-frame";
-import { jobForm } from "./job-form";
+import { follow, isFinalRefusal } from "../shared/job-events";
+import { pageHeader, showError } from "../shared/page-frame";
 import { stateBadge } from "../shared/wording";
+import { JobForm } from "./job-form";
+
+const PAGE_LENGTH = 30;
+const MOST_STREAMS = 3; // a browser keeps six connections to a host, and the page needs some itself
+const POLL_MS = 4000;
+const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
+
+type OnProgress = (now: { progress: number; stage: string }) => void;
 
 export async function listPage(app: HTMLElement): Promise<void> {
   document.title = "Jobs · zonemill";
@@ -11,23 +19,23 @@ export async function listPage(app: HTMLElement): Promise<void> {
   const again = (): void => {
     fill(list);
     void load(list, again);
-    form.again(); // what was written into it stays
+    form.load(); // what was entered stays
   };
-  const form = jobForm(again);
+  const form = new JobForm(again);
   const main = el("main", { id: "main", class: "list" }, form.node, el("section", { "aria-labelledby": "jobs" }, el("h2", { id: "jobs" }, "Jobs"), list));
-  fill(app, head(el("h1", { class: "title" }, "Jobs")), main);
+  fill(app, pageHeader(el("h1", { class: "title" }, "Jobs")), main);
   await load(list, again);
 }
 
 async function load(list: HTMLElement, again: () => void, cursor = ""): Promise<void> {
   let page: JobPage;
   try {
-    page = await get<JobPage>(`/v1/jobs?limit=30${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
+    page = await get<JobPage>(`/v1/jobs?limit=${PAGE_LENGTH}${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
   } catch (error) {
-    showRefusal(list, error, again);
+    showError(list, error, again);
     return;
   }
-  if (!cursor && !page.items.length) fill(list, el("p", { class: "hint" }, "There are none yet. Post a part above, or run make demo."));
+  if (!cursor && !page.items.length) fill(list, el("p", { class: "hint" }, "There are no jobs yet. Fill in the form on this page, or run make demo."));
   for (const job of page.items) list.appendChild(row(job));
   if (page.next_cursor) {
     const next = page.next_cursor;
@@ -39,60 +47,60 @@ async function load(list: HTMLElement, again: () => void, cursor = ""): Promise<
   }
 }
 
-const STREAMS = 3; // at a time: a browser keeps six connections to a host, and the page needs some itself
 let streams = 0;
 
-/** Follows a job by its events, or where many run by asking now and then; returns it as it ended. */
-async function watch(job: Job, say: (now: { progress: number; stage: string }) => void, lost: (why: string) => void): Promise<Job> {
-  if (streams < STREAMS) {
+/** Follows a job by its events, or by polling while many jobs run; returns the job as it ended. */
+async function watch(job: Job, onProgress: OnProgress, onLost: (why: string) => void): Promise<Job> {
+  if (streams < MOST_STREAMS) {
     streams++;
     try {
-      await follow(job, say, lost);
+      await follow(job, onProgress, onLost);
     } finally {
       streams--;
     }
     return get<Job>(job.links.self);
   }
   for (;;) {
-    await new Promise((resume) => setTimeout(resume, 4000));
+    await new Promise((resume) => setTimeout(resume, POLL_MS));
     let now: Job;
     try {
       now = await get<Job>(job.links.self);
     } catch (error) {
-      if (error instanceof Refusal && error.status >= 400 && error.status < 500 && error.status !== 429) throw error;
-      lost(error instanceof Refusal ? error.message : "The connection was lost.");
+      if (isFinalRefusal(error)) throw error;
+      onLost(error instanceof RequestError ? error.message : "The connection was lost.");
       continue;
     }
     if (FINAL.has(now.state)) return now;
-    say(now);
-    if (streams < STREAMS) return watch(now, say, lost);
+    onProgress(now);
+    if (streams < MOST_STREAMS) return watch(now, onProgress, onLost);
   }
 }
 
-function told(error: unknown): string {
-  return error instanceof Refusal ? error.message : "The connection was lost; load the page again.";
+function errorWords(error: unknown): string {
+  return error instanceof RequestError ? error.message : "The connection was lost. Load the page again.";
 }
-
-const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
 
 function row(job: Job): HTMLElement {
   const node = el("article", { class: "jobrow" });
-  const draw = (j: Job): void => {
-    const running = !FINAL.has(j.state);
-    const bar = el("progress", { max: 1, value: j.progress, "aria-label": "Progress" });
-    const words = el("span", { class: "where" }, running ? `${Math.round(100 * j.progress)} % ${j.stage}` : "");
-    const order = j.labels?.order ?? j.labels?.part ?? `${j.id.slice(0, 13)}…`;
-    fill(node, el("h3", {}, el("a", { href: `/v1/jobs/${j.id}/view` }, order)), stateBadge(j.state),
-      el("span", { class: "where" }, `${KINDS[j.kind] ?? j.kind}, ${new Date(j.created_at).toLocaleString()}`),
-      running ? bar : null, running ? words : null,
-      running ? el("button", { type: "button", onclick: () => void ask(j.links.self, { method: "DELETE" }).catch((error: unknown) => (words.textContent = told(error))) }, "Cancel") : null,
-      j.error ? el("p", { class: "where" }, j.error.detail) : null);
-    if (running)
-      void watch(j, (now) => {
-        bar.value = now.progress;
-        words.textContent = `${Math.round(100 * now.progress)} % ${now.stage}`;
-      }, (why) => (words.textContent = why)).then(draw, (error: unknown) => (words.textContent = told(error)));
-  };
-  draw(job);
+  draw(node, job);
   return node;
+}
+
+function draw(node: HTMLElement, job: Job): void {
+  const running = !FINAL.has(job.state);
+  const bar = el("progress", { max: 1, value: job.progress, "aria-label": "Progress" });
+  const words = el("span", { class: "where" }, running ? `${Math.round(100 * job.progress)} % ${job.stage}` : "");
+  const showFailure = (error: unknown): void => void (words.textContent = errorWords(error));
+  const order = job.labels?.order ?? job.labels?.part ?? `${job.id.slice(0, 13)}…`;
+  fill(node, el("h3", {}, el("a", { href: `/v1/jobs/${job.id}/view` }, order)), stateBadge(job.state),
+    el("span", { class: "where" }, `${KINDS[job.kind] ?? job.kind}, ${new Date(job.created_at).toLocaleString()}`),
+    running ? bar : null, running ? words : null,
+    running ? el("button", { type: "button", onclick: () => void ask(job.links.self, { method: "DELETE" }).catch(showFailure) }, "Cancel") : null,
+    job.error ? el("p", { class: "where" }, job.error.detail) : null);
+  if (!running) return;
+  const onProgress: OnProgress = ({ progress, stage }) => {
+    bar.value = progress;
+    words.textContent = `${Math.round(100 * progress)} % ${stage}`;
+  };
+  watch(job, onProgress, (why) => (words.textContent = why)).then((ended) => draw(node, ended), showFailure);
 }

@@ -1,23 +1,23 @@
-// What a browser keeps for a page. One that is told to keep nothing throws at the mere look, and the page goes on without.
+// Values that the browser stores for the page. Where the browser allows no storage, they last until the page is closed.
 
 type Shelf = "localStorage" | "sessionStorage";
-const here = new Map<string, string>();
+const fallback = new Map<string, string>();
 
-export function kept(shelf: Shelf, key: string): string | null {
+export function stored(shelf: Shelf, key: string): string | null {
   try {
     return window[shelf].getItem(key);
   } catch {
-    return here.get(`${shelf} ${key}`) ?? null;
+    return fallback.get(`${shelf} ${key}`) ?? null;
   }
 }
 
-/** Keeps a value; null forgets it. */
-export function keep(shelf: Shelf, key: string, value: string | null): void {
+/** Stores a value; null removes it. */
+export function store(shelf: Shelf, key: string, value: string | null): void {
   try {
     if (value === null) window[shelf].removeItem(key);
     else window[shelf].setItem(key, value);
   } catch {
-    if (value === null) here.delete(`${shelf} ${key}`);
-    else here.set(`${shelf} ${key}`, value);
+    if (value === null) fallback.delete(`${shelf} ${key}`);
+    else fallback.set(`${shelf} ${key}`, value);
   }
 }
