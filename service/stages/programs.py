@@ -23,8 +23,7 @@ from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service.cutting_data import rates_of
-from service.from_wire import rotary_machine, tool_bodies
-from service.report import report as reporting
+from service.from_wire import material_name, rotary_machine, tool_bodies
 from service.stages.access_plan import Look, Program, Side
 from service.stages.blank_model import turned_box
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height
@@ -244,7 +243,7 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clear
     gauges = gauge_lengths(setup)
     return Workplan(setup.labels.get("order") or "zonemill job", steps,
                     tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
-                    StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
+                    StockBox(lo, hi), material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
                     dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
                     stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
                     stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,

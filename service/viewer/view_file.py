@@ -8,7 +8,7 @@
 A chunk is a table of whole numbers, column after column. A column of n rows and k values of w bytes is stored as k * w
 planes of n bytes, value by value, the lowest byte first; equal high bytes deflate to nothing. Where a column is of
 differences each row is stored as its difference from the row before (the first from 0), and 0, -1, 1, -2 as 0, 1, 2, 3;
-so are columns that may be negative. The page reads it in web/src/viewfile.ts.
+so are columns that may be negative. The page reads it in web/src/shared/view-file.ts.
 """
 
 from __future__ import annotations

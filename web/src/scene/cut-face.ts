@@ -1,5 +1,5 @@
-// The faces that a section cuts. A line of sight leaves a body more often than it enters it, beyond the plane, where it
-// enters at the plane: so often is counted in the stencil, and the plane is filled there, before all else is drawn.
+// The cut faces of a section. Beyond the plane, a line of sight that is inside a body at the plane leaves bodies more often
+// than it enters them. The stencil counts this, and the plane is filled where the count is not zero, before all else is drawn.
 import {
   AlwaysStencilFunc, BackSide, DecrementStencilOp, DoubleSide, FrontSide, GLSL3, Group, IncrementStencilOp, Mesh, NotEqualStencilFunc, PlaneGeometry,
   ShaderMaterial, Vector3, ZeroStencilOp, type Color, type Side, type StencilOp, type Vector4,
@@ -30,19 +30,20 @@ export class CutFace {
   private readonly counters: ShaderMaterial[];
   private readonly plane: Mesh;
 
-  /** `order`: of drawing, below 0; what comes later lies over what came before in the same plane. */
+  /** `order`: of drawing, below 0; in the same plane, a later face covers an earlier one. */
   constructor(section: { value: unknown }, colour: Color, private readonly order: number) {
     const counter = (side: Side, stencilZPass: StencilOp): ShaderMaterial =>
-      new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: COUNTED, side, uniforms: { section } as never, colorWrite: false, depthWrite: false,
+      new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: COUNTED, side, uniforms: { section }, colorWrite: false, depthWrite: false,
         depthTest: false, stencilWrite: true, stencilFunc: AlwaysStencilFunc, stencilZPass });
     this.counters = [counter(BackSide, IncrementStencilOp), counter(FrontSide, DecrementStencilOp)];
     this.plane = new Mesh(new PlaneGeometry(1, 1), new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FILLED, side: DoubleSide,
-      uniforms: { colour: { value: colour } }, stencilWrite: true, stencilFunc: NotEqualStencilFunc, stencilRef: 0, stencilFail: ZeroStencilOp, stencilZFail: ZeroStencilOp, stencilZPass: ZeroStencilOp }));
+      uniforms: { colour: { value: colour } }, stencilWrite: true, stencilFunc: NotEqualStencilFunc, stencilRef: 0,
+      stencilFail: ZeroStencilOp, stencilZFail: ZeroStencilOp, stencilZPass: ZeroStencilOp }));
     this.plane.renderOrder = order + 0.5;
     this.plane.frustumCulled = false;
   }
 
-  /** Where the plane is, which body it cuts, and how far round a place of it that is. */
+  /** Makes the cut face of some bodies; it spans 4 `size` mm around `middle`. */
   cut(section: Vector4, bodies: Mesh[], middle: Vector3, size: number): void {
     this.group.clear();
     const normal = new Vector3(section.x, section.y, section.z);
@@ -55,7 +56,7 @@ export class CutFace {
         counted.matrixAutoUpdate = false;
         counted.matrix.copy(body.matrix);
         counted.frustumCulled = false;
-        counted.renderOrder = this.order + 0.2 * k; // first where it is left, for the count stops at 0
+        counted.renderOrder = this.order + 0.2 * k; // leaving is counted first, because the count stops at 0
         this.group.add(counted);
       }
     this.group.add(this.plane);

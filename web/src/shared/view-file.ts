@@ -1,4 +1,5 @@
-// Reads view.bin as it arrives; the form is told in service/viewer/view_file.py.
+// The view file, view.bin: its types, and a reader that returns each chunk as it arrives. The format is defined in
+// service/viewer/view_file.py.
 
 export interface ColumnEntry extends Array<string | number> {
   0: string;
@@ -55,7 +56,7 @@ export interface ViewFinding {
   limit: number;
   count: number;
   time_s: number | null;
-  /** How the tool stands then; files of earlier versions do not say it. */
+  /** Position of the tool at that second; missing in files of earlier versions. */
   step?: number | null;
   tip_mm?: [number, number, number] | null;
   axis?: [number, number, number] | null;
@@ -122,7 +123,7 @@ export interface ViewHead {
   programs: string[];
   seconds: number;
   findings: ViewFinding[];
-  /** Findings by kind, those beyond the list included; what is to be minded. Files of earlier versions have neither. */
+  /** Findings by kind, including those that the list leaves out; missing in files of earlier versions, as are cautions and notes. */
   found?: Record<string, number>;
   cautions?: ViewCaution[];
   notes?: string[];
@@ -139,15 +140,15 @@ export interface ViewHead {
 
 export type Table = Record<string, Int32Array>;
 
-const NEWEST = 2; // version of a file that this page knows
+const NEWEST_VERSION = 2; // of a file that this page can read
 const MAGIC = "ZMVIEW1\n";
 
-const MOST_HEAD = 1 << 28; // bytes
+const MOST_HEAD_BYTES = 1 << 28;
 
-/** A file this page cannot show, and what to do. */
+/** A view file that this page cannot read; the message gives the remedy. */
 export class BrokenView extends Error {}
 
-/** The bytes that were packed, which are no more than `most`. */
+/** Unpacks data; fails beyond `most` bytes. */
 async function inflate(data: Uint8Array<ArrayBuffer>, most: number): Promise<Uint8Array> {
   const reader = new Blob([data]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
   const parts: Uint8Array<ArrayBuffer>[] = [];
@@ -156,7 +157,7 @@ async function inflate(data: Uint8Array<ArrayBuffer>, most: number): Promise<Uin
     const { done, value } = await reader.read();
     if (done) break;
     size += value.length;
-    if (size > most) throw new BrokenView("The file with the picture is damaged: there is more in it than it says.");
+    if (size > most) throw new BrokenView("The view file is damaged: it holds more data than it declares.");
     parts.push(value);
   }
   return new Uint8Array(await new Blob(parts).arrayBuffer());
@@ -167,10 +168,10 @@ function bytesOf(columns: ColumnEntry[]): number {
   return columns.reduce((sum, [, rows, k, width]) => sum + rows * k * width, 0);
 }
 
-/** The columns of a chunk, rows of k values one behind the other. */
+/** The columns of a chunk; rows of k values follow each other. */
 export function columnsOf(raw: Uint8Array, entries: ColumnEntry[]): Table {
   const table: Table = {};
-  if (raw.length !== bytesOf(entries)) throw new BrokenView("The file with the picture is damaged: there is less in it than it says.");
+  if (raw.length !== bytesOf(entries)) throw new BrokenView("The view file is damaged: it holds less data than it declares.");
   let at = 0;
   for (const [name, rows, k, width, form] of entries) {
     const out = new Int32Array(rows * k);
@@ -191,18 +192,18 @@ export function columnsOf(raw: Uint8Array, entries: ColumnEntry[]): Table {
   return table;
 }
 
-/** Bytes of a stream, as many at a time as are asked for. */
+/** Takes bytes from a stream, any number at a time. */
 class Bytes {
   private held: Uint8Array<ArrayBuffer>[] = [];
   private size = 0;
   total = 0;
 
-  constructor(private reader: ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>) {}
+  constructor(private readonly reader: ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>) {}
 
   async take(count: number): Promise<Uint8Array<ArrayBuffer>> {
     while (this.size < count) {
       const { done, value } = await this.reader.read();
-      if (done) throw new BrokenView("The file with the picture was cut off. Load the page again; where that does not help, the file itself is damaged.");
+      if (done) throw new BrokenView("The view file is incomplete. Load the page again. If that does not help, the file itself is damaged.");
       this.held.push(value);
       this.size += value.length;
       this.total += value.length;
@@ -222,7 +223,7 @@ class Bytes {
   }
 }
 
-/** Reads a view file; `onChunk` is called for each chunk in the order of the file. Returns the bytes read. */
+/** Reads a view file. `onChunk` is called for each chunk in the order of the file. Returns the number of bytes read. */
 export async function readView(
   body: ReadableStream<Uint8Array<ArrayBuffer>>,
   onHead: (head: ViewHead) => void,
@@ -231,10 +232,10 @@ export async function readView(
   const bytes = new Bytes(body.getReader());
   const start = await bytes.take(12);
   if (new TextDecoder().decode(start.subarray(0, 8)) !== MAGIC)
-    throw new BrokenView("The file with the picture has another form than this page knows. Load the page again; where that does not help, another version made it.");
+    throw new BrokenView("The view file has an unknown format. Load the page again. If that does not help, another version of zonemill made the file.");
   const length = new DataView(start.buffer).getUint32(8, true);
-  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MOST_HEAD))) as ViewHead;
-  if (head.version > NEWEST) throw new BrokenView("A later version made the file with the picture. Look at it with that one.");
+  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MOST_HEAD_BYTES))) as ViewHead;
+  if (head.version > NEWEST_VERSION) throw new BrokenView("A later version of zonemill made the view file. Open it with that version.");
   onHead(head);
   for (const entry of head.chunks) onChunk(entry, columnsOf(await inflate(await bytes.take(entry.size), bytesOf(entry.columns)), entry.columns));
   return bytes.total;

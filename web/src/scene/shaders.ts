@@ -1,4 +1,4 @@
-// How part and ways are coloured, for the graphics card.
+// Shaders of part and tool paths.
 
 export const PART_VERTEX = /* glsl */ `
 in float left_; in float judged; in vec3 wall;
@@ -42,15 +42,15 @@ void main() {
   outColour = vec4(base * mix(1.0, shade + lit, 0.92), 1.0);
 }`;
 
-export const WAY_VERTEX = /* glsl */ `
+export const PATH_VERTEX = /* glsl */ `
 in float time; out vec3 vPlace; out float vTime;
 void main() {
   vec4 eye = modelViewMatrix * vec4(position, 1.0);
   vPlace = position; vTime = time;
-  gl_Position = projectionMatrix * vec4(eye.xyz * 0.9985, 1.0); // a little nearer, at the same place of the picture
+  gl_Position = projectionMatrix * vec4(eye.xyz * 0.9985, 1.0); // a little nearer, at the same place of the frame
 }`;
 
-export const WAY_FRAGMENT = /* glsl */ `
+export const PATH_FRAGMENT = /* glsl */ `
 precision highp float;
 in vec3 vPlace; in float vTime; out vec4 outColour;
 uniform vec3 colour; uniform float strength; uniform float now; uniform vec4 section; uniform float dashed;

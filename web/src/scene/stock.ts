@@ -1,9 +1,9 @@
-// The stock as it is drawn. To look at only: the proof has a finer model.
+// The stock as it is drawn. It is a picture only: the proof has a finer model.
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, Matrix4, Mesh, ShaderMaterial, Sphere, Vector3 } from "three";
+import type { ChunkEntry, Table } from "../shared/view-file";
 import { STOCK } from "./colours";
-import { noNet, surface, type Net } from "./field";
-import { States, type Course } from "./states";
-import type { ChunkEntry, Table } from "./viewfile";
+import { noNet, surface, type Net } from "./distance-field";
+import { StockStates, type CutterPath } from "./stock-states";
 
 const VERTEX = /* glsl */ `
 in float spare; out vec3 vPlace; out vec3 vEye; out vec3 vNormal_; out float vSpare;
@@ -18,7 +18,7 @@ in vec3 vPlace; in vec3 vEye; in vec3 vNormal_; in float vSpare; out vec4 outCol
 uniform vec4 section; uniform float least; uniform vec3 base;
 void main() {
   if (dot(section.xyz, vPlace) > section.w) discard;
-  if (vSpare < least) discard; // here the part itself is seen
+  if (vSpare < least) discard; // the part is seen here
   if (!gl_FrontFacing) {
     outColour = vec4(mix(base, base * 0.86, step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0))) * 0.86, 1.0);
     return;
@@ -27,23 +27,25 @@ void main() {
   float shade = 0.56 + 0.34 * max(dot(n, normalize(vec3(-0.35, 0.55, 0.75))), 0.0) + 0.16 * max(dot(n, eye), 0.0);
   outColour = vec4(base * shade, 1.0);
 }`;
-const SHOWN = 0.08; // of a step: stock that stands out of the part by less is not told from it
+const SHOWN = 0.08; // of a step: where the stock stands out of the part by less, the part is drawn
 
 export class Stock {
   readonly mesh: Mesh;
   /** mm that stock stands out of the part where it is drawn. */
   readonly least: number;
-  private readonly states: States;
+  private readonly states: StockStates;
   private net: Net = noNet();
+  private hasPaths = false;
 
-  /** allowed : mm of stock on the part that are as good as none */
+  /** `allowed`: where the stock stands out of the part by less, mm, the part is drawn. */
   constructor(entry: ChunkEntry, t: Table, section: { value: unknown }, allowed: number) {
-    this.states = new States(entry, t);
+    this.states = new StockStates(entry, t);
     this.least = Math.max(SHOWN * entry.step_mm!, allowed);
     const material = new ShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: this.least }, base: { value: new Color(...STOCK) } } as never });
+      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, uniforms: { section, least: { value: this.least }, base: { value: new Color(...STOCK) } } });
     this.mesh = new Mesh(new BufferGeometry(), material);
-    const { nx, ny, nz, step, origin } = this.states.grid; // what a ray looks at, whatever the surface is just now
+    this.mesh.visible = false;
+    const { nx, ny, nz, step, origin } = this.states.grid; // for rays: encloses the surface at every second
     const half = new Vector3(nx, ny, nz).multiplyScalar(0.5 * step);
     this.mesh.geometry.boundingSphere = new Sphere(new Vector3(...origin).add(half), half.length());
     this.mesh.frustumCulled = false;
@@ -52,14 +54,22 @@ export class Stock {
     this.mesh.applyMatrix4(new Matrix4().set(r[0]!, r[3]!, r[6]!, 0, r[1]!, r[4]!, r[7]!, 0, r[2]!, r[5]!, r[8]!, 0, 0, 0, 0, 1));
   }
 
-  /** What cuts it, in order. */
-  follow(courses: Course[]): void {
-    this.states.follow(courses);
+  /** Shows the stock at a second, cut along the paths; null hides it. */
+  showAt(seconds: number | null, paths: { readonly cutterPaths: CutterPath[] }): void {
+    this.mesh.visible = seconds !== null;
+    if (seconds === null) return;
+    if (!this.hasPaths) this.states.follow(paths.cutterPaths);
+    this.hasPaths = true;
+    this.states.time(seconds);
+    this.drawSurface();
   }
 
-  /** The stock at a second, drawn. */
-  time(seconds: number): void {
-    this.states.time(seconds);
+  /** The paths have changed. */
+  forgetPaths(): void {
+    this.hasPaths = false;
+  }
+
+  private drawSurface(): void {
     const s = this.states;
     const before = this.net;
     this.net = surface(s.grid, s.values, s.part, before);

@@ -1,9 +1,12 @@
-// The stock at any second: the verifier's state before it, cut further by the tool along the way that is drawn.
-import { sweep, type Cutter, type Grid } from "./field";
-import type { ChunkEntry, Table, ToolShape } from "./viewfile";
+// The stock at any second: the last state of the verifier before it, cut further by the tool along the path that is drawn.
+import { sweep, type Cutter, type Grid } from "./distance-field";
+import type { ChunkEntry, Table, ToolShape } from "../shared/view-file";
 
-/** Rows of a way: places in the setup frame, seconds, kinds (2: a cut leads here), axes where they change. */
-export interface Course {
+/**
+ * Rows of a path: places in the setup frame, mm; seconds; kinds (2: a feed move leads here); axes, null if they do not change,
+ * in which case `fixed` is the axis.
+ */
+export interface CutterPath {
   place: Float32Array;
   time: Float32Array;
   kind: Uint8Array;
@@ -14,11 +17,11 @@ export interface Course {
 
 const CUT = 2;
 
-export class States {
+export class StockStates {
   readonly grid: Grid;
   readonly part: Float32Array;
   readonly values: Float32Array;
-  /** Seconds at which the states of the verifier stand. */
+  /** Seconds of the states of the verifier. */
   readonly ended: Float64Array;
   private readonly first: Int8Array;
   private readonly base: Int8Array;
@@ -27,13 +30,13 @@ export class States {
   private readonly node: Int32Array;
   private readonly value: Int32Array;
   private readonly turn: number[];
-  private courses: Course[] = [];
-  private state = 0; // stretches that `base` has behind it
-  private until = 0; // second at which `values` stand
+  private paths: CutterPath[] = [];
+  private state = 0; // number of the state that `base` holds
+  private until = 0; // second that `values` hold
 
   constructor(entry: ChunkEntry, t: Table) {
     const [nx, ny, nz] = entry.shape!;
-    this.grid = { nx: nx!, ny: ny!, nz: nz!, step: entry.step_mm!, origin: entry.origin_mm! };
+    this.grid = { nx: nx, ny: ny, nz: nz, step: entry.step_mm!, origin: entry.origin_mm! };
     this.unit = entry.step_mm! / entry.levels!;
     this.turn = entry.rotation!;
     this.first = Int8Array.from(t.first!);
@@ -44,9 +47,9 @@ export class States {
     [this.begins, this.node, this.value] = [t.begins!, t.node!, t.value!];
   }
 
-  follow(courses: Course[]): void {
-    this.courses = courses;
-    this.until = Infinity; // what was cut along others does not count
+  follow(paths: CutterPath[]): void {
+    this.paths = paths;
+    this.until = Infinity; // what was cut along other paths does not count
   }
 
   /** Brings `values` to a second. */
@@ -63,11 +66,11 @@ export class States {
       for (let n = 0; n < this.base.length; n++) this.values[n] = this.base[n]! * this.unit;
       this.until = k > 0 ? this.ended[k - 1]! : 0;
     }
-    if (k < this.ended.length) for (const c of this.courses) this.along(c, this.until, seconds);
+    if (k < this.ended.length) for (const c of this.paths) this.along(c, this.until, seconds);
     this.until = Math.max(this.until, seconds);
   }
 
-  private along(c: Course, from: number, to: number): void {
+  private along(c: CutterPath, from: number, to: number): void {
     const n = c.time.length;
     if (n < 2 || c.time[n - 1]! <= from || c.time[0]! > to) return;
     const tool = cutterOf(c.tool);
@@ -86,14 +89,14 @@ export class States {
     }
   }
 
-  /** A vector of row - 1 to row, at a share of the way, in the frame of the grid. */
+  /** A vector between row - 1 and row, at a share of the path, in the frame of the grid. */
   private here(rows: Float32Array, row: number, share: number): [number, number, number] {
     const p = 3 * (row - 1);
     const at = (c: number): number => rows[p + c]! + share * (rows[p + 3 + c]! - rows[p + c]!);
     return this.turned(at(0), at(1), at(2));
   }
 
-  private axis(c: Course, row: number, share: number): [number, number, number] {
+  private axis(c: CutterPath, row: number, share: number): [number, number, number] {
     return c.axis ? this.here(c.axis, row, share) : this.turned(...c.fixed);
   }
 
@@ -103,7 +106,7 @@ export class States {
   }
 }
 
-/** The cutting part, from its profile: points (radius, height), the corner in between, the end of the flutes last. */
+/** The cutting part from its profile: points (radius, height) from the tip to the end of the flutes. */
 function cutterOf(tool: ToolShape): Cutter {
   const profile = tool.bodies[0]!.profile;
   const radius = Math.max(...profile.map(([r]) => r));

@@ -1,4 +1,4 @@
-// The stock as distances on a grid: cut by a tool, and its surface. No graphics here, so that it can be tried alone.
+// The stock as a distance field on a grid: cut by a tool, and its surface. It needs no graphics, so tests run it alone.
 
 /** Node (i, j, k) is number (i ny + j) nz + k and stands at origin + (i, j, k) step; values in mm, above zero in stock. */
 export interface Grid {
@@ -9,7 +9,7 @@ export interface Grid {
   origin: [number, number, number];
 }
 
-/** What cuts: radius, corner radius and length of the flutes, mm. */
+/** Cutting part of a tool: radius, corner radius and flute length, mm. */
 export interface Cutter {
   radius: number;
   corner: number;
@@ -32,7 +32,7 @@ export function sweep(g: Grid, values: Float32Array, tool: Cutter, a: Three, b: 
   }
 }
 
-/** The same for a tool that stands still: its tip in mm from node 0, its axis a unit vector. */
+/** The same for a tool at rest: its tip in mm from node 0, its axis a unit vector. */
 function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: number, pz: number, ax: number, ay: number, az: number): void {
   const { step: h, nx, ny, nz } = g;
   const { radius, corner, length } = tool;
@@ -68,7 +68,7 @@ function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: numb
   }
 }
 
-/** A surface: `spare` says how far each corner lies outside the part, mm. Arrays are longer than what is used of them. */
+/** A surface. `spare`: how far each vertex lies outside the part, mm. The arrays are longer than what is used of them. */
 export interface Net {
   vertices: number;
   triangles: number;
@@ -87,15 +87,24 @@ const EDGES: [number, number, number][] = []; // corner, corner, axis; corners a
 for (const c of CORNERS) for (const e of [0, 1, 2]) if (!(c & (4 >> e))) EDGES.push([c, c | (4 >> e), e]);
 
 /**
- * Surface nets, as `net_vertices` and `net_faces` of the verifier: a corner in every cell whose nodes differ, at the mean of
- * where its edges cross zero, and two triangles across every edge of the grid that does. The nodes of the border are outside.
+ * The surface of the stock by surface nets, as `net_vertices` and `net_faces` of the verifier make it: a vertex in each cell
+ * whose nodes differ, at the mean of where its edges cross zero, and two triangles across each edge of the grid that crosses
+ * zero. The nodes of the border are outside.
  */
 export function surface(g: Grid, values: Float32Array, part: Float32Array, old: Net): Net {
-  const { nx, ny, nz, step: h } = g;
+  const { number, count } = numberedCells(g, values);
+  const net = room(old, count);
+  net.vertices = count;
+  placeVertices(g, values, part, number, net);
+  joinVertices(g, values, number, net);
+  return net;
+}
+
+/** Numbers the cells whose nodes differ, from 0; -1 for all others. */
+function numberedCells({ nx, ny, nz }: Grid, values: Float32Array): { number: Int32Array; count: number } {
   const column = nz;
   const slab = ny * nz;
   const number = new Int32Array(nx * slab).fill(-1);
-  const offset = CORNERS.map((c) => (c & 4 ? slab : 0) + (c & 2 ? column : 0) + (c & 1));
   let count = 0;
   for (let i = 0; i + 1 < nx; i++)
     for (let j = 0; j + 1 < ny; j++) {
@@ -106,7 +115,13 @@ export function surface(g: Grid, values: Float32Array, part: Float32Array, old: 
         low = high;
       }
     }
-  const net = room(old, count);
+  return { number, count };
+}
+
+/** Places, normals and spares of the vertices. */
+function placeVertices(g: Grid, values: Float32Array, part: Float32Array, number: Int32Array, net: Net): void {
+  const { nx, ny, nz, step: h } = g;
+  const offset = CORNERS.map((c) => (c & 4 ? ny * nz : 0) + (c & 2 ? nz : 0) + (c & 1));
   const v = new Float64Array(8);
   for (let i = 0, n = 0; i + 1 < nx; i++)
     for (let j = 0; j < ny; j++)
@@ -135,11 +150,16 @@ export function surface(g: Grid, values: Float32Array, part: Float32Array, old: 
         net.normal.set([-gx / size, -gy / size, -gz / size], 3 * to);
         net.spare[to] = out / m;
       }
+}
+
+/** Triangles between the vertices of the four cells around each edge that crosses zero. */
+function joinVertices({ nx, ny, nz }: Grid, values: Float32Array, number: Int32Array, net: Net): void {
+  const slab = ny * nz;
+  const along = [slab, nz, 1];
   let t = 0;
-  const along = [slab, column, 1];
   for (let i = 1; i + 1 < nx; i++)
     for (let j = 1; j + 1 < ny; j++)
-      for (let k = 1, n = i * slab + j * column + 1; k + 1 < nz; k++, n++) {
+      for (let k = 1, n = i * slab + j * nz + 1; k + 1 < nz; k++, n++) {
         const solid = values[n]! > 0;
         for (let e = 0; e < 3; e++) {
           if (values[n + along[e]!]! > 0 === solid) continue;
@@ -156,9 +176,7 @@ export function surface(g: Grid, values: Float32Array, part: Float32Array, old: 
           net.index[t++] = d;
         }
       }
-  net.vertices = count;
   net.triangles = t / 3;
-  return net;
 }
 
 function room(old: Net, count: number): Net {

@@ -1,9 +1,9 @@
-// Elements without a framework.
+// Builders of elements, and figures as text.
 
 type Child = Node | string | null | undefined | false;
 type Props = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 
-/** Makes an element; a property that is a function listens to the event of its name without "on". */
+/** Makes an element. A property that is a function listens to an event: `onclick` to `click`. */
 export function el<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   props: Props = {},
@@ -29,7 +29,7 @@ export function fill(node: Node, ...children: Child[]): void {
   add(node, ...children);
 }
 
-/** A colour as a square; set by script, for the service forbids inline styles. */
+/** A square of a colour. The script sets the colour, because the service forbids inline styles. */
 export function swatch(colour: string, hatched = false): HTMLElement {
   const node = el("span", { class: hatched ? "swatch hatched" : "swatch", "aria-hidden": "true" });
   node.style.setProperty("--colour", colour);
@@ -38,7 +38,7 @@ export function swatch(colour: string, hatched = false): HTMLElement {
 
 let serial = 0;
 
-/** A field with its label. */
+/** An input with its label and hint. */
 export function field(label: string, input: HTMLElement, hint?: string): HTMLElement {
   const id = input.id || `f${++serial}`;
   input.id = id;
@@ -58,11 +58,11 @@ export function duration(seconds: number): string {
 export function figure(value: number | null | undefined, digits: number, unit = ""): string {
   if (value === null || value === undefined) return "–";
   const least = 10 ** -digits;
-  const small = value > 0 && value < 0.5 * least; // what is there does not read as nothing
+  const small = value > 0 && value < 0.5 * least; // a small value does not read as zero
   return `${small ? "<\u202f" : ""}${(small ? least : value).toFixed(digits)}${unit ? `\u202f${unit}` : ""}`;
 }
 
-/** A share of 0..1, rounded down as on the sheet, so that 100 % is all of it. */
+/** A share of 0..1, rounded down as on the setup sheet: 100 % means everything. */
 export function percent(value: number | null | undefined): string {
   return value === null || value === undefined ? "–" : `${Math.floor(1e4 * value + 1e-9) / 100}\u202f%`;
 }
