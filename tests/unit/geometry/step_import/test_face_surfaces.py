@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("cadquery")
 import cadquery as cq  # noqa: E402
 
+from benchmarks.reach.exact_faces import ExactFaces  # noqa: E402
 from geometry.errors import GeometryError, StepError  # noqa: E402
 from geometry.setup_frame import Placement  # noqa: E402
-from geometry.step_import.exact_faces import ExactFaces  # noqa: E402
 from geometry.step_import.face_surfaces import patches_from_bytes, read_patches  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from geometry.step_import.occ.patches import load_patches  # noqa: E402

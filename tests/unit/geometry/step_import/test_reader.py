@@ -7,10 +7,10 @@ import psutil
 import pytest
 import trimesh
 
+from benchmarks.reach.exact_faces import ExactFaces
 from geometry.mesh import TriangleMesh
 from geometry.part import EdgeKind
 from geometry.setup_frame import Placement
-from geometry.step_import.exact_faces import ExactFaces
 from geometry.step_import.occ.holes import fill_slivers
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.occ.meshing import count_open_edges

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from benchmarks.passes.faceting import facet_deviation, steps_for_chord
 from examples.family.thesis import Kind, control_points, surface
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.setup_frame import Placement
-from geometry.surfaces.faceting import facet_deviation, steps_for_chord
 from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface, open_uniform_knots
 
