@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class HolderSegment:
+class HolderFrustum:
     """A frustum of the holder: diameters at its lower and upper end and its length, mm."""
 
     diameter: float
@@ -49,7 +49,7 @@ class ToolBody:
     neck_length: float
     shank_diameter: float
     stickout: float
-    holder: tuple[HolderSegment, ...] = ()
+    holder: tuple[HolderFrustum, ...] = ()
 
     @property
     def radius(self) -> float:

@@ -18,7 +18,7 @@ SEEN_SHARE = 0.005  # of the area of a face
 UP = ((0.0, 0.0, 1.0),)
 
 
-class Form(StrEnum):
+class AreaForm(StrEnum):
     """How a sample is cut."""
 
     LEVEL = "level"
@@ -49,7 +49,7 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
 
 def forms_of(normals: F64) -> NDArray[np.object_]:
     """Form of each sample by its outward unit normal (n, 3) in the access frame."""
-    out = np.full(len(normals), Form.SHALLOW, dtype=object)
-    out[normals[:, 2] > LEVEL] = Form.LEVEL
-    out[normals[:, 2] < STEEP] = Form.STEEP
+    out = np.full(len(normals), AreaForm.SHALLOW, dtype=object)
+    out[normals[:, 2] > LEVEL] = AreaForm.LEVEL
+    out[normals[:, 2] < STEEP] = AreaForm.STEEP
     return out

@@ -20,7 +20,7 @@ from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64, I32
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.curvature import RESOLUTION
 from geometry.step_import.occ.loading import load_solid
 from geometry.step_import.occ.topology import Shape, faces_of
@@ -56,10 +56,10 @@ class ExactFaces:
     Raises what ``geometry.step_import.reader.read_part`` raises about the file and its solids.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, placement: Placement | None = None,
+    def __init__(self, path: str | os.PathLike[str], *, placement: SetupFrame | None = None,
                  solid: int | None = None) -> None:
         self._faces = faces_of(load_solid(Path(path), solid).body)
-        self._placement = placement or Placement()
+        self._placement = placement or SetupFrame()
 
     def __len__(self) -> int:
         return len(self._faces)

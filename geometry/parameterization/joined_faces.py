@@ -33,7 +33,7 @@ from geometry.parameterization.planar_embedding import located
 from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface
 
-MOST_STRETCHED = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even
+MAX_STRETCH = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even
 ROUGH = 1e-9  # of the size: sides of a triangle that are shorter are none
 
 
@@ -150,10 +150,10 @@ def _laid_flat(vertices: F64, faces: NDArray[np.int32], loop: NDArray[np.int64],
     p, q, r = (out[faces[:, k]] for k in range(3))
     laid = 0.5 * ((q - p).conj() * (r - p)).imag
     ratio = laid[whole] / area[whole]
-    if not (np.isfinite(ratio).all() and ratio.min() > 0.0 and ratio.max() < MOST_STRETCHED**2 * ratio.min()):
+    if not (np.isfinite(ratio).all() and ratio.min() > 0.0 and ratio.max() < MAX_STRETCH**2 * ratio.min()):
         stretch = float(np.sqrt(ratio.max() / ratio.min())) if ratio.min() > 0.0 else float("inf")
         raise GeometryError(f"{' '.join(names)} cannot be laid into a plane without folds or much stretch",
-                            code="not_flat", subjects=names, measured=stretch, limit=MOST_STRETCHED,
+                            code="not_flat", subjects=names, measured=stretch, limit=MAX_STRETCH,
                             remedy="take them one by one")
     plane = np.column_stack([out.real, out.imag]) * np.sqrt(area.sum() / laid.sum())
     if not shapely.Polygon(plane[loop]).is_valid:

@@ -18,7 +18,7 @@ from geometry.mesh import F64
 from geometry.parameterization.quad_grid import Quad, coons
 
 SETTLED = 1e-9  # of the size of the region
-MOST_ROUNDS = 100
+MAX_ROUNDS = 100
 
 
 def laplace(quad: Quad) -> tuple[F64, int]:
@@ -29,7 +29,7 @@ def laplace(quad: Quad) -> tuple[F64, int]:
     grid = coons(quad)
     size = float(np.ptp(grid.reshape(-1, 2), axis=0).max())
     moved, count = np.inf, 0
-    while moved > SETTLED * size and count < MOST_ROUNDS:
+    while moved > SETTLED * size and count < MAX_ROUNDS:
         inner = _solved(grid)
         moved = float(np.abs(inner - grid[1:-1, 1:-1]).max(initial=0.0))
         grid[1:-1, 1:-1] = inner

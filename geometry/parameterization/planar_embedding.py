@@ -21,9 +21,9 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.parameterization.quad_grid import even
 
-MOST_ROUNDS = 20
+MAX_ROUNDS = 20
 ROUNDS = 12  # of putting places on edges between two places of the border
-LEAST_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
+MIN_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
 
 
 def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) -> F64:
@@ -51,7 +51,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
     start, end, weight = _mean_values(vertices, faces)
     held = ~np.isnan(place[:, 0])
     best, least = place, np.inf
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         laid = _solved(place, held, start, end, weight)
         stretch, total = _stretch(vertices, faces, laid)
         if not total < least:
@@ -60,7 +60,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
         weight = weight / stretch[end]
     flat = _turn(best, faces)
     flat = np.where(np.isfinite(flat), flat, -np.inf)
-    if flat.min() <= LEAST_TURN * np.abs(flat).mean():
+    if flat.min() <= MIN_TURN * np.abs(flat).mean():
         worst = int(flat.argmin())
         at = vertices[faces[worst]].mean(axis=0)
         raise GeometryError("a triangle of the region is laid flat on a side of the square", code="flat_triangle",

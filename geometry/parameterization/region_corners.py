@@ -25,7 +25,7 @@ from geometry.mesh import F64
 SHAPE, ASPECT = 0.25, 0.05
 NARROW, WINDOW = 0.004, 0.02  # of the border, to each side, over which a turn is measured: corners, and rounded ones
 SHARP = np.radians(20.0)
-MOST_SHARP = 14
+MAX_SHARP = 14
 EVENLY = 12  # further places to choose from
 
 
@@ -120,7 +120,7 @@ def _candidates(around: F64, way: F64) -> tuple[np.ndarray, F64]:
     for window in (NARROW, WINDOW):
         turn = _turns(around, way, window)
         for k in np.argsort(-turn, kind="stable").tolist():
-            if turn[k] < SHARP or len(out) == MOST_SHARP:
+            if turn[k] < SHARP or len(out) == MAX_SHARP:
                 break
             if apart(k) > 1.5 * window * total:
                 out.append(k)

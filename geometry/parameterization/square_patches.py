@@ -30,9 +30,9 @@ from geometry.parameterization.region_corners import Corners, find_corners
 
 INWARDS = np.radians(50.0)  # a border that turns in by more is cut there
 NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a turn is measured: first, and if need be
-MOST_CUTS = 24
+MAX_CUTS = 24
 BLENDS = (0.25, 0.5, 0.75)
-LEAST_PIECE = 1e-4  # of the region: what is cut off smaller is dust
+MIN_PIECE = 1e-4  # of the region: what is cut off smaller is dust
 TAIL = 0.03  # of the region: a piece that small may be left out where it folds
 THIN = (0.004, 0.008)  # of the border: a tail no wider than twice that
 
@@ -108,7 +108,7 @@ def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int
                 raise
             left += piece.area - sum(part.area for part in parts)
             todo[:0] = [(part, k) for part in parts]
-    if left > LEAST_PIECE * outer.area:
+    if left > MIN_PIECE * outer.area:
         tails = f"thin tails of {left:.3g} mm², which fold whatever is tried, are left out"
         out = [replace(piece, notes=(tails, *piece.notes)) for piece in out]
     if len(out) > 1:
@@ -156,8 +156,8 @@ def _cut(region: shapely.Polygon, near: float) -> list[shapely.Polygon]:
     todo = [region]
     while todo:
         piece = todo.pop()
-        cut = _chord(piece, near) if len(done) + len(todo) < MOST_CUTS else None
-        parts = [p for p in split(piece, cut).geoms if p.area > LEAST_PIECE * region.area] if cut is not None else []
+        cut = _chord(piece, near) if len(done) + len(todo) < MAX_CUTS else None
+        parts = [p for p in split(piece, cut).geoms if p.area > MIN_PIECE * region.area] if cut is not None else []
         if len(parts) < 2:
             done.append(piece)
         else:

@@ -21,13 +21,13 @@ from numpy.typing import ArrayLike
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.reader import ask_reader
 from geometry.surfaces.nurbs import NurbsSurface
 
 
 @dataclass(frozen=True, eq=False)
-class FacePatch:
+class FaceSurface:
     """A face as a NURBS surface over the rectangle of parameters it lies in.
 
     number    : 1-based, the ``12`` of ``F12``, as in ``read_part`` of the same file and solid
@@ -70,8 +70,8 @@ class FacePatch:
 
 
 def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = None, *,
-                 placement: Placement | None = None, solid: int | None = None, time_limit: float = 120.0,
-                 memory_limit: float = 6e9) -> dict[int, FacePatch]:
+                 placement: SetupFrame | None = None, solid: int | None = None, time_limit: float = 120.0,
+                 memory_limit: float = 6e9) -> dict[int, FaceSurface]:
     """Faces of one solid of a STEP file as NURBS surfaces.
 
     path         : STEP file
@@ -99,7 +99,7 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
     return patches_from_bytes(ask_reader(request, time_limit, memory_limit))
 
 
-def patches_to_bytes(patches: Iterable[FacePatch]) -> bytes:
+def patches_to_bytes(patches: Iterable[FaceSurface]) -> bytes:
     """Patches without pickle (an .npz in memory), for a pipe between processes."""
     about: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
@@ -116,7 +116,7 @@ def patches_to_bytes(patches: Iterable[FacePatch]) -> bytes:
     return out.getvalue()
 
 
-def patches_from_bytes(data: bytes) -> dict[int, FacePatch]:
+def patches_from_bytes(data: bytes) -> dict[int, FaceSurface]:
     """The patches that ``patches_to_bytes`` wrote, by number."""
     out = {}
     with np.load(io.BytesIO(data), allow_pickle=False) as z:
@@ -124,7 +124,7 @@ def patches_from_bytes(data: bytes) -> dict[int, FacePatch]:
             n = a["number"]
             surface = NurbsSurface(z[f"control{n}"], z[f"u{n}"], z[f"v{n}"], tuple(a["orders"]),
                                    z[f"weights{n}"] if a["rational"] else None, a["side"])
-            out[n] = FacePatch(n, surface, z[f"box{n}"], tuple(a["angular"]), a["deviation"])
+            out[n] = FaceSurface(n, surface, z[f"box{n}"], tuple(a["angular"]), a["deviation"])
     return out
 
 

@@ -16,12 +16,12 @@ from typing import Any
 from geometry.child_process import run_limited
 from geometry.errors import PartError, ResourceError, SetupError
 from geometry.part import Part
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 
 READER_MODULE = "geometry.step_import.reader_process"
 
 
-def read_part(path: str | os.PathLike[str], *, placement: Placement | None = None, solid: int | None = None,
+def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
               memory_limit: float = 6e9) -> Part:
     """Read one solid from a STEP file, heal it where that is safe, and mesh it.

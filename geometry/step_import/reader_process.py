@@ -29,10 +29,10 @@ def main() -> int:
 
 
 def _load(request: dict) -> bytes:
-    from geometry.setup_frame import Placement
+    from geometry.setup_frame import SetupFrame
 
     placement = request.pop("placement")
-    where = Placement(**placement) if placement else None
+    where = SetupFrame(**placement) if placement else None
     try:
         if request.pop("wanted", "part") == "patches":
             from geometry.step_import.occ.patches import load_patches

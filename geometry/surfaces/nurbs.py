@@ -28,7 +28,7 @@ SLACK = 1e-9
 # The two tangents of a place with a normal: neither shorter than this share of the size of the net by the range of
 # the parameter, nor their angle less than this (rad). Poles of spheres and tips of cones fail it.
 SINGULAR = 1e-9
-MOST_FACETS = 20_000_000
+MAX_FACETS = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ class NurbsSurface:
         if m.shape != (4, 4) or not np.isfinite(m).all():
             raise GeometryError(f"a motion is a finite matrix of shape (4, 4), got {m.shape}", code="not_rigid",
                                 subjects=("matrix",), measured=list(m.shape), limit=[4, 4],
-                                remedy="use Placement.matrix")
+                                remedy="use SetupFrame.matrix")
         turn = m[:3, :3]
         off = float(np.abs(turn @ turn.T - np.eye(3)).max())
         if off > 1e-9 or np.linalg.det(turn) < 0.0:
@@ -274,9 +274,9 @@ class NurbsSurface:
                 raise GeometryError(f"{name} is {step}; a step is positive", code="bad_step", subjects=(name,),
                                     measured=step, limit=0.0, remedy="ask steps_for_chord")
         counts = np.maximum(np.ceil(size / (du, dv) - SLACK), 1.0)
-        if 2.0 * counts.prod() > MOST_FACETS:
+        if 2.0 * counts.prod() > MAX_FACETS:
             raise GeometryError(f"steps of {du:g} and {dv:g} make {2.0 * counts.prod():.3g} facets", code="bad_step",
-                                subjects=("du", "dv"), measured=2.0 * counts.prod(), limit=MOST_FACETS,
+                                subjects=("du", "dv"), measured=2.0 * counts.prod(), limit=MAX_FACETS,
                                 remedy="take longer steps")
         return int(counts[0]), int(counts[1])
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64
-from geometry.trimming.facet_sheet import BOOL, I64, Sheet
-from geometry.trimming.label_query import Asker, bisect
+from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet
+from geometry.trimming.label_query import LabelQuery, bisect
 
 # Rounds of bending; each takes about three quarters off the error that is left.
 BEND_ROUNDS = 10
@@ -17,11 +17,11 @@ BUDGET = 8
 REACH = 0.9
 
 
-def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
+def bend(sheet: FacetSheet, query: LabelQuery, tolerance: float) -> None:
     """Where the middle of a cut is farther than the tolerance from the change of label, put a node there.
 
-    sheet     : Sheet, every facet with one label; changed in place
-    ask       : Asker
+    sheet     : FacetSheet, every facet with one label; changed in place
+    query       : LabelQuery
     tolerance : float, mm
 
     The node goes along the line to the far corner of the facet on its wrong side, so no facet turns over.
@@ -44,7 +44,7 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
         share = np.minimum(tolerance / np.where(height > 0, height, tolerance), 0.5)
         own = sheet.label[facets]
         probe = middle[:, None] + share[..., None] * (far - middle[:, None])
-        right = ask(probe.reshape(-1, COLUMNS), np.repeat(face, 2)).reshape(-1, 2) == own
+        right = query(probe.reshape(-1, COLUMNS), np.repeat(face, 2)).reshape(-1, 2) == own
         fine = right.all(axis=1) | (chord <= tolerance)
         settled = np.concatenate([settled, key[fine]])
         rows = np.flatnonzero(~fine)
@@ -55,7 +55,7 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
         reach = _reach(p[rows], q[rows], far[rows, side], far[rows, 1 - side])
         end = middle[rows] + reach[:, None] * (far[rows, side] - middle[rows])
         here = own[rows, side]
-        way, _, _ = bisect(ask, end, middle[rows], face[rows], here, here, tolerance, False)
+        way, _, _ = bisect(query, end, middle[rows], face[rows], here, here, tolerance, False)
         node = sheet.add(end + way[:, None] * (middle[rows] - end), face[rows])
         _insert(sheet, facets[rows], places[rows], node)
         if len(sheet.nodes) > most:
@@ -80,7 +80,7 @@ def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
     return out
 
 
-def _borders(sheet: Sheet) -> tuple[I64, I64, I64]:
+def _borders(sheet: FacetSheet) -> tuple[I64, I64, I64]:
     """Sides between two labels: key (e,) of the nodes, the two facets (e, 2), and its place (e, 2) in them."""
     near = np.flatnonzero((sheet.corners >= sheet.first_cut).sum(axis=1) >= 2)
     a, b = sheet.corners[near], sheet.corners[near][:, [1, 2, 0]]
@@ -101,7 +101,7 @@ def _independent(facets: I64, count: int) -> BOOL:
     return np.asarray((best[facets] == rank[:, None]).all(axis=1))
 
 
-def _insert(sheet: Sheet, facets: I64, places: I64, node: I64) -> None:
+def _insert(sheet: FacetSheet, facets: I64, places: I64, node: I64) -> None:
     """Split the two facets beside each side at a node in its stead."""
     more, labels = [], []
     for k in (0, 1):

@@ -21,7 +21,7 @@ BOOL = NDArray[np.bool_]
 
 
 @dataclass(eq=False)
-class Sheet:
+class FacetSheet:
     """Facets of some faces of a part.
 
     nodes    : (n, 8) float64: x, y, z mm, u, v, normal (not unit); a point has one node per face and side of a seam
@@ -58,13 +58,13 @@ class Sheet:
         return np.arange(first, first + len(rows))
 
 
-def sheet_of(part: Part, faces: Sequence[int] | None) -> Sheet:
+def sheet_of(part: Part, faces: Sequence[int] | None) -> FacetSheet:
     """The mesh facets of the wanted faces as a sheet.
 
     part  : Part with ``uv``
     faces : face numbers, all when None
 
-    Returns Sheet. Where the surface has a pole, the facets without area that the mesh leaves out there are put back:
+    Returns FacetSheet. Where the surface has a pole, the facets without area that the mesh leaves out there are put back:
     they have area in (u, v).
     Raises GeometryError (``no_parameters``, ``no_such_face``).
     """
@@ -94,7 +94,7 @@ def sheet_of(part: Part, faces: Sequence[int] | None) -> Sheet:
     normal = normal / np.where(length > 0, length, 1.0)[:, None]
     nodes = np.concatenate([part.mesh.vertices[vertex[first]], uv[first], normal[point[first]]], axis=1)
     corners = _with_poles(node.reshape(-1, 3), vertex[first].astype(np.int64))
-    return Sheet(nodes, ids[first].astype(np.int32), corners, np.zeros(len(corners), np.int64), len(nodes))
+    return FacetSheet(nodes, ids[first].astype(np.int32), corners, np.zeros(len(corners), np.int64), len(nodes))
 
 
 def _with_poles(corners: I64, vertex: I64) -> I64:
@@ -123,13 +123,13 @@ def sides_of(corners: I64) -> tuple[I64, I64, I64]:
     return keys >> 32, keys & 0xFFFFFFFF, index.reshape(-1, 3)
 
 
-def refined(sheet: Sheet, pitch: float) -> Sheet:
+def refined(sheet: FacetSheet, pitch: float) -> FacetSheet:
     """The sheet with every facet divided so that no side and no row is longer than the pitch.
 
-    sheet : Sheet
+    sheet : FacetSheet
     pitch : float, mm
 
-    Returns a new Sheet; nodes on a side depend on the side alone, so neighbours share them.
+    Returns a new FacetSheet; nodes on a side depend on the side alone, so neighbours share them.
     """
     low, high, sides = sides_of(sheet.corners)
     length = np.linalg.norm(sheet.nodes[high, :3] - sheet.nodes[low, :3], axis=1)
@@ -146,4 +146,4 @@ def refined(sheet: Sheet, pitch: float) -> Sheet:
     corners = np.empty((int(small.sum()), 3), np.int64)
     divide(sheet.corners, sides, parts, length, first, nodes, pitch, node_at, facet_at, corners)
     face = np.concatenate([sheet.face, sheet.face[low[edge]], np.repeat(sheet.face[sheet.corners[:, 0]], inner)])
-    return Sheet(nodes, face, corners, np.zeros(len(corners), np.int64), sheet.original)
+    return FacetSheet(nodes, face, corners, np.zeros(len(corners), np.int64), sheet.original)

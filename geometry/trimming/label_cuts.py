@@ -11,8 +11,8 @@ import numpy as np
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64, I32
 from geometry.trimming.border_bending import bend
-from geometry.trimming.facet_sheet import BOOL, I64, Sheet, sides_of
-from geometry.trimming.label_query import Asker, Label, bisect
+from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet, sides_of
+from geometry.trimming.label_query import Label, LabelQuery, bisect
 
 # Rounds of cutting sides that hold a third label; then the change nearest to one end is taken.
 SPLIT_ROUNDS = 4
@@ -22,36 +22,36 @@ SPLIT_ROUNDS = 4
 CURVE_ROUNDS, CURVED, BUDGET = 8, 0.05, 8
 
 
-def label_sheet(sheet: Sheet, label: Label, tolerance: float) -> Sheet:
+def label_sheet(sheet: FacetSheet, label: Label, tolerance: float) -> FacetSheet:
     """Cut a refined sheet where the label changes.
 
-    sheet     : Sheet as ``refined`` returns it
+    sheet     : FacetSheet as ``refined`` returns it
     label     : Label
     tolerance : float, mm, distance within which a change of label is located
 
-    Returns a Sheet with one label a facet.
+    Returns a FacetSheet with one label a facet.
     """
-    ask = Asker(label)
-    at = ask(sheet.nodes, sheet.face)
-    at = _probe(sheet, at, ask)
+    query = LabelQuery(label)
+    at = query(sheet.nodes, sheet.face)
+    at = _probe(sheet, at, query)
     sheet.first_cut = len(sheet.nodes)
     beside = np.zeros(len(at), bool)
     beside[sheet.corners[(at[sheet.corners] != at[sheet.corners[:, :1]]).any(axis=1)]] = True
     work = beside[sheet.corners].any(axis=1)
     rest = sheet.corners[~work]
     sheet.corners = sheet.corners[work]
-    crossing = _crossings(sheet, at, _shared_sides(sheet.corners, rest), ask, tolerance)
-    _cut(sheet, *crossing, ask, tolerance)
-    bend(sheet, ask, tolerance)
+    crossing = _crossings(sheet, at, _shared_sides(sheet.corners, rest), query, tolerance)
+    _cut(sheet, *crossing, query, tolerance)
+    bend(sheet, query, tolerance)
     sheet.label = np.concatenate([at[rest[:, 0]], sheet.label])
     sheet.corners = np.concatenate([rest, sheet.corners])
     return sheet
 
 
-def _probe(sheet: Sheet, at: I64, ask: Asker) -> I64:
+def _probe(sheet: FacetSheet, at: I64, query: LabelQuery) -> I64:
     """Ask the centre of every facet; where none of the corners has that label, the centre becomes a node."""
     centre = sheet.nodes[sheet.corners].mean(axis=1)
-    here = ask(centre, sheet.face[sheet.corners[:, 0]])
+    here = query(centre, sheet.face[sheet.corners[:, 0]])
     new = (here[:, None] != at[sheet.corners]).all(axis=1)
     number = sheet.add(centre[new], sheet.face[sheet.corners[new, 0]])
     c = sheet.corners[new]
@@ -67,7 +67,7 @@ def _shared_sides(one: I64, two: I64) -> I64:
     return np.intersect1d(low << 32 | high, low_two << 32 | high_two, assume_unique=True)
 
 
-def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) -> tuple[I64, I64, I64]:
+def _crossings(sheet: FacetSheet, at: I64, fixed: I64, query: LabelQuery, tolerance: float) -> tuple[I64, I64, I64]:
     """A node on every edge whose ends differ, at the change of label.
 
     Returns the labels (n,) of the nodes (of no meaning for crossings); (t, 3) edge numbers; (e,) crossing nodes or
@@ -81,7 +81,7 @@ def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) 
         key = low << 32 | high
         open_ = np.flatnonzero((at[low] != at[high]) & ~np.isin(key, known[:, 0]))
         a, b = low[open_], high[open_]
-        share, third, label = bisect(ask, sheet.nodes[a], sheet.nodes[b], sheet.face[a], at[a], at[b], tolerance,
+        share, third, label = bisect(query, sheet.nodes[a], sheet.nodes[b], sheet.face[a], at[a], at[b], tolerance,
                                      round_ - curves < SPLIT_ROUNDS)
         node = sheet.add(sheet.nodes[a] + share[:, None] * (sheet.nodes[b] - sheet.nodes[a]), sheet.face[a])
         at = np.concatenate([at, np.where(third, label, at[a])])
@@ -93,7 +93,7 @@ def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) 
             most = min(most, len(sheet.nodes) + BUDGET * len(known))
             if curves == CURVE_ROUNDS or len(sheet.nodes) > most:
                 break
-            halved, fine = _curved(sheet, at, sides, crossing, settled, ask, tolerance)
+            halved, fine = _curved(sheet, at, sides, crossing, settled, query, tolerance)
             settled = np.concatenate([settled, fine])
             halved = np.setdiff1d(halved, np.flatnonzero(np.isin(key, fixed))).astype(np.int64)
             if not len(halved):
@@ -101,7 +101,7 @@ def _crossings(sheet: Sheet, at: I64, fixed: I64, ask: Asker, tolerance: float) 
             curves += 1
             a, b = low[halved], high[halved]
             middle[halved] = sheet.add(0.5 * (sheet.nodes[a] + sheet.nodes[b]), sheet.face[a])
-            at = np.concatenate([at, ask(sheet.nodes[middle[halved]], sheet.face[a])])
+            at = np.concatenate([at, query(sheet.nodes[middle[halved]], sheet.face[a])])
         sheet.corners = split(sheet.corners, sides, middle)
     return at, sides, crossing
 
@@ -115,7 +115,7 @@ def _look_up(known: I64, key: I64) -> I64:
     return np.where(found[:, 0] == key, found[:, 1], -1)
 
 
-def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, settled: I64, ask: Asker,
+def _curved(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, settled: I64, query: LabelQuery,
             tolerance: float) -> tuple[I64, I64]:
     """Edge numbers of the facets with two labels whose border misses the middle of the cut by far, and of those with
     three in which no place was found where they meet; and keys of the facets that are fine, passed over next time."""
@@ -135,11 +135,11 @@ def _curved(sheet: Sheet, at: I64, sides: I64, crossing: I64, settled: I64, ask:
     for far, label in ((corner[:, 0], at[c[:, 0]]), (0.5 * (corner[:, 1] + corner[:, 2]), at[c[:, 1]])):
         height = np.linalg.norm(np.cross((p - q)[:, :3], (far - q)[:, :3]), axis=1) / np.where(chord > 0, chord, 1.0)
         share = np.minimum(room / np.where(height > 0, height, np.inf), 1.0)
-        wrong |= ask(middle + share[:, None] * (far - middle), face) != label
+        wrong |= query(middle + share[:, None] * (far - middle), face) != label
     wrong &= chord > 4.0 * tolerance
     three = np.flatnonzero((m >= 0).sum(axis=1) == 3)
     c = sheet.corners[three]
-    _, found = _meeting_points(ask, sheet.nodes[c], sheet.face[c[:, 0]], at[c], tolerance)
+    _, found = _meeting_points(query, sheet.nodes[c], sheet.face[c[:, 0]], at[c], tolerance)
     bad, good = np.concatenate([two[wrong], three[~found]]), np.concatenate([two[~wrong], three[found]])
     return np.unique(sides[bad]), name[good]
 
@@ -165,7 +165,7 @@ def split(corners: I64, sides: I64, middle: I64) -> I64:
     return np.concatenate(out)
 
 
-def _cut(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance: float) -> None:
+def _cut(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, query: LabelQuery, tolerance: float) -> None:
     """Facets with two labels are cut by a segment, with three by a star from the point where the labels meet."""
     at = at[sheet.corners]
     m = crossing[sides]
@@ -183,7 +183,7 @@ def _cut(sheet: Sheet, at: I64, sides: I64, crossing: I64, ask: Asker, tolerance
     three = count == 3
     c, x, t = sheet.corners[three], m[three], at[three]
     face = sheet.face[c[:, 0]]
-    star = sheet.add(_meeting_points(ask, sheet.nodes[c], face, t, tolerance)[0], face)
+    star = sheet.add(_meeting_points(query, sheet.nodes[c], face, t, tolerance)[0], face)
     for k in range(3):
         after = (k + 1) % 3
         pieces += [np.stack([c[:, k], x[:, k], star], axis=1), np.stack([x[:, k], c[:, after], star], axis=1)]
@@ -198,7 +198,7 @@ def _cosine(nodes: F64, at: I64, one: I64, two: I64) -> F64:
     return np.asarray(np.einsum("ij,ij->i", a, b) / np.where(size > 0, size, 1.0))
 
 
-def _meeting_points(ask: Asker, corners: F64, face: I32, at: I64, tolerance: float) -> tuple[F64, BOOL]:
+def _meeting_points(query: LabelQuery, corners: F64, face: I32, at: I64, tolerance: float) -> tuple[F64, BOOL]:
     """Where three labels meet in facets whose corners have three: by halving, one of four parts has three again.
 
     corners : (k, 3, 8) node rows; face : (k,); at : (k, 3) labels
@@ -216,7 +216,7 @@ def _meeting_points(ask: Asker, corners: F64, face: I32, at: I64, tolerance: flo
             return 0.999 * corners.mean(axis=1) + 0.001 * outer, found
         c, t = corners[live], at[live]
         m = 0.5 * (c + np.roll(c, -1, axis=1))
-        a = ask(m.reshape(-1, COLUMNS), np.repeat(face[live], 3)).reshape(-1, 3)
+        a = query(m.reshape(-1, COLUMNS), np.repeat(face[live], 3)).reshape(-1, 3)
         parts = [(c[:, 0], m[:, 0], m[:, 2]), (m[:, 0], c[:, 1], m[:, 1]), (m[:, 2], m[:, 1], c[:, 2]),
                  (m[:, 0], m[:, 1], m[:, 2])]
         names = [(t[:, 0], a[:, 0], a[:, 2]), (a[:, 0], t[:, 1], a[:, 1]), (a[:, 2], a[:, 1], t[:, 2]),

@@ -13,7 +13,7 @@ from geometry.trimming.facet_sheet import BOOL, I64
 Label = Callable[[F64, F64, I32], I64]
 
 
-class Asker:
+class LabelQuery:
     """The label as a function of node rows; ``calls`` and ``asked`` count what it cost."""
 
     def __init__(self, label: Label) -> None:
@@ -33,7 +33,7 @@ class Asker:
         return out.astype(np.int64, copy=False)
 
 
-def bisect(ask: Asker, start: F64, end: F64, face: I32, at_start: I64, at_end: I64, tolerance: float,
+def bisect(query: LabelQuery, start: F64, end: F64, face: I32, at_start: I64, at_end: I64, tolerance: float,
            stop_at_third: bool) -> tuple[F64, BOOL, I64]:
     """Where along straight lines the label changes.
 
@@ -53,7 +53,7 @@ def bisect(ask: Asker, start: F64, end: F64, face: I32, at_start: I64, at_end: I
         if not len(live):
             return 0.5 * (low + high), third, label
         middle = 0.5 * (low[live] + high[live])
-        here = ask(start[live] + middle[:, None] * (end[live] - start[live]), face[live])
+        here = query(start[live] + middle[:, None] * (end[live] - start[live]), face[live])
         same = here == at_start[live]
         low[live[same]], high[live[~same]] = middle[same], middle[~same]
         if stop_at_third:

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.kernels.trim import thin, trace
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.trimming.facet_sheet import BOOL, I64, Sheet, refined, sheet_of
+from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet, refined, sheet_of
 from geometry.trimming.label_cuts import label_sheet
 from geometry.trimming.label_query import Label
 
@@ -97,7 +97,7 @@ def _components(twin: I64, label: I64) -> I64:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
+def _absorb(sheet: FacetSheet, twin: I64, areas: F64, tolerance: float) -> I64:
     """Give pieces narrower than the tolerance (twice area over border) to the neighbour with the longest border.
 
     Returns (t,) group numbers; ``sheet.label`` is changed with them.
@@ -128,7 +128,7 @@ def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
     return group
 
 
-def _patches(sheet: Sheet, twin: I64, group: I64, areas: F64, scale: F64,
+def _patches(sheet: FacetSheet, twin: I64, group: I64, areas: F64, scale: F64,
              tolerance: float) -> dict[int, tuple[FacePatch, ...]]:
     sides = 3 * len(sheet.corners)
     nodes, walked, at = np.empty(sides, np.int64), np.empty(sides, np.int64), np.empty(sides + 1, np.int64)
@@ -165,7 +165,7 @@ def _shoelace(polygon: F64) -> float:
     return float(0.5 * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum())
 
 
-def _scales(sheet: Sheet) -> F64:
+def _scales(sheet: FacetSheet) -> F64:
     """(f, 2) float64 by face number, mm a unit of u and of v: the 99 % quantile by area over the facets of the face."""
     p, q = sheet.nodes[sheet.corners, :3], sheet.nodes[sheet.corners, 3:5]
     e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -185,7 +185,7 @@ def _scales(sheet: Sheet) -> F64:
     return out
 
 
-def _kept(sheet: Sheet, nodes: I64, at: I64, owner: I64, other: I64, scale: F64, tolerance: float) -> BOOL:
+def _kept(sheet: FacetSheet, nodes: I64, at: I64, owner: I64, other: I64, scale: F64, tolerance: float) -> BOOL:
     """(n,) nodes that stay in the loops.
 
     On the rim of a face its own nodes and the ends of borders; on a border between two pieces what Douglas-Peucker
@@ -228,7 +228,7 @@ def _thin_ring(ring: I64, points: F64, tolerance: float, keep: BOOL) -> None:
         _thin_chain(closed[s:e + 1], points, tolerance, keep)
 
 
-def _restore(sheet: Sheet, nodes: I64, at: I64, owner: I64, face_of: I64, keep: BOOL) -> None:
+def _restore(sheet: FacetSheet, nodes: I64, at: I64, owner: I64, face_of: I64, keep: BOOL) -> None:
     """Where thinning made the loops of a piece cross or fall flat, the borders of its face keep all their nodes."""
     rings: dict[int, list[F64]] = {}
     bad = set()

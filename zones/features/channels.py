@@ -25,8 +25,8 @@ from geometry.mesh_queries.nearest import nearest
 from geometry.sampling import sample_surface
 from zones.features.connection_caps import cap_footprints
 from zones.features.face_graph import FaceGraph, cast
-from zones.features.side_borders import Border, Places, neighbours
-from zones.features.smooth_surface import SmoothFaces
+from zones.features.side_borders import BorderPlaces, SideBorder, neighbours
+from zones.features.smooth_surface import SmoothSurface
 from zones.kernels.nearby import one_piece
 
 FACING_DOT = -0.3
@@ -105,7 +105,7 @@ class _Side:
     def __init__(self, mesh: TriangleMesh, triangles: np.ndarray) -> None:
         self.mesh, self.triangles = mesh, triangles
         self.area = float(mesh.areas[triangles].sum())
-        self.border = Border.of(mesh, triangles)
+        self.border = SideBorder.of(mesh, triangles)
         self.rim = np.unique(self.border.nodes)
 
     @cached_property
@@ -150,7 +150,7 @@ class _Field:
         self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
         self.tree = TriangleTree(self.mesh)
         self.skin = graph.skin
-        self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
+        self.smooth = SmoothSurface(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
                                   max(graph.part.chord, graph.part.deviation))
         self.count = len(sides)
         self.walls = [_Side(self.mesh, np.flatnonzero(self.owner == k)) for k in range(self.count)]
@@ -245,7 +245,7 @@ class _Field:
         """Pairs of walls that see each other, in order of the pair."""
         area: dict[tuple[int, int], float] = {}
         best: dict[tuple[int, int], list[Start]] = {}
-        rim: dict[int, tuple[Places, F64, np.ndarray]] = {}
+        rim: dict[int, tuple[BorderPlaces, F64, np.ndarray]] = {}
         for wall, side in enumerate(self.walls):
             if side.area <= 0:
                 continue
@@ -271,7 +271,7 @@ class _Field:
         return out
 
     def _least(self, pair: tuple[int, int], found: list[Start],
-               rim: dict[int, tuple[Places, F64, np.ndarray]]) -> tuple[float, tuple[float, float, float]]:
+               rim: dict[int, tuple[BorderPlaces, F64, np.ndarray]]) -> tuple[float, tuple[float, float, float]]:
         """Least ray length of a pair, inside and along the borders, and the point on the first wall there."""
         gap, point, foot, wall = self._refine(found)
         for a, b in dict.fromkeys((pair, pair[::-1])):

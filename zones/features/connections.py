@@ -32,7 +32,7 @@ SPAN_SLACK = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Border:
+class ConcaveBorder:
     """A concave border between two bodies, of one edge or one fillet.
 
     a, b     : bodies
@@ -74,7 +74,7 @@ class Bridges:
     connections: list[list[int]]
     ends: list[list[End]]
     base: set[int]
-    borders: list[Border]
+    borders: list[ConcaveBorder]
 
 
 def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
@@ -125,7 +125,7 @@ def all_bodies(graph: FaceGraph, label: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(loose, sets.labels() + graph.n, label))
 
 
-def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
+def find_borders(graph: FaceGraph, body: np.ndarray) -> list[ConcaveBorder]:
     """Concave borders between different bodies, by edges and by fillets.
 
     body : (n,) int labels
@@ -135,7 +135,7 @@ def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
         a, b = int(body[link.a]), int(body[link.b])
         if link.kind == EdgeKind.CONCAVE and a != b and NO_WALL not in (a, b):
             nodes = link.nodes
-            out.append(Border(a, b, graph.normals_at(link.a, nodes), graph.normals_at(link.b, nodes), nodes))
+            out.append(ConcaveBorder(a, b, graph.normals_at(link.a, nodes), graph.normals_at(link.b, nodes), nodes))
     for fillet in np.flatnonzero(graph.fillet):
         links = [k for k in graph.at[fillet] if body[k.other(int(fillet))] != NO_WALL]
         for i, first in enumerate(links):
@@ -144,12 +144,12 @@ def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
                 g = second.other(int(fillet))
                 if body[f] != body[g]:
                     nodes = np.concatenate([first.nodes, second.nodes])
-                    out.append(Border(int(body[f]), int(body[g]), graph.normals_at(f, first.nodes),
+                    out.append(ConcaveBorder(int(body[f]), int(body[g]), graph.normals_at(f, first.nodes),
                                       graph.normals_at(g, second.nodes), nodes))
     return out
 
 
-def _ends(graph: FaceGraph, group: list[int], borders: list[Border], walls: set[int]) -> list[End]:
+def _ends(graph: FaceGraph, group: list[int], borders: list[ConcaveBorder], walls: set[int]) -> list[End]:
     """Places where a group of bodies ends at walls, each a connected run of borders."""
     mine = set(group)
     out = []
@@ -192,7 +192,7 @@ def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
     return out - set(sheets.labels)
 
 
-def _carries(borders: list[Border], x: int, thin: set[int]) -> bool:
+def _carries(borders: list[ConcaveBorder], x: int, thin: set[int]) -> bool:
     """Whether a thin body stands on a body: their border shows the upper side of that body."""
     sides = [own for b in borders for own, mine, other in ((b.na, b.a, b.b), (b.nb, b.b, b.a))
              if mine == x and other in thin]
@@ -227,7 +227,7 @@ def _looks_up(graph: FaceGraph, faces: np.ndarray) -> bool:
     return bool(mean[2] > STEEP_NZ * np.linalg.norm(mean))
 
 
-def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: list[Border], void: F64,
+def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: list[ConcaveBorder], void: F64,
                 unsupported: set[int]) -> bool:
     """Whether a group of bodies leaves void below some part of its span, where no floor or rib carries it either.
 
@@ -278,7 +278,7 @@ def _beside(under: F64, tops: list[F64], void: F64) -> bool:
     return bool(left.all() or not left.any())
 
 
-def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[Border], base: set[int],
+def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[ConcaveBorder], base: set[int],
              among: set[int]) -> set[int]:
     """Sheets that stand on no base along any edge or fillet and have void below.
 
@@ -304,7 +304,7 @@ def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[B
     return out & free
 
 
-def _groups(piece: set[int], borders: list[Border]) -> list[list[int]]:
+def _groups(piece: set[int], borders: list[ConcaveBorder]) -> list[list[int]]:
     """Bodies that may be one connection: pieces that meet each other (forks)."""
     order = sorted(piece)
     place = {x: i for i, x in enumerate(order)}
@@ -316,4 +316,4 @@ def _groups(piece: set[int], borders: list[Border]) -> list[list[int]]:
     return [[order[i] for i in np.flatnonzero(label == k)] for k in np.unique(label)]
 
 
-__all__ = ["Border", "Bridges", "End", "all_bodies", "find_borders", "find_bridges"]
+__all__ = ["ConcaveBorder", "Bridges", "End", "all_bodies", "find_borders", "find_bridges"]

@@ -15,7 +15,7 @@ import numpy as np
 from geometry.mesh import F64, TriangleMesh
 
 # Points a border is looked at first, at most; the best so many are looked at closer, so often, so much each time.
-MOST, CLOSER, TIMES, FINER = 3000, 6, 5, 8
+MAX_STARTS, CLOSER, TIMES, FINER = 3000, 6, 5, 8
 
 
 Rays = Callable[[F64, np.ndarray], tuple[F64, F64, F64]]
@@ -23,7 +23,7 @@ Rays = Callable[[F64, np.ndarray], tuple[F64, F64, F64]]
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class BorderPlaces:
     """Places along a border.
 
     piece : (k,) int, of the border; t : (k,) float64, 0 to 1 along it; half : (k,) float64, to the next place, half way
@@ -35,7 +35,7 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
-class Border:
+class SideBorder:
     """The border of the sides of a wall.
 
     ends     : (m, 2, 3) float64, mm, its straight pieces between mesh nodes
@@ -50,28 +50,28 @@ class Border:
     nodes: np.ndarray
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, side: np.ndarray) -> Border:
+    def of(cls, mesh: TriangleMesh, side: np.ndarray) -> SideBorder:
         """The border of some triangles (k,) of a mesh: their edges that no two of them share."""
         edges, _, alone = _edges(mesh.faces[side])
         at = side[alone % len(side)]
         return cls(mesh.vertices[edges[alone]], mesh.triangles[at].mean(axis=1), at, edges[alone])
 
-    def places(self) -> Places:
+    def places(self) -> BorderPlaces:
         """Evenly spread places, one or more on each piece."""
         lengths = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
-        count = np.maximum(np.ceil(MOST * lengths / max(float(lengths.sum()), 1e-30)), 1.0).astype(np.int64)
+        count = np.maximum(np.ceil(MAX_STARTS * lengths / max(float(lengths.sum()), 1e-30)), 1.0).astype(np.int64)
         piece = np.repeat(np.arange(len(count)), count)
         half = 0.5 / count[piece]
         within = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
-        return Places(piece, (2.0 * within + 1.0) * half, half)
+        return BorderPlaces(piece, (2.0 * within + 1.0) * half, half)
 
-    def points(self, at: Places, inset: float) -> F64:
+    def points(self, at: BorderPlaces, inset: float) -> F64:
         """(k, 3) float64, mm: the places, moved by a share of a triangle into the side."""
         a, b = self.ends[at.piece, 0], self.ends[at.piece, 1]
         p = a + at.t[:, None] * (b - a)
         return np.asarray(p + inset * (self.middle[at.piece] - p))
 
-    def least(self, rays: Rays, at: Places, length: F64, inset: float) -> tuple[float, F64, F64] | None:
+    def least(self, rays: Rays, at: BorderPlaces, length: F64, inset: float) -> tuple[float, F64, F64] | None:
         """The shortest ray at the border: its length, where it begins, its foot; None where there is none.
 
         at, length : places looked at already and the lengths there, inf for no ray
@@ -85,7 +85,7 @@ class Border:
                 break
             spread = np.linspace(-1.0, 1.0, 2 * FINER + 1)
             t = np.clip(at.t[order, None] + at.half[order, None] * spread, 0.0, 1.0).ravel()
-            at = Places(np.repeat(at.piece[order], len(spread)), t, np.repeat(at.half[order] / FINER, len(spread)))
+            at = BorderPlaces(np.repeat(at.piece[order], len(spread)), t, np.repeat(at.half[order] / FINER, len(spread)))
             length, start, foot = rays(self.points(at, inset), self.triangle[at.piece])
             k, keep = int(np.argmin(length)), 2
             if np.isfinite(length[k]) and (best is None or length[k] < best[0]):

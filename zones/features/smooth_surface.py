@@ -24,7 +24,7 @@ FAR = 4.0
 SAME = 1e-9
 
 
-class SmoothFaces:
+class SmoothSurface:
     """Places and normals of the exact surface on chosen triangles of a mesh.
 
     mesh      : TriangleMesh

@@ -21,7 +21,7 @@ from geometry.sampling import sample_surface
 from zones.model import Wall
 
 SAMPLES = 600  # of the sides of a wall
-MOST_ASKED = 24  # places of a wall that profiles are cut at
+MAX_PLACES = 24  # places of a wall that profiles are cut at
 PROFILE_RAYS = 40  # over the height of a profile
 SKIN_SHARE = 1e-6  # of the size of the part, that rays start below a surface
 
@@ -121,7 +121,7 @@ def _worst(mesh: _WallMesh, ratio: float) -> Slender | None:
     behind = mesh.thickness(samples.points, samples.normals)
     thin = np.flatnonzero(behind * ratio < high)
     order = thin[np.argsort(behind[thin], kind="stable")]
-    asked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MOST_ASKED)).astype(int))]
+    asked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MAX_PLACES)).astype(int))]
     best: Slender | None = None
     for k in asked.tolist():
         found = _at(mesh, samples.points[k], samples.normals[k], int(samples.triangle[k]))

@@ -22,7 +22,7 @@ from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.plan_view.channel_strips import CLEAR, RayIndex, side_rays
 from zones.plan_view.plan_cover import FACES_UP, cover_border, upward
-from zones.plan_view.plan_map import Area, PlanMap
+from zones.plan_view.plan_map import PlanArea, PlanMap
 from zones.plan_view.region_splitting import Parting
 from zones.plan_view.wall_sections import SideCurve, wall_sections
 
@@ -72,7 +72,7 @@ class ChannelPlan:
         found = side_rays(part, d, curves, [a.shape for a in shadows])
         strips = [s for f in found for s in f.strips]
         names = tuple(c.id for c in d.channels)
-        areas = [Area(n, shapely.union_all([s.area for s in strips if s.channel == n]).buffer(CLOSE)) for n in names]
+        areas = [PlanArea(n, shapely.union_all([s.area for s in strips if s.channel == n]).buffer(CLOSE)) for n in names]
         areas += _traces(d, curves) + shadows
         plan = PlanMap.of([a for a in areas if not a.shape.is_empty], [s.centre_line for s in strips])
         of_wall = np.array([[w.id in c.walls for c in d.channels] for w in d.walls], bool)
@@ -131,9 +131,9 @@ class ChannelPlan:
         return np.array(sorted(drawn, key=lambda k: (-round(size[self.names[k]], 3), k)), dtype=np.int64)
 
 
-def footprints(part: Part, decomposition: Decomposition) -> list[Area]:
+def footprints(part: Part, decomposition: Decomposition) -> list[PlanArea]:
     """What each connection covers in plan with its fillets, seen along +Z of the frame of the part."""
-    return [Area(c, _shadow(part, faces)) for c, faces in connection_faces(part, decomposition).items()]
+    return [PlanArea(c, _shadow(part, faces)) for c, faces in connection_faces(part, decomposition).items()]
 
 
 def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:
@@ -144,7 +144,7 @@ def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:
     return shapely.union_all(covers).buffer(0.0)
 
 
-def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[Area]:
+def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[PlanArea]:
     """Outline of each wall at the height it was cut: its sides in turn, or a ring between two closed ones."""
     out = []
     for w in decomposition.walls:
@@ -158,7 +158,7 @@ def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[A
             shape = shapely.make_valid(shapely.Polygon(np.concatenate(mine)))
         else:
             continue
-        out.append(Area(w.id, shape))
+        out.append(PlanArea(w.id, shape))
     return out
 
 

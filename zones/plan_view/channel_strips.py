@@ -35,7 +35,7 @@ SAME_SIDE = 0.5  # n1·n2 above: a point and a ray are on one side
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class ChannelStrip:
     """A run of rays from one wall to another: starts and feet, (k, 2) float64, mm, k >= 2."""
 
     channel: str
@@ -62,7 +62,7 @@ class SideRays:
     start: F64
     normal: F64
     named: list[str]
-    strips: list[Strip]
+    strips: list[ChannelStrip]
 
     @property
     def faced(self) -> dict[str, float]:
@@ -176,7 +176,7 @@ def _side(curve: SideCurve, look: _Look, holes: shapely.Geometry) -> SideRays:
     for run, (first, last) in zip(runs, ends, strict=True):
         base = np.vstack([first[:, :2], start[run], last[:, :2]])
         foot = np.vstack([first[:, 2:], start[run] + length[run, None] * normal[run], last[:, 2:]])
-        strips.append(Strip(named[run[0]], base, foot))
+        strips.append(ChannelStrip(named[run[0]], base, foot))
     return SideRays(start, normal, named, strips)
 
 

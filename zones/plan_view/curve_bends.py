@@ -47,7 +47,7 @@ INNER, OUTER = (0.25, 0.75), (0.05, 0.95)
 ARC_SHARE = 0.5 / 0.9
 
 
-class Way(StrEnum):
+class BendSide(StrEnum):
     """Which way a bend bulges."""
 
     UP = "up"
@@ -57,7 +57,7 @@ class Way(StrEnum):
 
 
 @dataclass(frozen=True)
-class Bend:
+class CurveBend:
     """A stretch of a curve that turns one way.
 
     way        : Way
@@ -66,7 +66,7 @@ class Bend:
     roundness  : length of the middle half of the turn over that of an arc; an arc has 1, a flat sine 0.84
     """
 
-    way: Way
+    way: BendSide
     turn: float
     start: float
     end: float
@@ -79,7 +79,7 @@ class BendLevel:
 
     least: float
     most: float
-    bends: tuple[Bend, ...]
+    bends: tuple[CurveBend, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +284,7 @@ class _Legs:
             return pivots[:leg] + pivots[leg + 2:]
         return pivots[1:] if leg == 0 else pivots[:-1]
 
-    def bends(self, pivots: list[int]) -> tuple[Bend, ...]:
+    def bends(self, pivots: list[int]) -> tuple[CurveBend, ...]:
         """One for every leg; a ring that never turns back is one."""
         ends = self.ends(pivots)
         if self.period and not pivots:
@@ -292,12 +292,12 @@ class _Legs:
         legs = zip(ends[:-1], ends[1:], strict=True)
         return tuple(self._bend(i, j) for i, j in legs if self.theta[i] != self.theta[j])
 
-    def _bend(self, i: int, j: int) -> Bend:
+    def _bend(self, i: int, j: int) -> CurveBend:
         turn = float(self.theta[j] - self.theta[i])
         rounds = float(np.floor(self.s[i]))
         roundness = _roundness(self.s[i:j + 1], self.theta[i:j + 1])
-        way = Way.UP if turn < 0 else Way.DOWN
-        return Bend(way, abs(turn), float(self.s[i]) - rounds, float(self.s[j]) - rounds, roundness)
+        way = BendSide.UP if turn < 0 else BendSide.DOWN
+        return CurveBend(way, abs(turn), float(self.s[i]) - rounds, float(self.s[j]) - rounds, roundness)
 
 
 def _ring(s: F64, theta: F64, p: F64, height: float, errors: F64) -> _Legs:
@@ -345,4 +345,4 @@ def _roundness(s: F64, theta: F64) -> float:
     return float(inner / max(outer, 1e-12) / ARC_SHARE)
 
 
-__all__ = ["Bend", "BendLevel", "BendMeasures", "Way", "measure_bends", "size_of", "smooth"]
+__all__ = ["CurveBend", "BendLevel", "BendMeasures", "BendSide", "measure_bends", "size_of", "smooth"]

@@ -81,7 +81,7 @@ class LevelPlaces:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class FreePlaces:
     """The places of a part at any level.
 
     vertices : (n, 3) float64, mm; faces : (m, 3), indices of what faces up, without connections
@@ -94,13 +94,13 @@ class Places:
     known: dict[int, LevelPlaces] = field(default_factory=dict)
 
     @staticmethod
-    def of(part: Part, spans: Iterable[int]) -> Places:
+    def of(part: Part, spans: Iterable[int]) -> FreePlaces:
         """Of a part, mm, the access along +Z; ``spans`` are the faces of its connections with their fillets."""
         mesh = part.mesh
         up = upward(mesh) > FACES_UP
         span = np.isin(mesh.face_ids, list(spans))
         covered = PlanMap.of_cover("spans", cover_border(mesh.vertices, mesh.faces[up & span])).shape("spans")
-        return Places(mesh.vertices, mesh.faces[up & ~span], covered.buffer(NARROW))
+        return FreePlaces(mesh.vertices, mesh.faces[up & ~span], covered.buffer(NARROW))
 
     def at_level(self, level: float) -> LevelPlaces:
         """The places at a level, mm."""

@@ -21,7 +21,7 @@ OUTSIDE = -1  # cell of a place outside the box of the map
 
 
 @dataclass(frozen=True)
-class Area:
+class PlanArea:
     """A named area in plan: what a cell may lie in.
 
     name  : 'H1', 'W1', 'C2' ...
@@ -48,7 +48,7 @@ class PlanMap:
     over: NDArray[np.bool_]
 
     @staticmethod
-    def of(areas: Sequence[Area], lines: Sequence[F64] = (), grid: float = 1e-3, seed: int = 0) -> PlanMap:
+    def of(areas: Sequence[PlanArea], lines: Sequence[F64] = (), grid: float = 1e-3, seed: int = 0) -> PlanMap:
         """Map of areas, and of polylines (k, 2) that cut cells in two without naming either side.
 
         grid : mm, step the borders are rounded to; what is thinner than it may vanish

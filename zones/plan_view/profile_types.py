@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from zones.plan_view.curve_bends import Bend, BendMeasures, Way, measure_bends
+from zones.plan_view.curve_bends import BendMeasures, BendSide, CurveBend, measure_bends
 
 # Limits of the table; beyond the last relative distance there is no second type.
 SKEW = 0.10
@@ -79,7 +79,7 @@ class VoidSide(StrEnum):
 
 
 @dataclass(frozen=True)
-class Profile:
+class CurveProfile:
     """The type of a curve and what it was decided by.
 
     type      : ProfileType, None for a curve without a bend
@@ -97,13 +97,13 @@ class Profile:
     level: Level
     margin: float
     second: ProfileType | None
-    bends: tuple[Bend, ...]
+    bends: tuple[CurveBend, ...]
     skew: float
     roundness: float
     closed: bool
 
 
-def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.LEFT) -> Profile:
+def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.LEFT) -> CurveProfile:
     """The profile type of a curve.
 
     points : (n, 2) float64, mm, in plan; four hundred or more where they carry noise
@@ -112,7 +112,7 @@ def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.
 
     Returns
     -------
-    Profile
+    CurveProfile
         The same for a curve that is moved, turned, scaled or sampled otherwise, and for the reversed points with the
         void on the other side. Noise of 1 % of the chord left it in 399 or more of 400 curves a type, and in 364 for
         C9 (docs/theory/profiles.md).
@@ -128,21 +128,21 @@ def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.
     bends = measures.levels[place].bends
     kind = _decide(measures, bends, measures.skew, roundness_of(bends))
     margin, second = _nearest_other(measures, place, kind)
-    return Profile(kind, LEVEL[kind] if kind else Level.SIMPLE, margin, second, _ordered(measures, bends),
+    return CurveProfile(kind, LEVEL[kind] if kind else Level.SIMPLE, margin, second, _ordered(measures, bends),
                    measures.skew, roundness_of(bends), closed)
 
 
-def roundness_of(bends: tuple[Bend, ...]) -> float:
+def roundness_of(bends: tuple[CurveBend, ...]) -> float:
     """Mean roundness of the up bends, 0 without any."""
-    found = [b.roundness for b in bends if b.way == Way.UP]
+    found = [b.roundness for b in bends if b.way == BendSide.UP]
     return float(np.mean(found)) if found else 0.0
 
 
-def _decide(measures: BendMeasures, bends: tuple[Bend, ...], skew: float, roundness: float) -> ProfileType | None:
+def _decide(measures: BendMeasures, bends: tuple[CurveBend, ...], skew: float, roundness: float) -> ProfileType | None:
     """The decision table."""
     if not bends:
         return None
-    ups = sum(b.way == Way.UP for b in bends)
+    ups = sum(b.way == BendSide.UP for b in bends)
     if measures.closed:
         return CLOSED.get(ups, ProfileType.C10)
     return _decide_triple(skew, roundness) if ups == 3 else OPEN.get(ups, ProfileType.C10)
@@ -181,7 +181,7 @@ def _relative(measure: float, limit: float) -> float:
     return 1.0 if not np.isfinite(measure) else abs(measure - limit) / max(measure, limit)
 
 
-def _ordered(measures: BendMeasures, bends: tuple[Bend, ...]) -> tuple[Bend, ...]:
+def _ordered(measures: BendMeasures, bends: tuple[CurveBend, ...]) -> tuple[CurveBend, ...]:
     """In walking order; on a ring from the bend that holds the least curvature, counted the way the ring turns."""
     if not measures.closed or len(bends) < 2:
         return bends

@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from geometry.part import Part
 from zones.features.connection_faces import connection_faces
 from zones.model import Decomposition
-from zones.plan_view.free_places import MATERIAL, NARROW, OPEN, LevelPlaces, Places
+from zones.plan_view.free_places import MATERIAL, NARROW, OPEN, FreePlaces, LevelPlaces
 from zones.plan_view.wall_sections import SideCurve
 
 OFF = (0.02, 0.1, 0.3)  # mm off the surface where its place is looked up; then the nearest of its region
@@ -81,7 +81,7 @@ class Parting:
         d = decomposition
         if not d.channels:
             return Parting({})
-        places = Places.of(part, {f for own in connection_faces(part, d).values() for f in own})
+        places = FreePlaces.of(part, {f for own in connection_faces(part, d).values() for f in own})
         level = {c.id: min(heights[w] for w in c.walls) for c in d.channels}
         out: dict[str, Parted] = {}
 

@@ -97,7 +97,7 @@ class Labels:
             np.zeros(0, dtype=object)
 
 
-class Regioner:
+class RegionLocator:
     """Labels points of a part as one access direction sees it.
 
     part, decomposition : in the access frame, +Z towards the spindle (ids of the decomposition are kept, its

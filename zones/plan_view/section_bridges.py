@@ -12,7 +12,7 @@ from geometry.mesh import F64
 
 # A bridge that would turn by more than this (rad) between an end and the chord is the chord: such ends have no
 # direction that goes on. One point for each step of turn (rad).
-MOST_TURN, STEP = 1.0, 0.05
+MAX_TURN, STEP = 1.0, 0.05
 
 
 def bridge(before: F64, after: F64, reach: float) -> F64:
@@ -32,7 +32,7 @@ def bridge(before: F64, after: F64, reach: float) -> F64:
     far = float(np.linalg.norm(chord))
     leave, enter = -direction(before[::-1], reach), direction(after, reach)
     off = np.array([_angle(leave, chord), _angle(chord, enter)])
-    if np.abs(off).max() > MOST_TURN:
+    if np.abs(off).max() > MAX_TURN:
         return np.zeros((0, 2))
     # The speed at which the cubic follows an arc that turns by ``off`` at either end.
     speed = 2.0 * far / (1.0 + float(np.cos(off).mean()))

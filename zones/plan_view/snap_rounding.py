@@ -25,7 +25,7 @@ from geometry.mesh import F64
 from zones.kernels.trapezoid import LIMIT
 
 I64 = NDArray[np.int64]
-LEAST_PART = 4.0  # grid steps: shorter parts of a segment are not worth a box of their own
+MIN_PART = 4.0  # grid steps: shorter parts of a segment are not worth a box of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ def _near(segments: I64, hot: I64) -> tuple[I64, I64]:
     p, d = segments[:, 0].astype(float), (segments[:, 1] - segments[:, 0]).astype(float)
     length = np.hypot(d[:, 0], d[:, 1])
     spread = float(np.prod(np.ptp(hot, axis=0) + 1.0))
-    part = max(LEAST_PART, float(np.sqrt(spread / len(hot))), float(length.sum()) / (4 * (n + len(hot))))
+    part = max(MIN_PART, float(np.sqrt(spread / len(hot))), float(length.sum()) / (4 * (n + len(hot))))
     parts = np.maximum(1, np.ceil(length / part)).astype(np.int64)
     of = np.repeat(np.arange(n), parts)
     k = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)

@@ -16,7 +16,7 @@ BACKED_REACH = 3.0
 BACKED_DOT = -0.8
 PIECE = 0.5
 PIECES = 400
-LEAST_STRETCH = 1.0
+MIN_STRETCH = 1.0
 CORNER = np.radians(45.0)
 
 FREE, MINE, OTHER = 0, 1, 2
@@ -105,7 +105,7 @@ class Pieces:
             opens = np.roll(opens, -int(np.argmax(opens)))
             for run in np.split(rows, np.flatnonzero(opens)[1:]):
                 held = run[:int(np.argmin(backed[run]))] if not backed[run].all() else run
-                if self.length[held].sum() >= LEAST_STRETCH * self.thick:
+                if self.length[held].sum() >= MIN_STRETCH * self.thick:
                     out.append(held.tolist())
         return out
 

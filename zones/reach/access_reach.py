@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from zones.features.connection_faces import connection_faces
-from zones.machinable_area import LEVEL, Form, forms_of
+from zones.machinable_area import LEVEL, AreaForm, forms_of
 from zones.model import Decomposition
 from zones.reach.access_view import View
 from zones.reach.tip_field import touchable
@@ -38,9 +38,9 @@ def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
     return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
 
 
-def preference(tool: ToolBody, form: Form) -> tuple[float, float, float]:
+def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float]:
     """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
-    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is Form.LEVEL else 0.0
+    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is AreaForm.LEVEL else 0.0
     return (kind, -tool.diameter, tool.stickout)
 
 
@@ -79,11 +79,11 @@ class Sight:
         """(n,) bool: samples this tool can finish along this view."""
         return np.asarray(self.can[tool] & self.reach[tool].by_tool)
 
-    def order(self, form: Form) -> list[str]:
+    def order(self, form: AreaForm) -> list[str]:
         """Ids of the tools, best first."""
         return sorted(self.view.fields, key=lambda t: (*preference(self.view.fields[t].tool, form), t))
 
-    def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, Form, NDArray[np.int64]]]:
+    def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, AreaForm, NDArray[np.int64]]]:
         """Base region with its place, form and samples of what is to be shared out, in a fixed order."""
         labels = self.view.labels
         names, ground = np.unique([r.ground for r in labels.regions], return_inverse=True)
@@ -92,7 +92,7 @@ class Sight:
         out = []
         for k in np.unique(base):
             mine = asked[base == k]
-            for form in Form:
+            for form in AreaForm:
                 members = mine[self.form[mine] == form]
                 if len(members):
                     out.append((str(names[k]), form, members))

@@ -12,7 +12,7 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
-from zones.plan_view.regions import Labels, Regioner
+from zones.plan_view.regions import Labels, RegionLocator
 from zones.reach.tip_field import TipField
 
 ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its own x axis is taken from Y
@@ -65,7 +65,7 @@ class View:
     samples  : SurfaceSamples of the machinable area, the same rows in every view
     labels   : their regions
     fields   : TipField by tool id
-    regioner : labels other points; first : (3, 3) rotation of the first view, whose channels it uses
+    locator : labels other points; first : (3, 3) rotation of the first view, whose channels it uses
     """
 
     id: str
@@ -76,14 +76,14 @@ class View:
     samples: SurfaceSamples
     labels: Labels
     fields: Mapping[str, TipField]
-    regioner: Regioner
+    locator: RegionLocator
     first: F64
 
     def label(self, samples: SurfaceSamples) -> Labels:
         """Regions of other samples, given in this frame."""
         turn = self.rotation @ self.first.T  # of rows of points: into the setup frame and on into the first
         there = None if self.is_first else (np.asarray(samples.points @ turn), np.asarray(samples.normals @ turn))
-        return self.regioner.of(samples.points, samples.normals, samples.face, there)
+        return self.locator.of(samples.points, samples.normals, samples.face, there)
 
     @property
     def direction(self) -> F64:

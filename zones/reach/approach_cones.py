@@ -24,7 +24,7 @@ from zones.reach.assembly import Clearances, discs_of
 from zones.reach.tip_field import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
-AT_ONCE = 400_000  # pairs of sample and direction asked in one go
+CHUNK_PAIRS = 400_000  # pairs of sample and direction asked in one go
 CANDIDATES = 4000  # axes tried for a cone before the best is refined
 ROUNDING = 1e-9  # rad
 
@@ -107,7 +107,7 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     p, n = finite_points(points, 3, "points"), finite_points(normals, 3, "normals")
     frames, bodies = axis_frames(directions), assembly(tool, clear, allowance)
     out = np.zeros((len(p), len(frames)), np.bool_)
-    step = max(AT_ONCE // max(len(frames), 1), 1)
+    step = max(CHUNK_PAIRS // max(len(frames), 1), 1)
     for lo in range(0, len(p), step):
         rows = slice(lo, lo + step)
         out[rows] = _reached(tree, tool, frames, bodies, p[rows], n[rows], lift + allowance)

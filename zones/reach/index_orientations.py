@@ -26,16 +26,16 @@ from zones.reach.approach_cones import approach, directions_over_hemisphere, res
 from zones.reach.assembly import Clearances
 
 DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most
-ASKED_AT_MOST = 1500
+MAX_SAMPLES = 1500
 SEED = 17
-MOST_AXES = 6
+MAX_AXES = 6
 SAME = np.radians(1.0)  # axes nearer than that to a known one are not asked
 ROUND_ANGLES = (15.0, 5.0, 1.0)  # deg, tried in turn
 AS_GOOD = 0.98  # of the area an axis wins
 STEPS = 3  # halvings of the angle by which a chosen axis is turned
 
 
-class Gatherer:
+class AxisCoverage:
     """Which samples some tool reaches along which axes, exactly, without the blank.
 
     tree      : TriangleTree of part and fixtures, setup frame
@@ -61,7 +61,7 @@ class Gatherer:
         return out
 
 
-def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[[F64], NDArray[np.bool_]],
+def orientations(samples: SurfaceSamples, coverage: AxisCoverage, allowed: Callable[[F64], NDArray[np.bool_]],
                  even: Callable[[F64, float], F64], known: F64, worth: float) -> F64:
     """Tool axes that are worth turning to.
 
@@ -85,9 +85,9 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
     total = float(samples.area.sum())
     if total < worth or not len(inner):
         return np.zeros((0, 3))
-    if len(inner) > ASKED_AT_MOST:
+    if len(inner) > MAX_SAMPLES:
         share = samples.area[inner] / total
-        inner = np.sort(np.random.default_rng(SEED).choice(inner, ASKED_AT_MOST, replace=False, p=share / share.sum()))
+        inner = np.sort(np.random.default_rng(SEED).choice(inner, MAX_SAMPLES, replace=False, p=share / share.sum()))
         each = np.full(len(inner), total / len(inner))
     else:
         each = samples.area[inner]
@@ -96,7 +96,7 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
     axes = axes[allowed(axes) & (axes @ known.T < np.cos(SAME)).all(axis=1)]
     if not len(axes):
         return np.zeros((0, 3))
-    got = gatherer.reached(few, axes)
+    got = coverage.reached(few, axes)
     chosen = _chosen(got, each, worth)
     spacing = resolution_of(directions_over_hemisphere(DIRECTIONS))
     found: list[F64] = []
@@ -107,9 +107,9 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
         if float(each[mine].sum()) < worth:
             continue
         left = few.subset(np.flatnonzero(rest))
-        axis = _turned(axes[k], left, each[rest], gatherer, allowed, spacing)
-        axis = _evened(axis, left, each[rest], gatherer, allowed, even)
-        rest &= ~gatherer.reached(few, axis[None])[:, 0]
+        axis = _turned(axes[k], left, each[rest], coverage, allowed, spacing)
+        axis = _evened(axis, left, each[rest], coverage, allowed, even)
+        rest &= ~coverage.reached(few, axis[None])[:, 0]
         found.append(axis)
     return np.array(found).reshape(-1, 3)
 
@@ -125,7 +125,7 @@ def _chosen(got: NDArray[np.bool_], area: F64, worth: float) -> list[int]:
     cost = np.concatenate([price, -area])
     cover = hstack([csr_matrix(-got.astype(np.float64)), identity(n)])
     limits = [LinearConstraint(cover, -np.inf, 0.0),
-              LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MOST_AXES)]
+              LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MAX_AXES)]
     answer = milp(cost, integrality=np.concatenate([np.ones(d), np.zeros(n)]), bounds=Bounds(0, 1), constraints=limits,
                   options={"mip_rel_gap": 0.0})
     if answer.x is None:
@@ -133,10 +133,10 @@ def _chosen(got: NDArray[np.bool_], area: F64, worth: float) -> list[int]:
     return [int(k) for k in np.flatnonzero(answer.x[:d] > 0.5)]
 
 
-def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+def _turned(axis: F64, samples: SurfaceSamples, area: F64, coverage: AxisCoverage,
             allowed: Callable[[F64], NDArray[np.bool_]], spacing: float) -> F64:
     """The axis, turned to where it wins most of the samples near by."""
-    best, most = axis, float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    best, most = axis, float(area @ coverage.reached(samples, axis[None])[:, 0])
     step = 0.5 * spacing
     ring = np.arange(8) * np.pi / 4
     for _ in range(STEPS):
@@ -145,7 +145,7 @@ def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
                           axis=1) @ frame
         around = around[(around[:, 2] >= 0.0) & allowed(around)]
         if len(around):
-            won = area @ gatherer.reached(samples, around)
+            won = area @ coverage.reached(samples, around)
             k = int(np.argmax(won))
             if won[k] > most * (1.0 + 1e-9):
                 best, most = around[k], float(won[k])
@@ -153,18 +153,18 @@ def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
     return np.asarray(best)
 
 
-def _evened(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+def _evened(axis: F64, samples: SurfaceSamples, area: F64, coverage: AxisCoverage,
             allowed: Callable[[F64], NDArray[np.bool_]], even: Callable[[F64, float], F64]) -> F64:
     """An axis near by at which the rotary axes stand at round angles, where that wins about as much."""
-    most = float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    most = float(area @ coverage.reached(samples, axis[None])[:, 0])
     for degrees in ROUND_ANGLES:
         near = even(axis, degrees)
         near = near[(near[:, 2] >= -1e-12) & allowed(near)]
         if len(near):
-            won = area @ gatherer.reached(samples, near)
+            won = area @ coverage.reached(samples, near)
             if won.max() >= AS_GOOD * most:
                 return np.asarray(near[int(np.argmax(won))])
     return axis
 
 
-__all__ = ["Gatherer", "orientations"]
+__all__ = ["AxisCoverage", "orientations"]

@@ -24,18 +24,18 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
 from zones.remainder.obstructions import above, covered
-from zones.remainder.tool_catalogue import MOST_SLENDER
-from zones.remainder.tool_requirements import DOES, Buyer, Cutter
+from zones.remainder.tool_catalogue import MAX_SLENDERNESS
+from zones.remainder.tool_requirements import DOES, CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
-ASKED_AT_MOST = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
+MAX_SAMPLES = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
 # how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last
 GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "fixture": 3, "gap": 4, "corner": 5, "sharp corner": 6}
 NO_PASS, TOO_LITTLE = "no pass gets there", "less than a zone is made of"
 
 
 @dataclass(frozen=True)
-class Remainder:
+class RemainderEntry:
     """Area of one region that stays, for one reason, and the one tool that would do.
 
     faces        : face numbers; area : mm²
@@ -85,12 +85,12 @@ class _Why:
         """What samples must share to be one entry: a ball and a flat end are two tools to buy."""
         c = self.cutter[row]
         kind = "" if c is None else c.like if c.at_hand else "ball" if c.corner > 0 else "flat"
-        sold = str(bool(self.slenderness[row] <= MOST_SLENDER))
+        sold = str(bool(self.slenderness[row] <= MAX_SLENDERNESS))
         return str(self.reason[row]), str(self.tool[row]), str(self.left[row]), kind, sold, str(self.view[row])
 
 
 def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], decomposition: Decomposition, lift: float,
-            given_up: NDArray[np.bool_] | None = None, *, clear: Clearances | None = None) -> list[Remainder]:
+            given_up: NDArray[np.bool_] | None = None, *, clear: Clearances | None = None) -> list[RemainderEntry]:
     """Group samples that stay by region and reason.
 
     samples  : SurfaceSamples that no proved pass covers, mm, frame of the first view
@@ -102,18 +102,18 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
 
     Returns
     -------
-    list of Remainder
+    list of RemainderEntry
         Largest area first; areas sum to that of the samples.
     """
     n = len(samples)
     if not n:
         return []
     rng = np.random.default_rng(7)
-    asked = np.sort(rng.choice(n, ASKED_AT_MOST, replace=False)) if n > ASKED_AT_MOST else np.arange(n)
+    asked = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
     few = samples.subset(asked)
     few = replace(few, area=few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-12)))
-    buyers = [Buyer(v, lift, clear or Clearances()) for v in views]
-    why = _of_views(few, buyers, decomposition)
+    requirements = [ToolRequirement(v, lift, clear or Clearances()) for v in views]
+    why = _of_views(few, requirements, decomposition)
     if given_up is not None:
         lost = given_up[asked]
         why.left[lost & (why.reason == "pass")] = NO_PASS
@@ -125,22 +125,22 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
     for row in range(len(few)):
         groups.setdefault((labels.regions[labels.code[asked[row]]].base, *why.key(row)), []).append(row)
     out = [_entry(few, why, rows, need) for members in groups.values()
-           for rows, need in _needs(few, why, np.array(members), buyers)]
+           for rows, need in _needs(few, why, np.array(members), requirements)]
     return sorted(out, key=lambda r: (-r.area, r.reason, r.faces))
 
 
-def _entry(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64], need: dict[str, object]) -> Remainder:
+def _entry(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64], need: dict[str, object]) -> RemainderEntry:
     mine, one = few.subset(rows), rows[0]
-    return Remainder(tuple(int(f) for f in np.unique(mine.face)), float(mine.area.sum()), str(why.reason[one]), need,
+    return RemainderEntry(tuple(int(f) for f in np.unique(mine.face)), float(mine.area.sum()), str(why.reason[one]), need,
                      tuple(mine.points[len(rows) // 2].tolist()), str(why.tool[one]), str(why.left[one]), mine)
 
 
 def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
-           buyers: Sequence[Buyer]) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
+           requirements: Sequence[ToolRequirement]) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
     """Samples of one group by the tool that would do, with that tool."""
     reason, tool, at = str(why.reason[rows[0]]), str(why.tool[rows[0]]), int(why.view[rows[0]])
-    buyer = buyers[at]
-    access: dict[str, object] = {"access": buyer.view.id} if len(buyers) > 1 else {}
+    requirement = requirements[at]
+    access: dict[str, object] = {"access": requirement.view.id} if len(requirements) > 1 else {}
     if reason.startswith("undercut"):
         yield rows, {"kind": "other access"}
     elif reason == "fixture":
@@ -148,10 +148,10 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
     elif why.cutter[rows[0]] is None or tool:
         yield rows, {}
     else:
-        turn = buyers[0].view.rotation @ buyer.view.rotation.T
+        turn = requirements[0].view.rotation @ requirement.view.rotation.T
         here = few if at == 0 else replace(few, points=few.points @ turn, normals=few.normals @ turn)
-        if why.slenderness[rows[0]] <= MOST_SLENDER:  # of all or of none in a group
-            for mine, need in _bought(few, here, why, rows, buyer):
+        if why.slenderness[rows[0]] <= MAX_SLENDERNESS:  # of all or of none in a group
+            for mine, need in _bought(few, here, why, rows, requirement):
                 yield mine, {**need, **access} if need else {}
         else:
             slender = round(float(why.slenderness[rows].min()), 1)
@@ -159,30 +159,30 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
 
 
 def _bought(few: SurfaceSamples, here: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
-            buyer: Buyer) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
-    """Samples of one group by the tool to buy, with that tool; ``here`` in the frame of the buyer.
+            requirement: ToolRequirement) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
+    """Samples of one group by the tool to buy, with that tool; ``here`` in the frame of the requirement.
 
     Where one that was picked for several does for less than half of them, each is asked for the cutter of its own; {}
     where that one does for less than half as well.
     """
     for mine, cutter in _stoutest(few, why, rows):
-        need = buyer.named(cutter, here.subset(mine))
+        need = requirement.named(cutter, here.subset(mine))
         own = _cutters(why, mine)
         if need or len(own) == 1:
             yield mine, need
             continue
         for cutter in own:
             of = mine[why.cutter[mine] == cutter]
-            yield of, buyer.named(cutter, here.subset(of))
+            yield of, requirement.named(cutter, here.subset(of))
 
 
-def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[Cutter]:
+def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[CuttingPart]:
     """The cutters noted for some samples, stout to thin."""
     return sorted(set(why.cutter[rows]), key=lambda c: -c.diameter)
 
 
 def _stoutest(few: SurfaceSamples, why: _Why,
-              rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], Cutter]]:
+              rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], CuttingPart]]:
     """Samples by cutter: the stoutest that does for half of the area, then the same of the rest while that is worth it.
 
     Where none does for half, the one that does for most. What a cutter touches a thinner one of its kind touches too,
@@ -201,25 +201,25 @@ def _stoutest(few: SurfaceSamples, why: _Why,
         rows = rows[~mine]
 
 
-def _of_views(few: SurfaceSamples, buyers: Sequence[Buyer], decomposition: Decomposition) -> _Why:
+def _of_views(few: SurfaceSamples, requirements: Sequence[ToolRequirement], decomposition: Decomposition) -> _Why:
     """What is known of each sample along the view in which least is in its way.
 
     few : in the frame of the first view
     """
     out, gravity = _Why.blank(len(few), 0), np.full(len(few), np.inf)
-    first = buyers[0].view
-    for k, buyer in enumerate(buyers):
-        turn = first.rotation @ buyer.view.rotation.T
+    first = requirements[0].view
+    for k, requirement in enumerate(requirements):
+        turn = first.rotation @ requirement.view.rotation.T
         here = few if k == 0 else replace(few, points=few.points @ turn, normals=few.normals @ turn)
-        found = _reasons(here, buyer, decomposition, k)
+        found = _reasons(here, requirement, decomposition, k)
         how = np.array([GRAVITY.get(str(w), len(GRAVITY)) for w in found.reason])
         out.take(found, np.flatnonzero(how < gravity))
         gravity = np.minimum(gravity, how)
     return out
 
 
-def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, place: int) -> _Why:
-    view = buyer.view
+def _reasons(few: SurfaceSamples, requirement: ToolRequirement, decomposition: Decomposition, place: int) -> _Why:
+    view = requirement.view
     part, n = view.part, len(few)
     out = _Why.blank(n, place)
     reason = out.reason
@@ -228,22 +228,22 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
     for k in np.flatnonzero((few.normals[:, 2] <= SEEN) | (roof >= 0)):
         c = owner.get(int(part.mesh.face_ids[roof[k]])) if roof[k] >= 0 else None
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
-    if buyer.clamped:
+    if requirement.clamped:
         reason[covered(few, view.obstacles) & (reason == "")] = "fixture"
-    _at_hand(few, view.fields, buyer, out, "pass")
+    _at_hand(few, view.fields, requirement, out, "pass")
     out.left[reason == "pass"] = TOO_LITTLE
-    if buyer.clamped and bool((reason == "").any()):  # these limits are dear
-        _at_hand(few, buyer.unclamped, buyer, out, "fixture")
+    if requirement.clamped and bool((reason == "").any()):  # these limits are dear
+        _at_hand(few, requirement.unclamped, requirement, out, "fixture")
     left = np.flatnonzero(reason == "")
-    wants = buyer.wants(few.subset(left))
+    wants = requirement.wants(few.subset(left))
     reason[left], out.cutter[left], out.slenderness[left] = wants.reason, wants.cutter, wants.slenderness
     reason[reason == ""] = "sharp corner"
     return out
 
 
-def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], buyer: Buyer, out: _Why, word: str) -> None:
+def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], requirement: ToolRequirement, out: _Why, word: str) -> None:
     """Give ``word`` to samples without a reason that one of these tools touches, and note the stoutest such tool."""
     left = np.flatnonzero(out.reason == "")
-    tool = buyer.touched_by(few.subset(left), fields)
+    tool = requirement.touched_by(few.subset(left), fields)
     out.tool[left] = tool
     out.reason[left[tool != ""]] = word

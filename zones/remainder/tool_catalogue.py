@@ -1,6 +1,6 @@
 """Tools as they are sold, and how long one has to be at a place.
 
-Diameters and shanks are series of solid carbide mills in millimetres; lengths come in steps. What is named to a buyer,
+Diameters and shanks are series of solid carbide mills in millimetres; lengths come in steps. What is named to a requirement,
 by the remainder or by the proposal, comes from here. Theory: docs/theory/tools.md.
 """
 
@@ -24,11 +24,11 @@ DIAMETERS = (40.0, 32.0, 25.0, 20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 
              0.4, 0.3, 0.2, 0.1)
 # mm, for cutters of up to the same thickness
 SHANKS = (6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0, 40.0)
-MOST_SLENDER = 20.0  # neck length in diameters; no thinner tool is named
+MAX_SLENDERNESS = 20.0  # neck length in diameters; no thinner tool is named
 BULL_CORNER = 0.2  # corner radius of the bull noses tried, in diameters
 FLUTES = 3.0  # flute length in diameters, where the neck is as long
 RELIEF = 0.05  # how much thinner than the cutter a neck is, in diameters
-LEAST_NECK = 1.0  # mm
+MIN_NECK = 1.0  # mm
 NOSE_STEP = 0.8  # mm, grid of the heights that holders have to clear
 
 
@@ -91,7 +91,7 @@ class Lengths:
             if d.name == "holder":
                 height = self._height(d.radius + self.allowance + spare + NOSE_STEP / math.sqrt(2.0))
                 nose = np.maximum(nose, height[cells] + lift - (d.height - body.stickout))
-        neck = np.maximum(catalogue(np.maximum(neck, LEAST_NECK)), floor[0])
+        neck = np.maximum(catalogue(np.maximum(neck, MIN_NECK)), floor[0])
         return np.column_stack([neck, np.maximum(catalogue(np.maximum(nose, neck + body.shank_diameter)), floor[1])])
 
     def _height(self, radius: float) -> F64:

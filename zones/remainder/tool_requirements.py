@@ -23,7 +23,7 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField, touchable
 from zones.remainder.obstructions import over_the_part
-from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
+from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, Lengths, catalogue, nearest, sold
 
 ALL_BUT = 0.98  # of the samples a named tool is long enough for; one more may ask for a neck of twice the length
 DOES = 0.5  # of the area of an entry, the least a tool named for it takes
@@ -31,7 +31,7 @@ GAP = 1.5  # times the thinnest cutter: what lies nearer ahead makes it a gap
 
 
 @dataclass(frozen=True)
-class Cutter:
+class CuttingPart:
     """A cutting part, mm, of a tool at hand (``at_hand``, named by ``like``) or new in the holder of that one."""
 
     diameter: float
@@ -41,11 +41,11 @@ class Cutter:
 
     def sold_on(self, neck: F64) -> NDArray[np.bool_]:
         """(k,) bool: such a cutter is sold on necks of these lengths (k,), mm."""
-        return np.asarray(neck <= MOST_SLENDER * self.diameter + 1e-9)
+        return np.asarray(neck <= MAX_SLENDERNESS * self.diameter + 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
-class Wants:
+class CutterNeeds:
     """Of n samples: reason (object, '' where unknown), stoutest Cutter (object, None), its neck in diameters (n,)."""
 
     reason: NDArray[np.object_]
@@ -53,7 +53,7 @@ class Wants:
     slenderness: F64
 
 
-class Buyer:
+class ToolRequirement:
     """Tools for what one view leaves.
 
     view  : View with the tools at hand
@@ -85,12 +85,12 @@ class Buyer:
             out[left[got & able(fields[t].tool, normals, self.cusp)]] = t
         return out
 
-    def body(self, cutter: Cutter) -> ToolBody:
+    def body(self, cutter: CuttingPart) -> ToolBody:
         """The tool with the lengths of the one it goes with."""
         like = self.tools[cutter.like]
         return like if cutter.at_hand else sold(like, cutter.diameter, cutter.corner)
 
-    def need(self, cutter: Cutter, tips: F64) -> F64:
+    def need(self, cutter: CuttingPart, tips: F64) -> F64:
         """Neck length and stickout (k, 2), mm, the tool has to have at tips (k, 3), mm, where its cutting part fits.
 
         One at hand keeps at least its own: instead of it, nothing is lost. One to buy has flutes up the whole of its
@@ -102,7 +102,7 @@ class Buyer:
         own = float(catalogue(np.array(body.corner_radius)))
         return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (own, own))
 
-    def touches(self, cutter: Cutter, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
+    def touches(self, cutter: CuttingPart, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
         """Rows (k,) of the samples that the cutting part alone touches and can finish, and its tips (k, 3), mm."""
         body = self.body(cutter)
         rows = np.flatnonzero(able(body, samples.normals, self.cusp))
@@ -112,12 +112,12 @@ class Buyer:
         _, fits, tips = touchable(field, samples.points[rows], samples.normals[rows], self.lift)
         return rows[fits], tips[fits]
 
-    def wants(self, samples: SurfaceSamples) -> Wants:
+    def wants(self, samples: SurfaceSamples) -> CutterNeeds:
         """What would do for n samples that no tool at hand touches: one of these with more neck, or a thinner one."""
         n = len(samples)
-        out = Wants(np.full(n, "", dtype=object), np.full(n, None, dtype=object), np.full(n, np.inf))
+        out = CutterNeeds(np.full(n, "", dtype=object), np.full(n, None, dtype=object), np.full(n, np.inf))
         for tid, field in self.view.fields.items():
-            rows, tips = self._ask(Cutter(field.tool.diameter, field.tool.corner_radius, tid, True), samples,
+            rows, tips = self._ask(CuttingPart(field.tool.diameter, field.tool.corner_radius, tid, True), samples,
                                    np.arange(n), out)
             out.reason[rows] = _stopped_by(field, tips)
         ahead = np.asarray(first_hits(self.view.obstacles, samples.points, samples.normals, 1e-3, 1e6)[0])
@@ -129,12 +129,12 @@ class Buyer:
                 if not len(left):
                     return out
                 like = nearest(list(self.tools.values()), d).id
-                rows, _ = self._ask(Cutter(d, corner, like, False), samples, left, out)
+                rows, _ = self._ask(CuttingPart(d, corner, like, False), samples, left, out)
                 out.reason[rows] = reason[rows]
         return out
 
-    def _ask(self, cutter: Cutter, samples: SurfaceSamples, rows: NDArray[np.int64],
-             out: Wants) -> tuple[NDArray[np.int64], F64]:
+    def _ask(self, cutter: CuttingPart, samples: SurfaceSamples, rows: NDArray[np.int64],
+             out: CutterNeeds) -> tuple[NDArray[np.int64], F64]:
         """Note the cutter for those of ``rows`` it would do for with a stouter neck than what is noted.
 
         Returns these (k,) and its tips there (k, 3), mm.
@@ -146,7 +146,7 @@ class Buyer:
         out.cutter[mine], out.slenderness[mine] = cutter, slender[better]
         return mine, tips[better]
 
-    def named(self, cutter: Cutter, samples: SurfaceSamples) -> dict[str, object]:
+    def named(self, cutter: CuttingPart, samples: SurfaceSamples) -> dict[str, object]:
         """The tool to buy for samples, asked whether it does: {} where it does for less than half of the area.
 
         Its neck and stickout do for nearly all of the samples it touches, for all where that is too little.

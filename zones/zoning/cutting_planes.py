@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.plan_view.regions import base_of
 from zones.reach.access_reach import Sight
 
@@ -26,7 +26,7 @@ FITS_SHARE = 0.5  # of an area the cutting part of a tool must touch for its nec
 
 
 @dataclass(frozen=True)
-class CuttingPlane:
+class RegionPlane:
     """A plane that ends what a tool is asked for in a region.
 
     height : mm along the access direction
@@ -68,7 +68,7 @@ def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> d
     return out
 
 
-def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[CuttingPlane]]:
+def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[RegionPlane]]:
     """What each view is asked for first, and the planes between two.
 
     All, but of walls in reach of two opposite views only its own side.
@@ -78,24 +78,24 @@ def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[Cutti
     Source: ALGORITHMS 1, step 2 of the 4-step algorithm.
     """
     allowed = [np.ones(len(s.samples), np.bool_) for s in sights]
-    planes: list[CuttingPlane] = []
+    planes: list[RegionPlane] = []
     for i, a in enumerate(sights):
         for j in range(i + 1, len(sights)):
             b = sights[j]
             if float(a.view.direction @ b.view.direction) > OPPOSITE:
                 continue
-            for base, form, members in a.groups(np.asarray(a.form == Form.STEEP)):
+            for base, form, members in a.groups(np.asarray(a.form == AreaForm.STEEP)):
                 through, plane = common_plane(a, b, members, form)
                 if not np.isfinite(plane):
                     continue
-                planes.append(CuttingPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
+                planes.append(RegionPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
                 z = a.samples.points[through, 2]
                 allowed[i][through[z < plane]] = False
                 allowed[j][through[z >= plane]] = False
     return allowed, planes
 
 
-def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> tuple[NDArray[np.int64], float]:
+def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: AreaForm) -> tuple[NDArray[np.int64], float]:
     """What of some samples two opposite views share, and the height in the frame of ``a`` of the plane between them.
 
     members : (k,) int64, samples of one region and form

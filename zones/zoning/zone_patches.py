@@ -20,11 +20,11 @@ from zones.reach.access_view import View
 from zones.zoning.zones import ZoneArea
 
 PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them
-MOST = 4e5
+MAX_POINTS = 4e5
 WIDE = 1e3  # mm, the same on faces of one zone, where nothing is to be found
 TOLERANCE = 0.02  # mm, how near a border is to the change of zone
 REST = 0  # label of what no zone holds
-MOST_CELLS = 1 << 20
+MAX_CELLS = 1 << 20
 
 
 def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FacePatch, ...]]:
@@ -47,7 +47,7 @@ def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FaceP
     inner = samples.area > 0
     owners = _owners(samples.face[inner], owner[inner])
     mixed = [f for f in faces if owners.get(f) is None]
-    pitch = max(PITCH, float(np.sqrt(2.0 * area / MOST)))
+    pitch = max(PITCH, float(np.sqrt(2.0 * area / MAX_POINTS)))
     found = [trim_faces(view.part, mixed, Nearest(view, owner), pitch, TOLERANCE)] if mixed else []
     for label in sorted({one for one in owners.values() if one is not None}):
         found.append(trim_faces(view.part, [f for f in faces if owners.get(f) == label], _constant(label), WIDE))
@@ -105,4 +105,4 @@ class Nearest:
 def _key(samples: SurfaceSamples, code: NDArray[np.int64]) -> NDArray[np.int64]:
     nz = samples.normals[:, 2]
     form = np.where(nz > LEVEL, 0, np.where(nz < STEEP, 2, 1))
-    return np.asarray((samples.face.astype(np.int64) * 3 + form) * MOST_CELLS + code)
+    return np.asarray((samples.face.astype(np.int64) * 3 + form) * MAX_CELLS + code)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.model import Decomposition
 from zones.plan_view.categories import Categories, Category
 from zones.plan_view.regions import base_of
@@ -30,7 +30,7 @@ from zones.reach.access_reach import Reach, Sight
 from zones.reach.access_view import View
 from zones.reach.openness import OPEN_SHARE, open_share
 from zones.reach.tip_field import TipField
-from zones.zoning.cutting_planes import PLANE_MARGIN, CuttingPlane, neck_planes, shares
+from zones.zoning.cutting_planes import PLANE_MARGIN, RegionPlane, neck_planes, shares
 
 # What a tool has to gain to be used in a region, whatever the size of that: 1 mm² is 25 planning samples, on which an
 # area is known to a fifth; where samples stand wider, 25 of them. It is also what a tool to buy has to gain.
@@ -64,7 +64,7 @@ class ZoneArea:
     access: str
     kind: str
     region: str
-    form: Form
+    form: AreaForm
     tool: ToolBody
     samples: NDArray[np.int64]
     tips: F64
@@ -106,7 +106,7 @@ class Zoning:
 
     zones: tuple[ZoneArea, ...]
     mcz: tuple[Mcz, ...]
-    planes: tuple[CuttingPlane, ...]
+    planes: tuple[RegionPlane, ...]
     taken: NDArray[np.bool_]
     reach: tuple[Mapping[str, Reach], ...] = field(default=(), repr=False)
 
@@ -152,7 +152,7 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
     return Zoning(zones, mcz, (*between, *_neck_planes(zones, sights)), taken, tuple(s.reach for s in sights))
 
 
-def _neck_planes(zones: Sequence[ZoneArea], sights: Sequence[Sight]) -> list[CuttingPlane]:
+def _neck_planes(zones: Sequence[ZoneArea], sights: Sequence[Sight]) -> list[RegionPlane]:
     """The planes the zones end at, highest first in each region."""
     out = set()
     above = {s.view.id: {high + PLANE_MARGIN for bands in s.bands.values() for _, high in bands} for s in sights}
@@ -160,12 +160,12 @@ def _neck_planes(zones: Sequence[ZoneArea], sights: Sequence[Sight]) -> list[Cut
         for name, height in z.planes.items():
             moved = height in above[z.access]
             out.add((z.access, name, -height, z.tool.id, "neck, moved above a connection" if moved else "neck"))
-    return [CuttingPlane(access, -low, name, tool, reason) for access, name, low, tool, reason in sorted(out)]
+    return [RegionPlane(access, -low, name, tool, reason) for access, name, low, tool, reason in sorted(out)]
 
 
 def _stage(zone: ZoneArea) -> int:
     """Tops and connections before walls, walls before floors: nothing is undercut while it still stands."""
-    if zone.form is Form.STEEP:
+    if zone.form is AreaForm.STEEP:
         return 1
     return 2 if base_of(zone.region) == "floor" else 0
 
@@ -198,7 +198,7 @@ def _gleaned(sights: Sequence[Sight], found: Sequence[ZoneArea], taken: NDArray[
     for sight in sights:
         here = [z for z in found if z.access == sight.view.id]
         used = {z.tool.id for z in here}
-        order = sight.order(Form.STEEP)
+        order = sight.order(AreaForm.STEEP)
         for tid in [*(t for t in order if t in used), *(t for t in order if t not in used)]:
             own = {(z.region, z.form) for z in here if z.tool.id == tid}
             parts = _parts(sight, sight.gets(tid) & ~taken, own)
@@ -212,8 +212,8 @@ def _gleaned(sights: Sequence[Sight], found: Sequence[ZoneArea], taken: NDArray[
     return out
 
 
-def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Form]]
-           ) -> list[tuple[str, Form, NDArray[np.int64]]]:
+def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, AreaForm]]
+           ) -> list[tuple[str, AreaForm, NDArray[np.int64]]]:
     """Groups of (n,) bool samples that are worth a zone to a tool in use.
 
     Whatever adds to one of its ``own`` zones of a whole region is; what lies under or over a connection, where it has
@@ -228,7 +228,7 @@ def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Form
     return out
 
 
-def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> list[ZoneArea]:
+def _split(sight: Sight, members: NDArray[np.int64], base: str, form: AreaForm) -> list[ZoneArea]:
     left = members
     area, regions, code = sight.samples.area, sight.view.labels.regions, sight.view.labels.code
     least = least_area(area[members], LEAST_ZONE_MM2, CERTAIN)
@@ -260,7 +260,7 @@ def _split(sight: Sight, members: NDArray[np.int64], base: str, form: Form) -> l
     return [z for tid, t in out.items() for z in _zones_of(sight, tid, t, base, form)]
 
 
-def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form, has_plain: bool = False) -> list[ZoneArea]:
+def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: AreaForm, has_plain: bool = False) -> list[ZoneArea]:
     """One zone where the tool cuts the plain cells of the region too (or has them already), else one for each cell."""
     labels = sight.view.labels
     cells = np.unique(labels.code[take.rows]).tolist()
@@ -276,7 +276,7 @@ def _zones_of(sight: Sight, tid: str, take: _Take, base: str, form: Form, has_pl
     return out
 
 
-def _zone(sight: Sight, tid: str, rows: NDArray[np.int64], kind: str, name: str, form: Form,
+def _zone(sight: Sight, tid: str, rows: NDArray[np.int64], kind: str, name: str, form: AreaForm,
           planes: dict[str, float], merged: tuple[str, ...], tried: tuple[dict[str, object], ...]) -> ZoneArea:
     z = sight.samples.points[rows, 2]
     return ZoneArea("", sight.view.id, kind, name, form, sight.view.fields[tid].tool, rows,
@@ -289,7 +289,7 @@ def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
     heights = {v.id: v.samples.points[:, 2] for v in views}
     names = {v.id: v.labels.names for v in views}
     face = views[0].samples.face
-    groups: dict[tuple[str, str, Form, str], list[ZoneArea]] = {}
+    groups: dict[tuple[str, str, AreaForm, str], list[ZoneArea]] = {}
     for z in zones:
         groups.setdefault((z.access, z.region, z.form, z.tool.id), []).append(z)
     out = []
@@ -309,7 +309,7 @@ def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
     return out
 
 
-def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: Form, got: float, least: float,
+def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: AreaForm, got: float, least: float,
              plane: float) -> dict[str, object]:
     tool, usable, by_cutter = sight.view.fields[tid].tool, sight.can[tid][left], sight.reach[tid].by_cutter[left]
     if not usable.any():
@@ -332,5 +332,5 @@ def is_open(zone: ZoneArea, field: TipField, area: F64) -> bool:
     Passes along steep area stay at one height, so there the level is that of each tip; others follow the surface, so
     it is that of the highest. A zone with walls or connections all round some of it is closed.
     """
-    level = zone.tips[:, 2] if zone.form is Form.STEEP else zone.tips[:, 2].max()
+    level = zone.tips[:, 2] if zone.form is AreaForm.STEEP else zone.tips[:, 2].max()
     return open_share(field, zone.tips, level, area[zone.samples]) > OPEN_SHARE

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry.part import EdgeInfo, FaceInfo, Part
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.curvature import face_info, surface_name
 from geometry.step_import.occ.edges import edge_infos
 from geometry.step_import.occ.healing import one_solid, swept_as_splines
@@ -51,7 +51,7 @@ def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
     return LoadedSolid(step, swept_as_splines(body), surfaces, warnings)
 
 
-def load_part(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
+def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2) -> Part:
     """The work behind ``geometry.step_import.reader.read_part``, in this process; arguments and errors are those of ``read_part``
     except that nothing limits time or memory here."""
@@ -68,7 +68,7 @@ def load_part(path: str | Path, *, placement: Placement | None = None, solid: in
     volume = _volume(body, mesh, VOLUME_ROOM * area * max(chord, mesh.deviation), warnings)
     warnings += _slivers(faces, tolerance)
     warnings += doubts(mesh.mesh.bounds, volume, area, step.unit, step.factor, step.text.products)
-    matrix = (placement or Placement()).matrix
+    matrix = (placement or SetupFrame()).matrix
     check_size(mesh.mesh.bounds, step.unit, step.factor)
     moved = mesh.mesh.transformed(matrix)
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,

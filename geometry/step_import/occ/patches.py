@@ -17,8 +17,8 @@ from OCP.GeomConvert import GeomConvert, GeomConvert_ApproxSurface
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64
-from geometry.setup_frame import Placement
-from geometry.step_import.face_surfaces import FacePatch, no_such_face, patches_to_bytes
+from geometry.setup_frame import SetupFrame
+from geometry.step_import.face_surfaces import FaceSurface, no_such_face, patches_to_bytes
 from geometry.step_import.occ.loading import load_solid
 from geometry.step_import.occ.topology import Shape, faces_of
 from geometry.surfaces.nurbs import NurbsSurface
@@ -29,12 +29,12 @@ ANGULAR = {Kind.GeomAbs_Cylinder: (True, False), Kind.GeomAbs_Cone: (True, False
 # Longest arc between two knots (rad): its middle weight is a half.
 LONGEST_ARC = 2.0 * np.pi / 3.0
 # What is no spline comes as one, as near as this (mm) where the kernel manages with so many spans.
-NEAR, MOST_SPANS, DEGREE = 1e-6, 400, 9
+NEAR, MAX_SPANS, DEGREE = 1e-6, 400, 9
 # Parameters of a patch that is measured, along each side.
 LOOKS = 15
 
 
-def load_patches(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
+def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
                  faces: Iterable[int] | None = None) -> bytes:
     """The work behind ``geometry.step_import.face_surfaces.read_patches``, in this process; arguments and errors as there.
 
@@ -45,11 +45,11 @@ def load_patches(path: str | Path, *, placement: Placement | None = None, solid:
     for number in wanted:
         if not 1 <= number <= len(shapes):
             raise no_such_face(number, len(shapes))
-    matrix = (placement or Placement()).matrix
+    matrix = (placement or SetupFrame()).matrix
     return patches_to_bytes(_moved(face_patch(n, shapes[n - 1]), matrix) for n in wanted)
 
 
-def face_patch(number: int, face: Shape) -> FacePatch:
+def face_patch(number: int, face: Shape) -> FaceSurface:
     """One kernel face as a patch, STEP coordinates (mm).
 
     number : int, 1-based
@@ -65,12 +65,12 @@ def face_patch(number: int, face: Shape) -> FacePatch:
     else:
         trimmed = Geom_RectangularTrimmedSurface(whole, box[0, 0], box[1, 0], box[0, 1], box[1, 1])
         if adaptor.GetType() in (Kind.GeomAbs_OffsetSurface, Kind.GeomAbs_OtherSurface):
-            spline = GeomConvert_ApproxSurface(trimmed, NEAR, GeomAbs_C1, GeomAbs_C1, DEGREE, DEGREE, MOST_SPANS,
+            spline = GeomConvert_ApproxSurface(trimmed, NEAR, GeomAbs_C1, GeomAbs_C1, DEGREE, DEGREE, MAX_SPANS,
                                                0).Surface()
         else:
             spline = GeomConvert.SurfaceToBSplineSurface_s(trimmed)
         surface = _surface(spline, box[0], side)
-    patch = FacePatch(number, surface, box, angular, 0.0)
+    patch = FaceSurface(number, surface, box, angular, 0.0)
     return replace(patch, deviation=_deviation(patch, adaptor))
 
 
@@ -146,12 +146,12 @@ def _surface(spline: Shape, low: F64, side: int) -> NurbsSurface:
     return NurbsSurface(control, knots[0], knots[1], orders, weights, side)
 
 
-def _deviation(patch: FacePatch, exact: BRepAdaptor_Surface) -> float:
+def _deviation(patch: FaceSurface, exact: BRepAdaptor_Surface) -> float:
     ways = [np.linspace(patch.box[0, axis], patch.box[1, axis], LOOKS) for axis in (0, 1)]
     uv = np.stack(np.meshgrid(*ways, indexing="ij"), axis=-1).reshape(-1, 2)
     there = np.array([exact.Value(u, v).Coord() for u, v in uv.tolist()])
     return float(np.linalg.norm(patch.surface.points(patch.parameters(uv)) - there, axis=1).max())
 
 
-def _moved(patch: FacePatch, matrix: F64) -> FacePatch:
+def _moved(patch: FaceSurface, matrix: F64) -> FaceSurface:
     return replace(patch, surface=patch.surface.moved(matrix))
