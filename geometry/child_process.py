@@ -1,4 +1,4 @@
-"""Run one command in a child process that cannot harm its parent.
+"""Runs one command in a child process that cannot harm its parent.
 
 The child lives in its own process group, dies with its parent, and is watched: wall time, resident memory of the
 whole group, signals. Whatever happens, nothing of it is left running when ``run_limited`` returns.
@@ -28,15 +28,15 @@ _PR_SET_PDEATHSIG = 1
 RESULT_VARIABLE = "ZONEMILL_CHILD_RESULT"
 MEMORY_VARIABLE = "ZONEMILL_CHILD_MEMORY"
 PARENT_VARIABLE = "ZONEMILL_CHILD_PARENT"
-# Exit code of a child that wrote an error description instead of a result.
+# Exit code of a child that wrote the description of an error instead of a result.
 TYPED_ERROR = 3
-# Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
+# Address space also counts mapped memory that is never touched (libraries, thread arenas), so its limit is wider.
 ADDRESS_ROOM = 4e9
 
 
 def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, memory_limit: float,
                 what: str = "reader", stop: threading.Event | None = None) -> bytes:
-    """Run a command, feed it a request on stdin, and return what it left in its result file.
+    """Run a command, feed it a request on stdin, and return the content of its result file.
 
     command      : arguments; the child finds the name of its result file in ``ZONEMILL_CHILD_RESULT``
     request      : bytes, stdin of the child
@@ -68,7 +68,7 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
 
 
 def guard_child() -> Path:
-    """Called first in the child: die with the parent, keep limits, return the path of the result file."""
+    """Path of the result file. Call this first in the child: it sets the limits and ends the child with its parent."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     parent = os.environ.get(PARENT_VARIABLE)
     if parent and os.getppid() != int(parent):
@@ -104,7 +104,7 @@ def _resident(handle: psutil.Process) -> int:
         for process in [handle, *handle.children(recursive=True)]:
             total += process.memory_info().rss
     except psutil.Error:
-        pass  # it ended while we looked
+        pass  # the process ended between two looks
     return total
 
 
@@ -129,9 +129,9 @@ def _outcome(code: int, result: Path, log: Path, memory_limit: float, what: str)
     if "bad_alloc" in tail or "MemoryError" in tail:
         raise _memory_error(what, memory_limit, memory_limit)
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    last = tail.splitlines()[-1] if tail else "it said nothing"
-    raise ResourceError(f"the {what} died of {name} ({last})", code=f"{what}_crashed", measured=name,
-                        remedy="the file drives the CAD kernel into a fault; export the part again, if possible "
+    last = tail.splitlines()[-1] if tail else "it wrote no message"
+    raise ResourceError(f"the {what} ended with {name} ({last})", code=f"{what}_crashed", measured=name,
+                        remedy="the file causes a fault in the CAD kernel; export the part again, if possible "
                                "from another program or as another schema")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from geometry.errors import SetupError
 from geometry.mesh import F64
 
-# Below this angle (rad) between z and x the frame is not determined well enough to cut metal with.
+# Below this angle (rad) between z and x the frame is not determined well enough.
 MIN_AXIS_ANGLE = 1e-3
 
 
@@ -64,7 +64,7 @@ class SetupFrame:
         rotation = self.inverse[:3, :3].T
         out = np.eye(4)
         out[:3, :3] = rotation
-        # + 0.0 turns a negative zero into a plain one, which would otherwise show in printed numbers
+        # + 0.0 turns a negative zero into a plain one; otherwise printed numbers show the sign
         out[:3, 3] = -rotation @ np.array(self.origin) + 0.0
         return out
 

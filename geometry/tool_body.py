@@ -1,4 +1,4 @@
-"""A tool as a body of revolution: shape only, no milling.
+"""A tool as a body of revolution: its shape only.
 
 Heights are measured from the tip upwards along the axis::
 
@@ -64,6 +64,6 @@ class ToolBody:
         return "ball" if self.corner_radius >= self.radius - 1e-12 else "bull"
 
     def neck_clearance(self, wanted: float) -> float:
-        """Radial clearance kept at the neck, mm: ``wanted``, or half the relief where that is less."""
+        """Radial clearance at the neck, mm: ``wanted``, or half the relief where that is less."""
         relief = 0.5 * (self.diameter - self.neck_diameter)
         return wanted if relief >= wanted else 0.5 * max(relief, 0.0)

@@ -1,9 +1,9 @@
 """Outlines of bodies of revolution: lines and arcs from the tip outwards and upwards.
 
-A tool is turned: its half section is a chain of lines and arcs. What a drop meets of it is, at each radius, the lowest
-point there: the *lower outline*. Where that bends upwards all the way it is one convex body; where it bends down (a
-step to the shank, a cone that ends in a wider collar) another body begins, flat-bottomed from the axis to there, which
-adds nothing to the tool. So any tool is a stack of convex bodies, and its tip is the highest that one of them asks for.
+The half section of a tool is a chain of lines and arcs. In a drop only the lowest point at each radius can touch: the
+*lower outline*. Where it bends upwards all the way, the tool is one convex body. Where it bends down (a step to the
+shank, a cone that ends in a wider collar), another body begins. That body has a flat bottom from the axis to there,
+which adds nothing to the tool. So any tool is a stack of convex bodies, and its tip is the highest tip of any of them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from geometry.kernels.outline import Stack
 from geometry.mesh import F64
 
 BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
-STEEPEST = 5.0  # slope of a paraboloid at its radius: at the rim the outline may be upright
-SAMPLES = 4096  # places at which they are held below it
-MIN_GROWTH = 1e-9  # mm a radius has to grow by to be wider
-CHORD = 1e-3  # mm by which chords of a hollow arc may stand out of it
+STEEPEST = 5.0  # largest slope of a paraboloid at its radius: at the rim the outline may be upright
+SAMPLES = 4096  # places at which the paraboloids are kept below the outline
+MIN_GROWTH = 1e-9  # mm, least growth of a radius that counts as wider
+CHORD = 1e-3  # mm, largest distance of a chord from its hollow arc
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,9 @@ class OutlineArc:
 class Outline:
     """Half section of a tool from its tip, which is at (0, 0) or on the level z = 0.
 
-    pieces : Line and Arc in order, each from the end of the one before, the first from (0, 0); z never falls, rho may
-             (what is above a wider place is not met). After the last piece the tool goes on upwards as a cylinder.
+    pieces : OutlineLine and OutlineArc in order, each from the end of the one before, the first from (0, 0). z never
+             falls; rho may fall, and a drop does not meet what lies above a wider place. After the last piece the tool
+             goes on upwards as a cylinder.
 
     Raises
     ------
@@ -99,7 +100,7 @@ class Outline:
                 c, a = p.centre, math.dist(at, p.centre)
                 if p.hollow:
                     out += _chords(at, p)
-                elif p.z > c[1] + MIN_GROWTH:  # goes on above its widest place: what is there is not met
+                elif p.z > c[1] + MIN_GROWTH:  # the arc goes on above its widest place, where a drop does not meet it
                     out.append(OutlineArc(c[0] + a, c[1], c))
                 else:
                     out.append(p)
@@ -132,7 +133,7 @@ class Outline:
                 rows.append(row)
                 widest, steepest = p.rho, float(row[5])
             elif p.z > z + MIN_GROWTH and rho >= widest - MIN_GROWTH:
-                steepest = 1.0  # an upright stretch: whatever widens above it is another body
+                steepest = 1.0  # an upright stretch: a wider place above it belongs to another body
             rho, z = p.rho, p.z
         bodies.append((offset, rows))
         tables = [np.array(r) for _, r in bodies]
@@ -202,7 +203,13 @@ def _bowls(table: F64) -> F64:
 
 
 def heights(table: F64, rho: F64) -> F64:
-    """h at radii rho (any shape) float64, mm, within those of one body; table (k, 9), its rows for the kernels."""
+    """Height h of the outline of one body at radii, mm.
+
+    table : (k, 9) float64, mm, rows of the body for the kernels, in the plane of the half section
+    rho   : float64 of any shape such as (n,), mm, radii within those of the body
+
+    Returns float64 of the shape of rho, mm.
+    """
     k = np.minimum(np.searchsorted(table[:, 1], rho), len(table) - 1)
     s = table[k]
     t = np.clip(rho, s[..., 0], s[..., 1])

@@ -3,7 +3,7 @@
     patches = read_patches("wheel.step", [12, 13])
     patches[12].surface.curvature(patches[12].parameters(part.uv[part.mesh.face_ids == 12].reshape(-1, 2)))
 
-A patch covers the rectangle of parameters its face lies in; the face itself is the part of it that its borders trim.
+A patch covers the rectangle of parameters that its face lies in. The borders of the face trim the patch.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class FaceSurface:
     number    : 1-based, the ``12`` of ``F12``, as in ``read_part`` of the same file and solid
     surface   : NurbsSurface, mm, setup frame, its normal out of the material
     box       : (2, 2) float64, least and greatest (u, v) of the face in the parameters of ``Part.uv``
-    angular   : whether u, v are angles (rad) in ``Part.uv``, which arcs written as splines do not keep
+    angular   : whether u, v are angles (rad) in ``Part.uv``; arcs written as splines have other parameters
     deviation : float, mm, largest distance measured between the patch and the surface of the file
     """
 
@@ -48,9 +48,9 @@ class FaceSurface:
         return f"F{self.number}"
 
     def parameters(self, uv: ArrayLike) -> F64:
-        """Parameters of the patch where the face has its own.
+        """Parameters of the patch at parameters of the face.
 
-        uv : (n, 2), parameters of the face as in ``Part.uv``
+        uv : (n, 2) float64, parameters of the face as in ``Part.uv``, rad, mm or dimensionless
         Returns (n, 2) float64, parameters for ``surface``.
 
         Notes
@@ -84,14 +84,14 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
     Returns
     -------
     dict of FacePatch by number, in order
-        Planes, cylinders, cones, spheres, tori and splines are exact; an offset surface, which no spline is, comes as
-        near as ``deviation`` says.
+        Planes, cylinders, cones, spheres, tori and splines are exact. No spline equals an offset surface; its error is
+        ``deviation``.
 
     Raises
     ------
     CamError
-        What ``geometry.step_import.reader.read_part`` raises about the file, its solids and the limits; GeometryError
-        (``no_such_face``).
+        The errors of ``geometry.step_import.reader.read_part`` about the file, its solids and the limits;
+        GeometryError (``no_such_face``).
     """
     request = {"wanted": "patches", "path": os.path.abspath(path), "solid": solid,
                "faces": None if faces is None else [int(f) for f in faces],
@@ -132,4 +132,4 @@ def no_such_face(number: int, count: int) -> GeometryError:
     """The error for a face number out of range."""
     return GeometryError(f"face F{number} does not exist; the solid has {count} faces", code="no_such_face",
                          subjects=(f"F{number}",), measured=number, limit=count,
-                         remedy="number faces as read_part does")
+                         remedy=f"give a number from 1 to {count}")

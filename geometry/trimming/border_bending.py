@@ -1,4 +1,4 @@
-"""Cuts between labels bent towards a curved border."""
+"""Bends the cuts between labels towards a curved border."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from geometry.mesh import F64
 from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet
 from geometry.trimming.label_query import LabelQuery, bisect
 
-# Rounds of bending; each takes about three quarters off the error that is left.
+# Rounds of bending; each removes about three quarters of the remaining error.
 BEND_ROUNDS = 10
-# Nodes put in for each cut there was; a ragged border would otherwise be followed into every tooth.
+# Largest number of new nodes for each cut. Without it the bending follows a ragged border into every tooth.
 BUDGET = 8
-# A node never comes nearer to the far corner of the facet it is moved in than this fraction of the way.
+# A node keeps at least this fraction of the way from the far corner of the facet it moves in.
 REACH = 0.9
 
 
 def bend(sheet: FacetSheet, query: LabelQuery, tolerance: float) -> None:
-    """Where the middle of a cut is farther than the tolerance from the change of label, put a node there.
+    """Put a node on every cut whose middle is farther than the tolerance from the change of label.
 
     sheet     : FacetSheet, every facet with one label; changed in place
     query       : LabelQuery
@@ -64,7 +64,7 @@ def bend(sheet: FacetSheet, query: LabelQuery, tolerance: float) -> None:
 
 
 def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
-    """Fraction of the way from the middle of p q to the far corner that a node may go and still be seen from the back.
+    """Fraction of the way from the middle of p q to the far corner at which the node is still visible from the back.
 
     p, q, far, back : (k, 8) node rows of the two facets beside the side p q
     """
@@ -74,7 +74,7 @@ def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
     for a, b in ((p, 1.0), (q, -1.0)):
         at_start, at_end = (b * np.einsum("ij,ij->i", np.cross(a - back, x - back), normal)
                             for x in (0.5 * (p + q), far))
-        # seen while the signed area is positive; it changes linearly along the way
+        # visible while the signed area is positive; it changes linearly along the way
         beyond = at_end * np.sign(at_start) < 0
         out[beyond] = np.minimum(out, REACH * at_start / np.where(beyond, at_start - at_end, 1.0))[beyond]
     return out

@@ -14,11 +14,11 @@ from geometry.trimming.border_bending import bend
 from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet, sides_of
 from geometry.trimming.label_query import Label, LabelQuery, bisect
 
-# Rounds of cutting sides that hold a third label; then the change nearest to one end is taken.
+# Rounds of cutting sides that hold a third label. After them the change nearest to one end counts.
 SPLIT_ROUNDS = 4
-# Rounds of halving facets in which the border is far from straight, and how far: the middle of the cut misses it by
-# more than this fraction of the cut's length. What is left, ``bend`` takes off. Corners need the many rounds; ragged
-# borders end at so many new nodes for each crossing there was.
+# Rounds of halving facets in which the border is far from straight: the middle of the cut misses it by more than this
+# fraction of the cut's length. ``bend`` removes the rest. Corners need many rounds. On ragged borders the halving ends
+# at this many new nodes for each crossing.
 CURVE_ROUNDS, CURVED, BUDGET = 8, 0.05, 8
 
 
@@ -49,7 +49,7 @@ def label_sheet(sheet: FacetSheet, label: Label, tolerance: float) -> FacetSheet
 
 
 def _probe(sheet: FacetSheet, at: I64, query: LabelQuery) -> I64:
-    """Ask the centre of every facet; where none of the corners has that label, the centre becomes a node."""
+    """Query the centre of every facet; where none of the corners has its label, the centre becomes a node."""
     centre = sheet.nodes[sheet.corners].mean(axis=1)
     here = query(centre, sheet.face[sheet.corners[:, 0]])
     new = (here[:, None] != at[sheet.corners]).all(axis=1)
@@ -61,7 +61,7 @@ def _probe(sheet: FacetSheet, at: I64, query: LabelQuery) -> I64:
 
 
 def _shared_sides(one: I64, two: I64) -> I64:
-    """Keys of the edges that facets of both sets have."""
+    """Keys of the edges that belong to facets of both sets."""
     low, high, _ = sides_of(one)
     low_two, high_two, _ = sides_of(two)
     return np.intersect1d(low << 32 | high, low_two << 32 | high_two, assume_unique=True)
@@ -70,9 +70,9 @@ def _shared_sides(one: I64, two: I64) -> I64:
 def _crossings(sheet: FacetSheet, at: I64, fixed: I64, query: LabelQuery, tolerance: float) -> tuple[I64, I64, I64]:
     """A node on every edge whose ends differ, at the change of label.
 
-    Returns the labels (n,) of the nodes (of no meaning for crossings); (t, 3) edge numbers; (e,) crossing nodes or
-    -1. An edge that holds a third label is split there, with the facets beside it, and so are the sides of facets in
-    which the border is far from straight; but never the edges whose keys are ``fixed``, which facets elsewhere have.
+    Returns the labels (n,) of the nodes (without meaning for crossings), (t, 3) edge numbers, and (e,) crossing
+    nodes or -1. An edge that holds a third label is split there, with the facets beside it. So are the sides of
+    facets in which the border is far from straight. Edges whose keys are ``fixed`` are not split, since other facets share them.
     """
     known, settled = np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
     curves, most = 0, np.inf
@@ -117,8 +117,11 @@ def _look_up(known: I64, key: I64) -> I64:
 
 def _curved(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, settled: I64, query: LabelQuery,
             tolerance: float) -> tuple[I64, I64]:
-    """Edge numbers of the facets with two labels whose border misses the middle of the cut by far, and of those with
-    three in which no place was found where they meet; and keys of the facets that are fine, passed over next time."""
+    """Edge numbers of the facets to halve, and keys of the facets that need no further look.
+
+    To halve are facets with two labels whose border is far from the middle of the cut, and facets with three labels
+    without a known place where these meet.
+    """
     m = crossing[sides]
     m.sort(axis=1)
     name = m[:, 1] << 32 | m[:, 2]
@@ -147,14 +150,16 @@ def _curved(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, settled: I64,
 def split(corners: I64, sides: I64, middle: I64) -> I64:
     """Divide facets at nodes on their sides.
 
-    corners : (t, 3) int64 node numbers; sides : (t, 3) edge numbers; middle : (e,) int64 node on each edge or -1
+    corners : (t, 3) int64, index of the nodes in the frame of the sheet
+    sides   : (t, 3) int64, index of the edges
+    middle  : (e,) int64, index of the node on each edge, or -1
 
-    Returns (q, 3) node numbers, one to four facets for each.
+    Returns (q, 3) int64, index of the nodes, one to four facets for each.
     """
     m = middle[sides]
     count = (m >= 0).sum(axis=1)
     out = [corners[count == 0]]
-    # turned so that the only split side, or the first of two adjoining ones, runs from corner 0 to corner 1
+    # rotated so that the only split side, or the first of two adjoining ones, runs from corner 0 to corner 1
     turn = np.where(count == 1, (m >= 0).argmax(axis=1), ((m < 0).argmax(axis=1) + 1) % 3)
     turned = (turn[:, None] + np.arange(3)) % 3
     c, m = np.take_along_axis(corners, turned, 1), np.take_along_axis(m, turned, 1)
@@ -166,7 +171,7 @@ def split(corners: I64, sides: I64, middle: I64) -> I64:
 
 
 def _cut(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, query: LabelQuery, tolerance: float) -> None:
-    """Facets with two labels are cut by a segment, with three by a star from the point where the labels meet."""
+    """Cut facets with two labels by a segment, facets with three by a star from the point where the labels meet."""
     at = at[sheet.corners]
     m = crossing[sides]
     count = (m >= 0).sum(axis=1)
@@ -174,7 +179,7 @@ def _cut(sheet: FacetSheet, at: I64, sides: I64, crossing: I64, query: LabelQuer
     turned = ((m < 0).argmax(axis=1)[:, None] + 2 + np.arange(3)) % 3
     two = count == 2
     c, x, t = (np.take_along_axis(v, turned, 1)[two] for v in (sheet.corners, m, at))
-    # corner 0 is alone: sides 0 and 2 are crossed; of the diagonals the one that leaves the cut at the wider angle
+    # corner 0 is alone, so sides 0 and 2 are crossed; the diagonal at the wider angle to the cut is taken
     first = _cosine(sheet.nodes, x[:, 0], x[:, 2], c[:, 2]) < _cosine(sheet.nodes, x[:, 2], x[:, 0], c[:, 1])
     near = np.stack([x[:, 0], c[:, 1], np.where(first, c[:, 2], x[:, 2])], axis=1)
     other = np.stack([np.where(first, x[:, 0], c[:, 1]), c[:, 2], x[:, 2]], axis=1)
@@ -199,12 +204,12 @@ def _cosine(nodes: F64, at: I64, one: I64, two: I64) -> F64:
 
 
 def _meeting_points(query: LabelQuery, corners: F64, face: I32, at: I64, tolerance: float) -> tuple[F64, BOOL]:
-    """Where three labels meet in facets whose corners have three: by halving, one of four parts has three again.
+    """Where three labels meet in facets whose corners have three labels; halving finds the part with all three.
 
     corners : (k, 3, 8) node rows; face : (k,); at : (k, 3) labels
 
     Returns (k, 8) node rows, inside the facets, and (k,) whether the place was found. By Sperner's lemma a part with
-    three labels exists while no side holds a label that its ends do not have; where none is found the halving ends.
+    three labels exists while no side holds a label that its ends do not have. Without such a part the halving ends.
     """
     outer, live = corners.mean(axis=1), np.arange(len(corners))
     corners, at = corners.copy(), at.copy()

@@ -28,7 +28,7 @@ ANGULAR = {Kind.GeomAbs_Cylinder: (True, False), Kind.GeomAbs_Cone: (True, False
            Kind.GeomAbs_Torus: (True, True)}
 # Longest arc between two knots (rad): its middle weight is a half.
 LONGEST_ARC = 2.0 * np.pi / 3.0
-# What is no spline comes as one, as near as this (mm) where the kernel manages with so many spans.
+# Other surfaces are approximated by splines: to this tolerance (mm) where this many spans suffice.
 NEAR, MAX_SPANS, DEGREE = 1e-6, 400, 9
 # Parameters of a patch that is measured, along each side.
 LOOKS = 15
@@ -36,7 +36,7 @@ LOOKS = 15
 
 def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
                  faces: Iterable[int] | None = None) -> bytes:
-    """The work behind ``geometry.step_import.face_surfaces.read_patches``, in this process; arguments and errors as there.
+    """The work of ``geometry.step_import.face_surfaces.read_patches`` in this process, arguments and errors as there.
 
     Returns the bytes ``patches_from_bytes`` reads.
     """
@@ -75,7 +75,7 @@ def face_patch(number: int, face: Shape) -> FaceSurface:
 
 
 def _box(face: Shape, whole: Shape) -> F64:
-    """Parameters the face lies in: not beyond the surface, and not more than once round it."""
+    """Parameters of the face: not beyond the surface, and not more than one period."""
     box = np.ascontiguousarray(np.array(BRepTools.UVBounds_s(face)).reshape(2, 2).T)
     limits = np.array(whole.Bounds()).reshape(2, 2).T
     turns = ((whole.IsUPeriodic, whole.UPeriod), (whole.IsVPeriodic, whole.VPeriod))
@@ -90,7 +90,7 @@ def _box(face: Shape, whole: Shape) -> F64:
 def _turned(exact: BRepAdaptor_Surface, box: F64, side: int) -> NurbsSurface:
     """Cylinder, cone, sphere or torus: an arc about the axis by a line or an arc in its half plane, homogeneous.
 
-    The kernel's own conversion cannot begin a full turn at any angle: eight bores of a test part came out 0.13 mm off.
+    The kernel's own conversion cannot begin a full turn at any angle; eight bores of a test part were 0.13 mm off.
     """
     kind = exact.GetType()
     if kind == Kind.GeomAbs_Cylinder:
@@ -130,7 +130,7 @@ def _line(ends: F64, radius: F64, height: F64) -> tuple[F64, F64]:
 
 
 def _surface(spline: Shape, low: F64, side: int) -> NurbsSurface:
-    """Poles, weights and knots of a kernel spline; its knots, a period off at times, shifted to begin at ``low``."""
+    """Poles, weights and knots of a kernel spline; the knots, which may be off by a period, begin at ``low``."""
     spline.SetUNotPeriodic()
     spline.SetVNotPeriodic()
     n, m = spline.NbUPoles(), spline.NbVPoles()
