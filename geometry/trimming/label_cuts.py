@@ -72,7 +72,8 @@ def _crossings(sheet: FacetSheet, at: I64, fixed: I64, query: LabelQuery, tolera
 
     Returns the labels (n,) of the nodes (without meaning for crossings), (t, 3) edge numbers, and (e,) crossing
     nodes or -1. An edge that holds a third label is split there, with the facets beside it. So are the sides of
-    facets in which the border is far from straight. Edges whose keys are ``fixed`` are not split, since other facets share them.
+    facets in which the border is far from straight. Edges whose keys are ``fixed`` are not split, since other
+    facets share them.
     """
     known, settled = np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
     curves, most = 0, np.inf

@@ -149,7 +149,7 @@ def _stays(asked: Sequence[tuple[View, NDArray[np.int64], ToolProposal]], area: 
     """Area that stays by reason, mm², scaled from the samples that were asked to ``total``."""
     stays: dict[str, float] = {}
     for _, mine, proposal in asked:
-        rows = mine[proposal.asked]
+        rows = mine[proposal.rows]
         why = np.where(proposal.why == "taken", "too little", proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
         for reason in sorted(set(why[~taken[rows]].tolist())):

@@ -1,8 +1,8 @@
-"""Where the sides of walls end, and shortest rays there.
+"""Borders of the sides of walls, and the shortest rays there.
 
-A channel's shortest ray often begins on a border of a side or meets one. There it is looked for along the border, in
-one dimension. A ray that meets a border point q begins at the foot of the perpendicular from q on the other side, so
-these rays are found backwards, from the nearest point of that side.
+The shortest ray of a channel often begins on a border of a side or meets one. The search for it there runs along the
+border, in one dimension. A ray that meets a border point q begins at the foot of the perpendicular from q on the other
+side. So these rays are found backwards, from the nearest point of that side.
 """
 
 from __future__ import annotations
@@ -14,19 +14,21 @@ import numpy as np
 
 from geometry.mesh import F64, TriangleMesh
 
-# Points a border is looked at first, at most; the best so many are looked at closer, so often, so much each time.
+# Largest number of first points on a border; number of the best points to refine; rounds; refinement of each round.
 MAX_STARTS, CLOSER, TIMES, FINER = 3000, 6, 5, 8
 
 
 Rays = Callable[[F64, np.ndarray], tuple[F64, F64, F64]]
-"""From points (k, 3) and the triangles they lie on to lengths (inf: no ray), places where rays begin, and feet."""
+"""From points (k, 3) and their triangles to lengths (inf: no ray), starts of the rays, and feet."""
 
 
 @dataclass(frozen=True, eq=False)
 class BorderPlaces:
     """Places along a border.
 
-    piece : (k,) int, of the border; t : (k,) float64, 0 to 1 along it; half : (k,) float64, to the next place, half way
+    piece : (k,) int64, index of the piece of the border
+    t     : (k,) float64, dimensionless, 0 to 1 along the piece
+    half  : (k,) float64, dimensionless, half the distance to the next place
     """
 
     piece: np.ndarray
@@ -36,7 +38,7 @@ class BorderPlaces:
 
 @dataclass(frozen=True, eq=False)
 class SideBorder:
-    """The border of the sides of a wall.
+    """The border of the sides of a wall, in the frame of the part.
 
     ends     : (m, 2, 3) float64, mm, its straight pieces between mesh nodes
     middle   : (m, 3) float64, mm, of the side triangle at each
@@ -51,7 +53,10 @@ class SideBorder:
 
     @classmethod
     def of(cls, mesh: TriangleMesh, side: np.ndarray) -> SideBorder:
-        """The border of some triangles (k,) of a mesh: their edges that no two of them share."""
+        """The border of some triangles of a mesh: the edges that only one of them has.
+
+        side : (k,) int64, index of the triangles
+        """
         edges, _, alone = _edges(mesh.faces[side])
         at = side[alone % len(side)]
         return cls(mesh.vertices[edges[alone]], mesh.triangles[at].mean(axis=1), at, edges[alone])
@@ -72,9 +77,11 @@ class SideBorder:
         return np.asarray(p + inset * (self.middle[at.piece] - p))
 
     def least(self, rays: Rays, at: BorderPlaces, length: F64, inset: float) -> tuple[float, F64, F64] | None:
-        """The shortest ray at the border: its length, where it begins, its foot; None where there is none.
+        """The shortest ray at the border: its length (mm), start and foot, (3,) each; None where there is none.
 
-        at, length : places looked at already and the lengths there, inf for no ray
+        at     : BorderPlaces of the first look
+        length : (k,) float64, mm, lengths of the rays there, inf for no ray
+        inset  : share of a triangle by which places are moved into the side
         """
         best: tuple[float, F64, F64] | None = None
         keep = CLOSER
@@ -96,8 +103,8 @@ class SideBorder:
 def neighbours(faces: np.ndarray) -> np.ndarray:
     """The triangles across the edges 01, 12 and 20 of each triangle.
 
-    faces : (k, 3) int, nodes of triangles
-    Returns (k, 3) int64 rows of ``faces``; -1 where there is none.
+    faces : (k, 3) int64, index of the nodes of triangles; the frame of the mesh does not matter
+    Returns (k, 3) int64, index in ``faces``; -1 where there is none.
     """
     edges, key, _ = _edges(faces)
     order = np.argsort(key, kind="stable")
@@ -109,7 +116,7 @@ def neighbours(faces: np.ndarray) -> np.ndarray:
 
 
 def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (3 k, 2) of triangles, edge 01 of all first; a number that equal edges share; those no other equals."""
+    """Edges (3 k, 2) of triangles, edge 01 of all first; a number that equal edges share; the single edges."""
     f = faces.astype(np.int64)
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     number = edges.min(axis=1) * (int(edges.max(initial=0)) + 1) + edges.max(axis=1)

@@ -57,10 +57,10 @@ class ToolToAdd:
 
 @dataclass(frozen=True, eq=False)
 class ToolProposal:
-    """What to add, and what is known of the samples that were asked.
+    """What to add, and the verdict on each examined sample.
 
     tools : stoutest first
-    asked : (n,) int64, rows of the samples that were asked
+    rows  : (n,) int64, index of the samples that were examined
     why   : (n,) str of each of these: 'taken' where a tool of the list takes it; else why it stays: 'undercut', 'pass'
             (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters does), 'sharp corner'
             (no round tool), 'too little' (not worth a tool), 'fixture' (one stands above it, or keeps the tools at
@@ -68,7 +68,7 @@ class ToolProposal:
     """
 
     tools: tuple[ToolToAdd, ...]
-    asked: NDArray[np.int64]
+    rows: NDArray[np.int64]
     why: NDArray[np.object_]
 
 
@@ -100,8 +100,8 @@ def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolPropos
     if not n:
         return ToolProposal((), np.zeros(0, np.int64), np.zeros(0, object))
     rng = np.random.default_rng(SEED)
-    asked = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
-    few = samples.subset(asked)
+    rows = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
+    few = samples.subset(rows)
     area = few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-300))
     why = _known(few, requirement)
     left = np.flatnonzero(why == "")
@@ -117,7 +117,7 @@ def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolPropos
     if requirement.clamped:
         rest = np.flatnonzero(np.isin(why, ("slender", "sharp corner")))
         why[rest[requirement.touched_by(few.subset(rest), requirement.unclamped) != ""]] = "fixture"
-    return ToolProposal(tuple(tools), asked, why)
+    return ToolProposal(tuple(tools), rows, why)
 
 
 def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.object_]:

@@ -50,7 +50,7 @@ def asked(mesh, tools, samples):
 
 def areas(found, samples):
     """Area by what is said of the samples, mm²."""
-    area = samples.area[found.asked]
+    area = samples.area[found.rows]
     area = area * (samples.area.sum() / area.sum())
     return {str(w): float(area[found.why == w].sum()) for w in set(found.why.tolist())}
 
@@ -77,7 +77,7 @@ def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
     found = asked(mesh, AT_HAND, left)
     got = areas(found, left)
     assert found.tools and got["taken"] > 0.9 * float(left.area.sum())
-    taken = left.subset(found.asked[found.why == "taken"])
+    taken = left.subset(found.rows[found.why == "taken"])
     for margin in (4.0, 4.13, 4.27):
         by_tool = np.array([takes(mesh, body, taken, margin) for body in grown(AT_HAND, found)])
         assert by_tool.any(axis=0).all()
@@ -95,7 +95,7 @@ def test_no_shorter_neck_would_do():
     mesh = channel()
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    taken = left.subset(found.asked[found.why == "taken"])
+    taken = left.subset(found.rows[found.why == "taken"])
     bodies = grown(AT_HAND, found)
     got = np.array([takes(mesh, body, taken) for body in bodies])
     for k, body in enumerate(bodies):
@@ -162,7 +162,7 @@ def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
     assert found.tools == () and set(found.why) == {"pass"}
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    few = found.asked[found.why == "taken"][:4]
+    few = found.rows[found.why == "taken"][:4]
     assert float(left.area[few].sum()) < LEAST_ZONE_MM2
     found = asked(mesh, AT_HAND, left.subset(few))
     assert found.tools == () and set(found.why) == {"too little"}
