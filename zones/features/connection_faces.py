@@ -25,8 +25,8 @@ def face_bases(part: Part, decomposition: Decomposition) -> dict[int, str]:
 def connection_faces(part: Part, decomposition: Decomposition) -> dict[str, tuple[int, ...]]:
     """Face numbers of every connection with its fillets, by id, ascending.
 
-    A fillet along an edge of the connection belongs to it. So does a fillet between two of those that meets nothing else
-    but walls: the patch at a corner of the span. A fillet between two connections belongs to both.
+    A fillet along an edge of the connection belongs to it. So does a fillet between two of those that meets nothing
+    else but walls: the patch at a corner of the span. A fillet between two connections belongs to both.
     """
     role = decomposition.face_role
     fillets = {f for f, r in role.items() if r == "fillet"}

@@ -2,8 +2,8 @@
 
 A *body* is a thin sheet (see ``zones.features.walls``) or a component of the remaining faces across convex and smooth
 edges. A body *ends* at a wall where their common concave edges (or fillets) run around it: its normals along that
-border point to different sides. A wall that another body ends at shows one normal there. So a long wall with a window or
-a gate does not count as a bridge between the ribs that meet it.
+border point to different sides. A wall that another body ends at shows one normal there. So a long wall with a window
+or a gate does not count as a bridge between the ribs that meet it.
 A body with two ends and void below is a connection [Arivazhagan2020]; with floor below its whole span it is a wall.
 
 Arrays of faces are (n,), in the order of the faces; normals and places lie in the frame of the part.

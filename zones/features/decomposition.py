@@ -31,9 +31,10 @@ def decompose(part: Part) -> Decomposition:
     Returns
     -------
     Decomposition
-        Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are measured between patches through the mesh
-        nodes. They are within 0.1 % of exact surfaces meshed with 20 or more columns (tests/oracle/test_gaps.py).
-        Without surface parameters they are the gaps of the mesh, with at most twice ``part.deviation`` of further error.
+        Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are measured between patches through the
+        mesh nodes. They are within 0.1 % of exact surfaces meshed with 20 or more columns (tests/oracle/test_gaps.py).
+        Without surface parameters they are the gaps of the mesh, with at most twice ``part.deviation`` of further
+        error.
     """
     graph = FaceGraph(part)
     sheets = find_sheets(graph)

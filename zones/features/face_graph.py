@@ -334,7 +334,8 @@ class FaceGraph:
     def _chamfers(self, fillet: np.ndarray) -> np.ndarray:
         """Narrow faces between two concave edges, leaning half way between their neighbours (a weld, a chamfer).
 
-        The flank of a short bar or of a leg of a fork is none: it is wider than the thickness of the material behind it.
+        The flank of a short bar or of a leg of a fork is none: it is wider than the thickness of the material behind
+        it.
         """
         out = np.zeros(self.n, bool)
         width = np.zeros(self.n)

@@ -92,7 +92,8 @@ class SideBorder:
                 break
             spread = np.linspace(-1.0, 1.0, 2 * FINER + 1)
             t = np.clip(at.t[order, None] + at.half[order, None] * spread, 0.0, 1.0).ravel()
-            at = BorderPlaces(np.repeat(at.piece[order], len(spread)), t, np.repeat(at.half[order] / FINER, len(spread)))
+            half = np.repeat(at.half[order] / FINER, len(spread))
+            at = BorderPlaces(np.repeat(at.piece[order], len(spread)), t, half)
             length, start, foot = rays(self.points(at, inset), self.triangle[at.piece])
             k, keep = int(np.argmin(length)), 2
             if np.isfinite(length[k]) and (best is None or length[k] < best[0]):

@@ -1,7 +1,8 @@
-"""Categorised computable zones (CCZ): the profile type and level of what a region's walls look like in plan.
+"""Categorised computable zones (CCZ): profile type and level of a region, from its walls in plan [Arivazhagan2020].
 
-A channel has the profiles of the sides that face it, the outside of a wall those of the sides that face none, and an
-SCZI cell or a connection those of the stretches of sides it touches. The most complex one counts for the zone.
+A channel has the profiles of the sides that face it. The outside of a wall has those of the sides that face no channel.
+An SCZI cell or a connection has those of the stretches of sides that it touches. The most complex profile counts for
+the zone.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from zones.plan_view.regions import base_of, connections_of, place_of
 from zones.plan_view.wall_sections import SideCurve
 
 RANK = {Level.SIMPLE: 0, Level.MEDIUM: 1, Level.HIGH: 2}
-NEAR = 0.05  # mm round a footprint within which a side counts as touched
+NEAR = 0.05  # mm around a footprint: a side within it counts as touched
 MIN_POINTS = 4
-LOOK = 0.1  # mm off a side where its place is looked up
-ELSEWHERE = 0.02  # of a side in other places, up to which it is not cut: its ends stand at other walls
+LOOK = 0.1  # mm off a side: distance at which its place is looked up
+ELSEWHERE = 0.02  # of a side: a smaller share in other places does not split it, since its ends stand at other walls
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +38,13 @@ class WallSideProfile:
 
 @dataclass(frozen=True, eq=False)
 class Category:
-    """What decides the type of a zone: its sides, the most complex first."""
+    """The sides that decide the type of a zone, the most complex first."""
 
     sides: tuple[WallSideProfile, ...] = ()
 
     @property
     def profile(self) -> CurveProfile | None:
-        """Of the most complex side; None where the region has no side."""
+        """Profile of the most complex side; None where the region has no side."""
         return self.sides[0].profile if self.sides else None
 
     @property
@@ -74,7 +75,7 @@ class Categories:
         return self.known[region]
 
     def _of_place(self, base: str, place: int) -> list[WallSideProfile]:
-        """The sides of a base; of one that goes on into other places the longest stretch in this one."""
+        """The sides of a base; of a side that continues into other places, the longest stretch in this place."""
         out = []
         for s in self._of_base(base):
             points, normals = spread(s.curve.points, s.curve.closed, PITCH)
@@ -109,7 +110,7 @@ class Categories:
 
 
 def _within(curve: SideCurve, shape: shapely.Geometry) -> F64 | None:
-    """The longest stretch of a side inside a shape, (k, 2) float64, mm; None where there is none to speak of."""
+    """The longest stretch of a side inside a shape, (k, 2) float64, mm; None where it is too short."""
     line = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
     cut = shapely.line_merge(shapely.intersection(shapely.LineString(line), shape))
     parts = [g for g in shapely.get_parts(cut) if g.geom_type == "LineString" and g.length > 0]

@@ -1,8 +1,8 @@
 """The smallest change of the tool set that empties the remainder, as one list of tools.
 
-Every cutter of a fixed grid, and every cutter at hand, is asked which samples it touches if nothing but the cutting
-part counts, and how long its neck and stickout must be there. That gives candidates of catalogue lengths, each with
-the samples it takes, and the list is a minimum set cover, solved exactly. Theory: docs/theory/tools.md.
+For every cutter of a fixed grid and every cutter at hand, two things are computed: the samples that its cutting part
+alone touches, and the lengths of neck and stickout it needs there. This gives candidates of catalogue lengths, each
+with the samples it takes. The list is a minimum set cover, solved exactly. Theory: docs/theory/tools.md.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from zones.zoning.zones import LEAST_ZONE_MM2
 
 MAX_SAMPLES = 2000
 SEED = 11
-LEVELS = 8  # neck lengths tried for one cutter
-# weights of the ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
+LEVELS = 8  # neck lengths to try for one cutter
+# weights that decide ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
 PER_SLENDER, PER_NEW, PER_STOUT = 1e-2, 1e-3, 1e-4
 
 
@@ -34,8 +34,8 @@ PER_SLENDER, PER_NEW, PER_STOUT = 1e-2, 1e-3, 1e-4
 class ToolToAdd:
     """A tool to add, lengths mm from the tip.
 
-    instead_of : id of the tool at hand that has the same cutter and a shorter neck or stickout, '' where none has
-    holder_of  : id of the tool at hand whose shank and holder it was measured with
+    instead_of : id of the tool at hand with the same cutter and a shorter neck or stickout, '' where there is none
+    holder_of  : id of the tool at hand whose shank and holder were used
     """
 
     kind: str
@@ -57,14 +57,14 @@ class ToolToAdd:
 
 @dataclass(frozen=True, eq=False)
 class ToolProposal:
-    """What to add, and the verdict on each examined sample.
+    """The tools to add, and the verdict on each examined sample.
 
     tools : stoutest first
     rows  : (n,) int64, index of the samples that were examined
-    why   : (n,) str of each of these: 'taken' where a tool of the list takes it; else why it stays: 'undercut', 'pass'
-            (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters does), 'sharp corner'
-            (no round tool), 'too little' (not worth a tool), 'fixture' (one stands above it, or keeps the tools at
-            hand from it that touch it on the bare part)
+    why   : (n,) str of each of these: 'taken' where a tool of the list takes it, else the reason why it remains:
+            'undercut', 'pass' (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters
+            reaches it), 'sharp corner' (no round tool), 'too little' (not worth a tool), 'fixture' (a fixture lies
+            above it, or blocks the tools at hand that touch it on the bare part)
     """
 
     tools: tuple[ToolToAdd, ...]
@@ -74,7 +74,7 @@ class ToolProposal:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A tool with the samples it would take; need (k, 2): neck length and stickout each of them asks for, mm."""
+    """A tool with the samples it takes; need (k, 2): neck length and stickout that each of them needs, mm."""
 
     cutter: CuttingPart
     body: ToolBody
@@ -87,14 +87,14 @@ class _Candidate:
 
 
 def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolProposal:
-    """Fewest tools that take what no tool at hand does.
+    """Fewest tools that take the samples that no tool at hand takes.
 
-    samples : SurfaceSamples of the remainder, mm, access frame
+    samples     : SurfaceSamples of the remainder, mm, access frame
     requirement : ToolRequirement of the access
 
     Notes
     -----
-    Of more than 2000 samples 2000 are asked, drawn with a fixed seed, and stand for the rest.
+    Of more than 2000 samples, 2000 are drawn with a fixed seed and represent the rest.
     """
     n = len(samples)
     if not n:
@@ -121,7 +121,7 @@ def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolPropos
 
 
 def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.object_]:
-    """Reason of the samples no new tool is asked for: out of sight or covered, or touched by a tool at hand."""
+    """Reason of the samples that need no new tool: out of sight or covered, or touched by a tool at hand."""
     view = requirement.view
     why = np.full(len(few), "", dtype=object)
     if requirement.clamped:
@@ -133,12 +133,12 @@ def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.obje
 
 
 def _cutters(requirement: ToolRequirement) -> list[CuttingPart]:
-    """What is asked, stout to thin: the cutters at hand and those of the series."""
+    """The cutters to try, stout to thin: those at hand and those of the series."""
     tools = list(requirement.tools.values())
     out = [CuttingPart(t.diameter, t.corner_radius, t.id, True) for t in tools]
     have = {(c.diameter, c.corner) for c in out}
     for d in DIAMETERS:
-        if 0.5 * d <= requirement.cusp:  # such a tool cannot keep its cusp below its own radius, and no setup takes it
+        if 0.5 * d <= requirement.cusp:  # the cusp would exceed the radius of such a tool, and no setup allows it
             continue
         like = nearest(tools, d).id
         out += [CuttingPart(d, corner, like, False) for corner in (d / 2, 0.0, round(BULL_CORNER * d, 6))
@@ -147,7 +147,7 @@ def _cutters(requirement: ToolRequirement) -> list[CuttingPart]:
 
 
 def _candidates(samples: SurfaceSamples, requirement: ToolRequirement) -> tuple[list[_Candidate], NDArray[np.object_]]:
-    """Every tool that takes some of the samples, and of each sample 'tool', 'slender' or 'sharp corner'."""
+    """Every tool that takes some of the samples, and for each sample 'tool', 'slender' or 'sharp corner'."""
     why = np.full(len(samples), "sharp corner", dtype=object)
     out: list[_Candidate] = []
     for cutter in _cutters(requirement):
@@ -176,10 +176,10 @@ def _levels(cutter: CuttingPart, body: ToolBody, rows: NDArray[np.int64], need: 
 
 
 def _fewest(candidates: list[_Candidate], area: F64) -> list[_Candidate]:
-    """Candidates that together take most with fewest tools: a set cover in which leaving a least zone costs a tool.
+    """Candidates that take most with the fewest tools: a set cover in which an open area of a least zone costs a tool.
 
-    No tool that gains less is proposed: zones would not use it either. Samples that the same candidates take are one
-    row. Solved exactly by HiGHS (branch and bound).
+    A tool that gains less is not proposed, since zones do not use it either. Samples that the same candidates take are
+    one row. HiGHS solves the problem exactly (branch and bound).
     """
     if not candidates or not float(area.sum()) > 0.0:
         return []
@@ -202,13 +202,13 @@ def _fewest(candidates: list[_Candidate], area: F64) -> list[_Candidate]:
     answer = milp(np.concatenate([price, worth]), constraints=LinearConstraint(rows, lb=1.0),
                   integrality=np.concatenate([np.ones(len(useful)), np.zeros(len(kinds))]),
                   bounds=Bounds(0.0, 1.0), options={"mip_rel_gap": 0.0, "presolve": True})
-    if answer.x is None:  # leaving everything is always allowed, so there is an answer
+    if answer.x is None:  # an empty choice is always allowed, so there is a solution
         raise InternalError(f"no set of tools was found: {answer.message}", code="cover_failed")
     return [candidates[useful[j]] for j in np.flatnonzero(answer.x[:len(useful)] > 0.5)]
 
 
 def _named(c: _Candidate, need: F64) -> ToolToAdd:
-    """The candidate, no longer than the samples it takes ask for."""
+    """The candidate with the least lengths that the samples it takes need."""
     t = c.body
     neck, stickout = (float(v) for v in need.max(axis=0))
     return ToolToAdd(t.kind, t.diameter, round(t.corner_radius, 6), round(min(t.flute_length, neck), 6),
