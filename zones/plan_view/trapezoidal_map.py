@@ -5,8 +5,8 @@
 3. Trapezoids that are neighbours across a wall belong to one face.
 
 The map of a set of pieces is unique. Trapezoids and faces are numbered by their left points, so the numbers do not
-depend on the seed or on the order of the segments. docs/theory/subdivision.md has the argument. All places lie in the plan
-frame.
+depend on the seed or on the order of the segments. docs/theory/subdivision.md has the argument. All places lie in
+the plan frame.
 """
 
 from __future__ import annotations
