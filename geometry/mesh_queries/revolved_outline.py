@@ -142,8 +142,8 @@ class Outline:
                      np.array([o for o, _ in bodies]))
 
 
-def _wrong(k: int, what: str, limit: str) -> SetupError:
-    return SetupError(f"piece {k + 1} of the outline {what}", code="bad_cutter", subjects=(f"piece {k + 1}",),
+def _wrong(k: int, fault: str, limit: str) -> SetupError:
+    return SetupError(f"piece {k + 1} of the outline {fault}", code="bad_cutter", subjects=(f"piece {k + 1}",),
                       limit=limit, remedy="give the half section from the tip upwards in mm")
 
 

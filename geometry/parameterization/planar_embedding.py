@@ -161,15 +161,15 @@ def _mean_values(vertices: F64, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.concatenate(start), np.concatenate(end), np.concatenate(weight)
 
 
-def _solved(place: F64, held: np.ndarray, start: np.ndarray, end: np.ndarray, weight: F64) -> F64:
-    """Places (k, 2) in which every place that is not ``held`` is a mean of its neighbours."""
+def _solved(place: F64, fixed: np.ndarray, start: np.ndarray, end: np.ndarray, weight: F64) -> F64:
+    """Places (k, 2) in which every place that is not ``fixed`` is a mean of its neighbours."""
     number = np.full(len(place), -1)
-    number[~held] = np.arange((~held).sum())
-    inner = ~held[start]
+    number[~fixed] = np.arange((~fixed).sum())
+    inner = ~fixed[start]
     i, j, w = number[start[inner]], end[inner], weight[inner]
-    count = int((~held).sum())
+    count = int((~fixed).sum())
     known = np.zeros((count, 2))
-    border = held[j]
+    border = fixed[j]
     np.add.at(known, i[border], w[border, None] * place[j[border]])
     total = np.bincount(i, w, count)
     total[total == 0.0] = 1.0  # a place in no triangle may lie anywhere
@@ -178,7 +178,7 @@ def _solved(place: F64, held: np.ndarray, start: np.ndarray, end: np.ndarray, we
                           np.concatenate([np.arange(count), number[j[~border]]]))), shape=(count, count)).tocsc()
     out = place.copy()
     try:
-        out[~held] = splu(system).solve(known)
+        out[~fixed] = splu(system).solve(known)
     except RuntimeError as singular:
         raise GeometryError("some triangles of the region are not connected to its border", code="flat_triangle",
                             subjects=("region",), measured=count, limit=0,

@@ -205,7 +205,7 @@ def _chord(piece: shapely.Polygon, near: float) -> shapely.LineString | None:
     return None if best is None else best[1]
 
 
-def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method | None,
+def _laid(piece: shapely.Polygon, scale: F64, shape: tuple[int, int], only: Method | None,
           notes: tuple[str, ...]) -> Squared:
     """One piece over the unit square, by the first grid that does not fold."""
     m, n = shape
@@ -220,13 +220,13 @@ def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method 
             continue
         try:
             grid = _grid(method, blend, quad, piece, sides, shape)
-            mapped = GridMap.of(grid / by)
+            mapped = GridMap.of(grid / scale)
         except (GeometryError, QhullError) as refusal:  # QhullError where places of a sliver lie on one line
             tried.append(f"{method}{f' {blend:g}' if method is Method.BLEND else ''}: {refusal}")
             continue
-        return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / by,
+        return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / scale,
                        (*notes, *tried))
-    middle = (shapely.get_coordinates(piece.representative_point())[0] / by).round(4).tolist()
+    middle = (shapely.get_coordinates(piece.representative_point())[0] / scale).round(4).tolist()
     raise GeometryError(f"a piece of a region around uv {middle} folds with every method",
                         code="no_square", subjects=(f"uv {middle}",), measured=tried, limit=0,
                         remedy="machine it by another strategy")

@@ -70,14 +70,14 @@ def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | Non
     return found
 
 
-def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
+def _search(surface: NurbsSurface, points: F64, start: F64) -> FootPoints:
     low, high = surface.domain
     uv = start.copy()
     foot = surface.points(uv)
-    left = np.einsum("pi,pi->p", foot - given, foot - given)
-    rows = np.arange(len(given))
+    left = np.einsum("pi,pi->p", foot - points, foot - points)
+    rows = np.arange(len(points))
     for _ in range(ROUNDS):
-        step = _newton(surface, given[rows], uv[rows])
+        step = _newton(surface, points[rows], uv[rows])
         step /= np.maximum(np.abs(step / (REACH * (high - low))).max(axis=1, keepdims=True), 1.0)
         far = (np.abs(step) > ENOUGH * (high - low)).any(axis=1)
         rows, step = rows[far], step[far]
@@ -88,7 +88,7 @@ def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
                 break
             trial = np.clip(uv[rows[todo]] + step[todo], low, high)
             at = surface.points(trial)
-            gap = np.einsum("pi,pi->p", at - given[rows[todo]], at - given[rows[todo]])
+            gap = np.einsum("pi,pi->p", at - points[rows[todo]], at - points[rows[todo]])
             better = gap < left[rows[todo]]
             gained[todo[better]] = True
             done = rows[todo[better]]

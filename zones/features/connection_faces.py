@@ -40,12 +40,12 @@ def connection_faces(part: Part, decomposition: Decomposition) -> dict[str, tupl
 
 
 def _with_fillets(c: Connection, fillets: set[int], role: dict[int, str],
-                  beside: dict[int, set[int]]) -> tuple[int, ...]:
+                  neighbours: dict[int, set[int]]) -> tuple[int, ...]:
     body = set(c.faces)
-    own = body | {f for f in fillets if beside.get(f, set()) & body}
-    around = {g for f in own - body for g in beside[f]}
+    own = body | {f for f in fillets if neighbours.get(f, set()) & body}
+    around = {g for f in own - body for g in neighbours[f]}
     patches = {f for f in (around & fillets) - own
-               if len(beside[f] & own) > 1 and all(g in own or role.get(g) == "wall" for g in beside[f])}
+               if len(neighbours[f] & own) > 1 and all(g in own or role.get(g) == "wall" for g in neighbours[f])}
     return tuple(sorted(own | patches))
 
 

@@ -67,19 +67,19 @@ class LevelPlaces:
         cells = np.flatnonzero(self.number != MATERIAL)
         return {int(self.number[k]): self.plan.map.outline(self.plan.faces, int(k)) for k in cells.tolist()}
 
-    def nearest(self, xy: F64, of: tuple[int, ...]) -> NDArray[np.int64]:
-        """(n,) int64, index of the nearest of some places. xy : (n, 2) float64, mm, in plan; of : their numbers."""
-        if of not in self.sides:
-            rings = [shapely.get_parts(self.outlines[k].boundary) for k in of]
-            owner = np.repeat(of, [len(own) for own in rings])
+    def nearest(self, xy: F64, numbers: tuple[int, ...]) -> NDArray[np.int64]:
+        """(n,) int64, index of the nearest of some places. xy : (n, 2) float64, mm, in plan; numbers : their numbers."""
+        if numbers not in self.sides:
+            rings = [shapely.get_parts(self.outlines[k].boundary) for k in numbers]
+            owner = np.repeat(numbers, [len(own) for own in rings])
             corners, ring = shapely.get_coordinates(np.concatenate(rings), return_index=True)
             on = ring[1:] == ring[:-1]
             lines = shapely.linestrings(np.stack([corners[:-1][on], corners[1:][on]], axis=1))
-            self.sides[of] = shapely.STRtree(lines), owner[ring[:-1][on]]
-        tree, owner = self.sides[of]
+            self.sides[numbers] = shapely.STRtree(lines), owner[ring[:-1][on]]
+        tree, owner = self.sides[numbers]
         inside = self.at(xy)
         out = owner[tree.nearest(shapely.points(xy))]
-        return np.where(np.isin(inside, of), inside, out)
+        return np.where(np.isin(inside, numbers), inside, out)
 
 
 @dataclass(frozen=True, eq=False)

@@ -197,10 +197,10 @@ def _led(grid: float, segments: I64, hot: I64) -> Noding:
     return _sorted_pieces(grid, segments, hot, pairs, s[:-1][same])
 
 
-def _sorted_pieces(grid: float, segments: I64, hot: I64, pairs: I64, of: I64) -> Noding:
+def _sorted_pieces(grid: float, segments: I64, hot: I64, pairs: I64, source: I64) -> Noding:
     """A noding from pairs of hot pixels (k, 2), lesser first, and the segments (k,) they came from."""
     pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
-    both = np.unique(np.column_stack([piece.ravel(), of]), axis=0)
+    both = np.unique(np.column_stack([piece.ravel(), source]), axis=0)
     starts = np.searchsorted(both[:, 0], np.arange(len(pieces) + 1)).astype(np.int64)
     return Noding(grid, segments, hot, pieces, starts, np.ascontiguousarray(both[:, 1]))
 

@@ -212,12 +212,12 @@ class TrapezoidMap:
             lines = np.concatenate([lines, [[b, d], [a, c]]])
         return shapely.build_area(shapely.multilinestrings(lines * self.noding.grid))
 
-    def _height(self, line: I64, x: I64, here: I64) -> F64:
-        """y of pieces at x, grid steps; ``here`` on a vertical one."""
+    def _height(self, line: I64, x: I64, fallback: I64) -> F64:
+        """y of pieces at x, grid steps; ``fallback`` on a vertical one."""
         p, q = self.points[self.pieces[line, 0]], self.points[self.pieces[line, 1]]
         run = q[:, 0] - p[:, 0]
         rise = (q[:, 1] - p[:, 1]) * (x - p[:, 0])
-        return np.where(run == 0, here, p[:, 1] + rise / np.maximum(run, 1))
+        return np.where(run == 0, fallback, p[:, 1] + rise / np.maximum(run, 1))
 
 
 def _by_first(label: NDArray[np.int32]) -> I64:

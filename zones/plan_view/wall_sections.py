@@ -295,10 +295,10 @@ class _Section(Pieces):
         rows = _Chain([r for r in chain.rows if r >= 0], chain.closed)
         return self._in_line(rows, rows, 0.0) is not None
 
-    def _in_line(self, one: _Chain, two: _Chain, least: float = IN_LINE) -> float | None:
+    def _in_line(self, one: _Chain, two: _Chain, min_cosine: float = IN_LINE) -> float | None:
         """Length of the chord from the end of one chain to the start of another, None where they are not one side.
 
-        least : cosine of the angle between the chord and either side that is allowed
+        min_cosine : cosine of the angle between the chord and either side that is allowed
         """
         if one.closed or two.closed or not one.rows or not two.rows:
             return None
@@ -308,7 +308,7 @@ class _Section(Pieces):
             return None
         u = (q - p) / far
         leave, enter = self._heading(one.rows[::-1]), self._heading(two.rows)
-        if min(float(leave @ u), float(enter @ u)) < least:
+        if min(float(leave @ u), float(enter @ u)) < min_cosine:
             return None
         return far if self._filled(p, q) else None
 

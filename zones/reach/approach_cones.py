@@ -201,10 +201,10 @@ def _upper(unit: F64) -> bool:
     return bool((unit[:, 2] > -ROUNDING).all())
 
 
-def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None) -> tuple[F64, float]:
+def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, contained: F64 | None) -> tuple[F64, float]:
     """Axis and half angle of the widest cone: the best of evenly spread axes, refined by halving steps.
 
-    held : (3,) an axis that the cone must contain, or None
+    contained : (3,) an axis that the cone must contain, or None
     """
     bad, upper = unit[~good], _upper(unit)
     if not len(bad) and not upper:
@@ -212,7 +212,9 @@ def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None
 
     def room(axes: F64) -> F64:
         out = free(axes)
-        return out if held is None else np.where(np.arccos(np.clip(axes @ held, -1.0, 1.0)) <= out, out, -math.inf)
+        if contained is None:
+            return out
+        return np.where(np.arccos(np.clip(axes @ contained, -1.0, 1.0)) <= out, out, -math.inf)
 
     def free(axes: F64) -> F64:
         out = np.full(len(axes), math.inf)
@@ -235,7 +237,7 @@ def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None
         else:
             step *= 0.5
     if width <= 0.0:  # no axis has room: take the axis to contain, or the direction farthest from failing ones
-        best, width = (held, 0.0) if held is not None else _first(unit[good], free(unit[good]))
+        best, width = (contained, 0.0) if contained is not None else _first(unit[good], free(unit[good]))
     return best, max(width, 0.0)
 
 

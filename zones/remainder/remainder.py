@@ -167,22 +167,22 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
             yield rows, {"kind": "other process", "slenderness": slender, **access}
 
 
-def _bought(few: SurfaceSamples, here: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
+def _bought(few: SurfaceSamples, turned: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
             requirement: ToolRequirement) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
-    """Samples of one group by the tool to buy, with that tool; ``here`` in the frame of the requirement.
+    """Samples of one group by the tool to buy, with that tool; ``turned`` in the frame of the requirement.
 
     Where a tool picked for several samples suffices for less than half of them, each gets its own cutter. The dict is
     empty where that cutter suffices for less than half as well.
     """
     for mine, cutter in _stoutest(few, why, rows):
-        need = requirement.named(cutter, here.subset(mine))
+        need = requirement.named(cutter, turned.subset(mine))
         own = _cutters(why, mine)
         if need or len(own) == 1:
             yield mine, need
             continue
         for cutter in own:
             of = mine[why.cutter[mine] == cutter]
-            yield of, requirement.named(cutter, here.subset(of))
+            yield of, requirement.named(cutter, turned.subset(of))
 
 
 def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[CuttingPart]:

@@ -317,7 +317,7 @@ def _joined(zones: list[ZoneArea], views: Sequence[View]) -> list[ZoneArea]:
     return out
 
 
-def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: AreaForm, got: float, least: float,
+def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: AreaForm, got: float, min_area: float,
              plane: float) -> dict[str, object]:
     tool, usable, by_cutter = sight.view.fields[tid].tool, sight.can[tid][left], sight.reach[tid].by_cutter[left]
     if not usable.any():
@@ -325,11 +325,11 @@ def _refusal(sight: Sight, left: NDArray[np.int64], tid: str, form: AreaForm, go
                 "limit": 0.0}
     if not (usable & by_cutter).any():
         return {"tool": tid, "reason": "too thick to touch it", "value": tool.diameter, "limit": 0.0}
-    if np.isfinite(plane) and got < least:
+    if np.isfinite(plane) and got < min_area:
         return {"tool": tid, "reason": "shank or holder meets the surroundings above it",
                 "value": round(tool.neck_length, 3), "limit": round(plane, 3)}
     return {"tool": tid, "reason": "adds less area than is worth a zone", "value": round(got, 3),
-            "limit": round(least, 3)}
+            "limit": round(min_area, 3)}
 
 
 def is_open(zone: ZoneArea, field: TipField, area: F64) -> bool:

@@ -204,7 +204,8 @@ def _flipped(net: Net, distances: _Distances) -> Net:
     return Net(net.nodes, net.uv, triangles, net.kept)
 
 
-def _gain(net: Net, corners: tuple[I64, ...], now: F64, flat: F64, distances: _Distances) -> tuple[F64, np.ndarray]:
+def _gain(net: Net, corners: tuple[I64, ...], distance: F64, flat: F64,
+          distances: _Distances) -> tuple[F64, np.ndarray]:
     """Gain of flips of side a b into c d, and whether each flip is allowed.
 
     A cap, three corners almost on a line, comes first: its normal has no meaning, and halving its long side only makes
@@ -215,8 +216,8 @@ def _gain(net: Net, corners: tuple[I64, ...], now: F64, flat: F64, distances: _D
     angles = [_angle(net.nodes, *k) for k in ((c, a, d), (a, d, c), (d, c, a), (d, b, c), (b, c, d), (c, d, b))]
     worst = np.max(angles, axis=0)
     cured = (flat > CAP) & (worst < CAP)
-    better = cured | ((other < FLIP_GAIN * now) & (worst < np.maximum(CAP, flat)))
-    return np.where(cured, flat, 0.0) + now - other, better
+    better = cured | ((other < FLIP_GAIN * distance) & (worst < np.maximum(CAP, flat)))
+    return np.where(cured, flat, 0.0) + distance - other, better
 
 
 def _angle(nodes: F64, a: I64, b: I64, c: I64) -> F64:
