@@ -68,7 +68,7 @@ class LevelPlaces:
         return {int(self.number[k]): self.plan.map.outline(self.plan.faces, int(k)) for k in cells.tolist()}
 
     def nearest(self, xy: F64, numbers: tuple[int, ...]) -> NDArray[np.int64]:
-        """(n,) int64, index of the nearest of some places. xy : (n, 2) float64, mm, in plan; numbers : their numbers."""
+        """(n,) int64, index of the nearest of the places ``numbers``. xy : (n, 2) float64, mm, in plan."""
         if numbers not in self.sides:
             rings = [shapely.get_parts(self.outlines[k].boundary) for k in numbers]
             owner = np.repeat(numbers, [len(own) for own in rings])
