@@ -121,9 +121,9 @@ def _worst(mesh: _WallMesh, ratio: float) -> Slender | None:
     behind = mesh.thickness(samples.points, samples.normals)
     thin = np.flatnonzero(behind * ratio < high)
     order = thin[np.argsort(behind[thin], kind="stable")]
-    asked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MAX_PLACES)).astype(int))]
+    picked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MAX_PLACES)).astype(int))]
     best: Slender | None = None
-    for k in asked.tolist():
+    for k in picked.tolist():
         found = _at(mesh, samples.points[k], samples.normals[k], int(samples.triangle[k]))
         if found is not None and found.ratio > max(ratio, 0.0 if best is None else best.ratio):
             best = Slender(wall.id, found.thickness, found.height, found.at)

@@ -92,11 +92,11 @@ class Sight:
         """
         labels = self.view.labels
         names, ground = np.unique([r.ground for r in labels.regions], return_inverse=True)
-        asked = np.flatnonzero(rows)
-        base = ground[labels.code[asked]]
+        selected = np.flatnonzero(rows)
+        base = ground[labels.code[selected]]
         out = []
         for k in np.unique(base):
-            mine = asked[base == k]
+            mine = selected[base == k]
             for form in AreaForm:
                 members = mine[self.form[mine] == form]
                 if len(members):

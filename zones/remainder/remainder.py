@@ -117,13 +117,13 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
     if not n:
         return []
     rng = np.random.default_rng(7)
-    asked = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
-    few = samples.subset(asked)
+    examined = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
+    few = samples.subset(examined)
     few = replace(few, area=few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-12)))
     requirements = [ToolRequirement(v, lift, clear or Clearances()) for v in views]
     why = _of_views(few, requirements, decomposition)
     if given_up is not None:
-        lost = given_up[asked]
+        lost = given_up[examined]
         why.left[lost & (why.reason == "pass")] = NO_PASS
         lost &= np.isin(why.reason, ("gap", "corner", "sharp corner"))
         blank = _Why.blank(len(few), 0)
@@ -131,7 +131,7 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
         why.take(blank, np.flatnonzero(lost))
     groups: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(few)):
-        groups.setdefault((labels.regions[labels.code[asked[row]]].base, *why.key(row)), []).append(row)
+        groups.setdefault((labels.regions[labels.code[examined[row]]].base, *why.key(row)), []).append(row)
     out = [_entry(few, why, rows, need) for members in groups.values()
            for rows, need in _needs(few, why, np.array(members), requirements)]
     return sorted(out, key=lambda r: (-r.area, r.reason, r.faces))

@@ -74,15 +74,15 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
             suffice, and gaps between edges and faces are not the cause, the whole solid is meshed again with a smaller
             chord: at most twice, as long as it helps and the mesh stays below half a million triangles.
     """
-    asked, before = chord, np.inf
-    limit = DEVIATION_ROOM * asked
+    requested, before = chord, np.inf
+    limit = DEVIATION_ROOM * requested
     shapes = faces_of(solid)
     for attempt in range(MAX_REMESH + 1):
         faces = triangulate(solid, chord, angle)
-        off = face_deviations(shapes, faces, asked)
+        off = face_deviations(shapes, faces, requested)
         if off.max(initial=0.0) > limit:
-            faces = mend_faces(solid, faces, np.flatnonzero(off > limit), asked, chord, angle)
-            off = face_deviations(shapes, faces, asked)
+            faces = mend_faces(solid, faces, np.flatnonzero(off > limit), requested, chord, angle)
+            off = face_deviations(shapes, faces, requested)
         deviation = float(off.max(initial=0.0))
         count = sum(len(f.triangles) for f in faces)
         if (not _curable(shapes, faces, off, limit) or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES
@@ -93,12 +93,12 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
         chord *= float(np.clip(0.9 * limit / deviation, 0.3, 0.8))
     mesh, uv, edge_nodes = _join(solid, faces)
     warnings = []
-    if deviation > DEVIATION_ROOM * asked:
+    if deviation > DEVIATION_ROOM * requested:
         warnings.append(f"the mesh deviates up to {deviation:.4g} mm from the exact surface; "
-                        f"the requested chord is {asked:g} mm")
+                        f"the requested chord is {requested:g} mm")
     open_edges = count_open_edges(mesh)
     if open_edges:
-        mesh, holes = fill_slivers(mesh, asked)
+        mesh, holes = fill_slivers(mesh, requested)
         uv = extend_parameters(mesh, uv, _projector(faces_of(solid)))
         open_edges = count_open_edges(mesh)
         if holes:
