@@ -15,7 +15,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
@@ -29,12 +29,12 @@ from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.plan_view.categories import Categories
 from zones.plan_view.channel_plan import ChannelPlan
-from zones.plan_view.regions import Regioner
+from zones.plan_view.regions import RegionLocator
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
 from zones.reach.approach_cones import directions_over_hemisphere
 from zones.reach.assembly import Clearances
-from zones.reach.index_orientations import DIRECTIONS, Gatherer, orientations
+from zones.reach.index_orientations import DIRECTIONS, AxisCoverage, orientations
 from zones.reach.tip_field import DiscHeights, TipField
 from zones.remainder.obstructions import AIR
 from zones.zoning.zone_patches import zone_patches
@@ -131,10 +131,10 @@ def load_blank(path: Path, setup: Setup) -> Part:
         raise of_blank(error) from None
 
 
-def placement_of(setup: Setup) -> Placement:
+def placement_of(setup: Setup) -> SetupFrame:
     """The setup frame in the coordinates of the file."""
     p = setup.placement
-    return Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
 
 
 def table_height(setup: Setup, blank: Blank) -> float:
@@ -254,11 +254,12 @@ def _further(setup: Setup, part: Part, blank: Blank, views: list[View], zoning: 
     samples = views[0].samples
     turn = views[0].rotation
     here = turned_samples(samples, turn.T)
-    gatherer = Gatherer(TriangleTree(obstacle_mesh(part, setup, table=table_height(setup, blank))), tool_bodies(setup),
-                        clearances(setup), setup.quality.scallop_height_mm, lift, setup.quality.stock_allowance_mm)
+    tree = TriangleTree(obstacle_mesh(part, setup, table=table_height(setup, blank)))
+    coverage = AxisCoverage(tree, tool_bodies(setup), clearances(setup), setup.quality.scallop_height_mm, lift,
+                            setup.quality.stock_allowance_mm)
     worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
     known = np.array([v.direction for v in views])
-    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands, machine.even, known,
+    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), coverage, machine.stands, machine.even, known,
                         worth)
     names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in setup.access})
     offset = setup.access[0].work_offset
@@ -307,10 +308,10 @@ def _view(setup: Setup, name: str, part: Part, blank: Blank, rotation: F64, firs
     standing = DiscHeights(obstacles)
     fields = {b.id: tip_field(setup, blank, rotation, standing, here.bounds, b) for b in tool_bodies(setup)}
     seen = turned_samples(samples, rotation @ first.T)
-    regioner = Regioner(here, decomposition, channels, first=is_first)
+    locator = RegionLocator(here, decomposition, channels, first=is_first)
     there = None if is_first else (samples.points, samples.normals)
-    labels = regioner.of(seen.points, seen.normals, seen.face, there)
-    return View(name, rotation, here, tree, obstacles, seen, labels, fields, regioner, first)
+    labels = locator.of(seen.points, seen.normals, seen.face, there)
+    return View(name, rotation, here, tree, obstacles, seen, labels, fields, locator, first)
 
 
 def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> SurfaceSamples:

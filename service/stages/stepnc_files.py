@@ -64,7 +64,7 @@ def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[To
     try:
         with ThreadPoolExecutor(1) as pool:
             begun = pool.submit(run_limited, [sys.executable, "-m", "service.stages.stepnc_process"], pickle.dumps(job),
-                                time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, what="stepnc", stop=stop)
+                                time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, name="stepnc", stop=stop)
             try:
                 yield wait
             finally:

@@ -28,7 +28,7 @@ from service.viewer.view_stock import stock_chunk
 from verify.checks.program_sequence import Reading, read_all
 from verify.model import NcProgram, Proof, ProofSetup
 from zones.reach.access_view import turned_samples
-from zones.remainder.remainder import Remainder
+from zones.remainder.remainder import RemainderEntry
 
 VIEW_NAME = "view.bin"
 VIEW_VERSION = 2
@@ -39,7 +39,7 @@ I64 = NDArray[np.int64]
 
 
 def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
-              stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+              stays: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
     """The view file of a planned job, as ``service.stages.result_files`` takes it.
 
@@ -54,7 +54,7 @@ def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32
 
 
 def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
-               stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+               stays: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
                report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
@@ -91,7 +91,7 @@ def _or_none(report: Mapping[str, Any], what: str, made: Callable[[], Files]) ->
         return {}
 
 
-def _entries(s: SurfaceSamples, stays: Sequence[Remainder], count: int) -> I64:
+def _entries(s: SurfaceSamples, stays: Sequence[RemainderEntry], count: int) -> I64:
     """(r,) which entry of the remainder, of ``count``, each sample that stays is of: that of the nearest one asked."""
     kept = [i.samples for i in stays if i.area >= REMAINDER_FLOOR_MM2]
     asked = [(k, i) for k, i in enumerate(kept[:count]) if i is not None and len(i)]

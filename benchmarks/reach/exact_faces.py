@@ -1,8 +1,7 @@
 """Exact normals and curvatures of the B-rep on demand.
 
 The mesh of a ``Part`` is within a chord of the surface, but its normals and curvatures are not those of the surface.
-``ExactFaces`` holds the kernel shape and answers for points near it. Use it inside a child process: the kernel is
-imported when the first instance is made.
+``ExactFaces`` holds the shape of the CAD kernel and evaluates points near it. The module imports the CAD kernel.
 """
 
 from __future__ import annotations
@@ -12,10 +11,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepLProp import BRepLProp_SLProps
+from OCP.gp import gp_Dir, gp_Pnt
+from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.errors import GeometryError
 from geometry.mesh import F64, I32
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
+from geometry.step_import.occ.curvature import RESOLUTION
+from geometry.step_import.occ.loading import load_solid
+from geometry.step_import.occ.topology import Shape, faces_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +56,10 @@ class ExactFaces:
     Raises what ``geometry.step_import.reader.read_part`` raises about the file and its solids.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, placement: Placement | None = None,
+    def __init__(self, path: str | os.PathLike[str], *, placement: SetupFrame | None = None,
                  solid: int | None = None) -> None:
-        from geometry.step_import.occ.loading import load_solid
-        from geometry.step_import.occ.topology import faces_of
-
         self._faces = faces_of(load_solid(Path(path), solid).body)
-        self._placement = placement or Placement()
+        self._placement = placement or SetupFrame()
 
     def __len__(self) -> int:
         return len(self._faces)
@@ -68,8 +73,6 @@ class ExactFaces:
         Returns SurfacePoints with n rows.
         Raises GeometryError (``no_such_face``) for a number out of range.
         """
-        from geometry.occ.projection import surface_points
-
         if not 1 <= face <= len(self._faces):
             raise GeometryError(f"face F{face} does not exist; the solid has {len(self._faces)} faces",
                                 code="no_such_face", subjects=(f"F{face}",), measured=face, limit=len(self._faces),
@@ -113,3 +116,42 @@ class ExactFaces:
             found = self.evaluate(int(number), np.asarray(points)[rows])
             normals[rows], curvature[rows] = found.normals, found.curvature
         return normals, curvature
+
+
+def surface_points(face: Shape, points: F64) -> tuple[F64, F64, F64, F64]:
+    """Nearest points of a face's surface and what it is there.
+
+    face   : kernel face
+    points : (n, 3) float64, mm, STEP coordinates
+
+    Returns foot points (n, 3), outward normals (n, 3), curvatures (n, 2) least and greatest (1/mm, positive where the
+    material is convex), principal directions (n, 2, 3) of the two; NaN where not defined.
+    """
+    projector = ShapeAnalysis_Surface(BRep_Tool.Surface_s(face))
+    surface = BRepAdaptor_Surface(face, True)
+    properties = BRepLProp_SLProps(surface, 2, RESOLUTION)
+    reversed_face = face.Orientation() == TopAbs_REVERSED
+    n = len(points)
+    foot, normals = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    curvature, directions = np.full((n, 2), np.nan), np.full((n, 2, 3), np.nan)
+    for row, point in enumerate(points.tolist()):
+        u, v = projector.ValueOfUV(gp_Pnt(*point), 1e-9).Coord()
+        properties.SetParameters(u, v)
+        foot[row] = properties.Value().Coord()
+        if properties.IsNormalDefined():
+            normals[row] = np.array(properties.Normal().Coord()) * (-1.0 if reversed_face else 1.0)
+        if properties.IsCurvatureDefined():
+            curvature[row], directions[row] = _principal(properties, reversed_face)
+    return foot, normals, curvature, directions
+
+
+def _principal(properties: BRepLProp_SLProps, reversed_face: bool) -> tuple[F64, F64]:
+    sign = 1.0 if reversed_face else -1.0
+    values = np.array([properties.MinCurvature(), properties.MaxCurvature()]) * sign
+    directions = np.full((2, 3), np.nan)
+    if not properties.IsUmbilic():
+        greatest, least = gp_Dir(), gp_Dir()
+        properties.CurvatureDirections(greatest, least)
+        directions = np.array([least.Coord(), greatest.Coord()])
+    order = np.argsort(values, kind="stable")
+    return values[order], directions[order]
