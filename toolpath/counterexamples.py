@@ -22,7 +22,7 @@ from toolpath.lines import dense
 CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much
 CAREFUL = 1.0  # of the radius round a place, in plan, within which a line is one that goes there
 BARRED = 0.3  # of the radius round a place: what of a line is left out
-LEAST_BARRED = 0.2  # mm
+MIN_BARRED = 0.2  # mm
 CROWDED = 0.75  # of the radius round a place: what of a line is skimmed first
 CLOSER = 0.7  # of its thickness that a wall counts as, each time it was found without support
 STRICTER = 0.5  # of what is aimed at, where more stayed than the plan had measured
@@ -56,7 +56,7 @@ class Counterexamples:
 
     def bars(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
         """(n,) bool: which of tips (n, 3), mm, are where the tool must not go."""
-        return _near(self.barred.get(tool.id), points, max(BARRED * tool.radius, LEAST_BARRED))
+        return _near(self.barred.get(tool.id), points, max(BARRED * tool.radius, MIN_BARRED))
 
     def crowds(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
         """(n,) bool: which of tips (n, 3), mm, are where too much of the tool was in stock."""

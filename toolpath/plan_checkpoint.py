@@ -15,21 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.stock.stock_map import StockNow
+from toolpath.stock.stock_map import StockSnapshot
 from toolpath.workingsteps import Workingstep
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
+class PackedLines:
     """Lines one behind the other: points (n, 3) float64, mm, and how many each has, (k,) int64."""
 
     points: F64
     counts: NDArray[np.int64]
 
     @classmethod
-    def of(cls, lines: Sequence[F64]) -> Ways:
+    def of(cls, lines: Sequence[F64]) -> PackedLines:
         """Lines (n, 3), mm, joined."""
         return cls(np.concatenate([np.zeros((0, 3)), *lines]), np.array([len(line) for line in lines], np.int64))
 
@@ -39,7 +39,7 @@ class Ways:
 
 
 @dataclass(frozen=True, eq=False)
-class FinishNow:
+class FinishSnapshot:
     """A ``Finish``: residual (n,) mm and met (n,) bool at its checks, and of its strategy all but the lines."""
 
     zone: str
@@ -57,7 +57,7 @@ class FinishNow:
 
 
 @dataclass(frozen=True, eq=False)
-class LayersNow:
+class LayersSnapshot:
     """The layers of a tool: how high stock stood when they were laid out, what they have come to, mm, and how many
     are left."""
 
@@ -68,30 +68,30 @@ class LayersNow:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolNow:
+class ToolSnapshot:
     """What a tool has walked and cut; its layers and the ids of their workingsteps; its zones that have been begun."""
 
-    walked: Ways
-    depths: Ways
-    layers: LayersNow | None
+    walked: PackedLines
+    depths: PackedLines
+    layers: LayersSnapshot | None
     layered: tuple[str, ...]
-    finishes: tuple[FinishNow, ...]
+    finishes: tuple[FinishSnapshot, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class PlanNow:
+class PlanSnapshot:
     """A plan after so many acts."""
 
     acts: int
     steps: tuple[Workingstep, ...]
-    stock: StockNow
-    tools: tuple[ToolNow, ...]
+    stock: StockSnapshot
+    tools: tuple[ToolSnapshot, ...]
 
 
-class Keeper:
+class CheckpointKeeper:
     """Who is told of a plan under way, and may know it from an attempt before; this one keeps nothing."""
 
-    def taken(self, use: Callable[[PlanNow], T]) -> T | None:
+    def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
         """What ``use`` makes of the plan that is kept; None where there is none, or one that it makes nothing of.
 
         ``use`` raises AttributeError, IndexError, KeyError, TypeError or ValueError then, and has changed nothing.
@@ -99,10 +99,10 @@ class Keeper:
         del use
         return None
 
-    def done(self, now: Callable[[], PlanNow]) -> None:
+    def done(self, now: Callable[[], PlanSnapshot]) -> None:
         """An act is over; ``now`` is asked where this is worth keeping."""
 
 
-NOTHING = Keeper()
+NOTHING = CheckpointKeeper()
 
-__all__ = ["NOTHING", "FinishNow", "Keeper", "LayersNow", "PlanNow", "StockNow", "ToolNow", "Ways"]
+__all__ = ["NOTHING", "FinishSnapshot", "CheckpointKeeper", "LayersSnapshot", "PlanSnapshot", "StockSnapshot", "ToolSnapshot", "PackedLines"]

@@ -14,7 +14,8 @@ from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.tool_deflection import LEAST_FEED, Bend, Bending, effective_diameter
+from toolpath.tool_deflection import MIN_FEED, DeflectionEstimate, DeflectionModel, effective_diameter
+from toolpath.workingsteps import CutDirection
 
 
 class Pattern(StrEnum):
@@ -43,8 +44,8 @@ class CutData:
     step_down: float
     engaged: float = math.pi
     finish: CutData | None = None
-    bending: Bending | None = None
-    bend: Bend | None = None
+    bending: DeflectionModel | None = None
+    bend: DeflectionEstimate | None = None
 
     def under(self, depth: float, width: float) -> CutData:
         """The same with the feed eased to where a cut of a depth and a width, mm, bends the tool no more than it may.
@@ -54,7 +55,7 @@ class CutData:
         if self.bending is None:
             return self
         bend = self.bending.under(self.feed, depth, width)
-        feed = max(LEAST_FEED, bend.share * self.feed)
+        feed = max(MIN_FEED, bend.share * self.feed)
         down = self.plunge_feed if self.bending.ways_fixed else min(self.plunge_feed, feed)
         return replace(self, feed=feed, plunge_feed=down, bend=bend)
 
@@ -71,7 +72,7 @@ class CutData:
 
 
 @dataclass(frozen=True)
-class Turning:
+class RotaryAxes:
     """What rotary axes can do, in the frame of an access.
 
     stands  : for which tool axes (n, 3), unit, they have a place, (n,) bool
@@ -88,7 +89,7 @@ class Turning:
 
 
 @dataclass(frozen=True)
-class Leaned:
+class ToolLean:
     """How far a nose is asked to lean off the normal of faces, rad: forwards along a pass, and to one side of it.
 
     walls : to one side on walls; None where it leans on others alone
@@ -106,7 +107,7 @@ class PlanSettings:
     lift            : distance along the normal within which a touch counts as reach
     clearance       : height of rapid moves across
     rapid_floor     : height down to which a rapid may go
-    either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
+    cut_direction   : CutDirection of passes along walls
     pattern         : of passes over shallow area
     turning         : what the rotary axes can do; None on a machine without
     leaned          : how far noses are asked to lean on faces; None where that is left to the plan
@@ -126,12 +127,11 @@ class PlanSettings:
     ramp_angle: float
     roughing: bool = True
     finishing: bool = True
-    climb: bool = True
-    either_way: bool = False
+    cut_direction: CutDirection = CutDirection.CLIMB
     pattern: Pattern = Pattern.AUTO
-    turning: Turning | None = None
+    turning: RotaryAxes | None = None
     found: Counterexamples = NONE
     rates: Rates = RATES
     planes: tuple[float, ...] = ()
     semi_finishing: bool = False
-    leaned: Leaned | None = None
+    leaned: ToolLean | None = None

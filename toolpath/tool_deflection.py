@@ -17,18 +17,18 @@ CARBIDE = 600e3
 """N/mm2, modulus of cemented carbide."""
 CORE = 0.8
 """Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
-LEAST_SHARE = 0.2
+MIN_SHARE = 0.2
 """A feed is not eased to less than this share of itself: below, edges rub and the tool wears for nothing."""
 LAYER_LIMIT = 0.05
 """mm, most that a tool may bend in layers, where half of what they leave is not less."""
 LEFT_SHARE, LEFT_STEPS = 0.1, 1.5
 """What layers leave for the finish: of the deepest layer, and of the lattice step; the greater."""
-LEAST_FEED = 0.1
+MIN_FEED = 0.1
 """mm/min."""
 
 
 @dataclass(frozen=True)
-class Bend:
+class DeflectionEstimate:
     """What a cut bends a tool by.
 
     full  : mm, at the feed of material and tool; limit : mm, that it may
@@ -44,7 +44,7 @@ class Bend:
 
 
 @dataclass(frozen=True)
-class Bending:
+class DeflectionModel:
     """A tool that cuts a material, as far as its bending goes.
 
     compliance : mm/N, of the tip
@@ -66,7 +66,7 @@ class Bending:
     fixed: bool = False
     ways_fixed: bool = False
 
-    def under(self, feed: float, depth: float, width: float) -> Bend:
+    def under(self, feed: float, depth: float, width: float) -> DeflectionEstimate:
         """What a cut of a depth and a width, mm, bends the tool by at a feed, mm/min, and how far that is eased."""
         tool = self.tool
         force = cutting_force(self.kc, self.mc, feed / (self.flutes * self.rpm), depth, width, tool, self.flutes)
@@ -75,8 +75,8 @@ class Bending:
         full = force * self.compliance
         share = 1.0
         if full > self.limit and not self.fixed:
-            share = max(LEAST_SHARE, (self.limit / full) ** (1.0 / (1.0 - self.mc)))
-        return Bend(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
+            share = max(MIN_SHARE, (self.limit / full) ** (1.0 / (1.0 - self.mc)))
+        return DeflectionEstimate(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
 
 
 def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
@@ -141,5 +141,5 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing)
 
 
-__all__ = ["CARBIDE", "CORE", "LAYER_LIMIT", "LEAST_FEED", "LEAST_SHARE", "Bend", "Bending", "compliance",
+__all__ = ["CARBIDE", "CORE", "LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel", "compliance",
            "cutting_force", "effective_diameter", "engaged_angle", "left_by_layers"]

@@ -15,10 +15,10 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates, move_seconds
 from geometry.tool_body import ToolBody
-from toolpath.tool_deflection import Bend
+from toolpath.tool_deflection import DeflectionEstimate
 
 
-class Motion(StrEnum):
+class TrajectoryKind(StrEnum):
     """What a trajectory is for; the STEP-NC trajectory types follow from it."""
 
     RAPID = "rapid"
@@ -28,8 +28,29 @@ class Motion(StrEnum):
     LIFT = "lift"
 
 
+class CutDirection(StrEnum):
+    """On which side of its way a tool has the material, seen from the spindle of a right-hand cutter."""
+
+    CLIMB = "climb"
+    """Material on the right."""
+    CONVENTIONAL = "conventional"
+    """Material on the left."""
+    EITHER = "either"
+    """Passes may go both ways; the first of them climbs."""
+
+    @property
+    def climbs(self) -> bool:
+        """Whether the first pass climbs."""
+        return self is not CutDirection.CONVENTIONAL
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether passes may go both ways."""
+        return self is CutDirection.EITHER
+
+
 @dataclass(frozen=True)
-class Arc:
+class ArcSpan:
     """A stretch of a trajectory on a circle as seen along Z; where Z changes it goes evenly with the angle, a helix.
 
     first, last : rows of the points it begins and ends at
@@ -55,11 +76,11 @@ class Trajectory:
              of an arc lie on it
     """
 
-    motion: Motion
+    motion: TrajectoryKind
     points: F64
     feed: float
     axes: F64 | None = None
-    arcs: tuple[Arc, ...] = ()
+    arcs: tuple[ArcSpan, ...] = ()
 
     @property
     def length(self) -> float:
@@ -77,7 +98,7 @@ def trajectory_seconds(trajectories: Sequence[Trajectory], rates: Rates) -> F64:
     if not trajectories:
         return np.zeros(0)
     count = [len(t.points) - 1 for t in trajectories]
-    rapid = np.repeat([t.motion is Motion.RAPID for t in trajectories], count)
+    rapid = np.repeat([t.motion is TrajectoryKind.RAPID for t in trajectories], count)
     feed = np.where(rapid, rates.rapid, np.repeat([t.feed for t in trajectories], count))
     stop = np.concatenate([[False], rapid[1:] != rapid[:-1]])
     way = np.concatenate([np.diff(t.points, axis=0) for t in trajectories])
@@ -100,7 +121,7 @@ class Workingstep:
     rates     : what the machine does, for times
     bend      : what its cuts bend the tool by, as estimated; None where nobody knows
     fresh     : the program asks for a fresh cutter before it
-    either_way: its passes may go in both directions; climb says that of the first
+    cut_direction : CutDirection of its passes
     """
 
     id: str
@@ -119,12 +140,11 @@ class Workingstep:
     outline: F64
     top: float
     bottom: float
-    climb: bool = True
+    cut_direction: CutDirection = CutDirection.CLIMB
     access: str = ""
     rates: Rates = RATES
-    bend: Bend | None = None
+    bend: DeflectionEstimate | None = None
     fresh: bool = False
-    either_way: bool = False
 
     @property
     def seconds(self) -> float:

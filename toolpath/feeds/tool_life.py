@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath.workingsteps import Motion, Trajectory, Workingstep, trajectory_seconds
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep, trajectory_seconds
 
 AT_PLANE = 1e-9  # mm
 AS_FAST = 1.0 + 1e-9
@@ -21,10 +21,10 @@ AS_FAST = 1.0 + 1e-9
 
 def minutes_in_cut(step: Workingstep) -> NDArray[np.float64]:
     """(k,) float64, min: what each trajectory of a step keeps the tool in cut at most."""
-    links = [t.feed for t in step.trajectories if t.motion not in (Motion.RAPID, Motion.CUT)]
+    links = [t.feed for t in step.trajectories if t.motion not in (TrajectoryKind.RAPID, TrajectoryKind.CUT)]
     air = max(links, default=0.0) / AS_FAST
     told = air > step.feed  # else nothing tells a link in air from one in stock
-    cuts = np.array([t.motion is Motion.CUT or t.motion is not Motion.RAPID and not (told and t.feed >= air)
+    cuts = np.array([t.motion is TrajectoryKind.CUT or t.motion is not TrajectoryKind.RAPID and not (told and t.feed >= air)
                      for t in step.trajectories])
     return np.asarray(np.where(cuts, trajectory_seconds(step.trajectories, step.rates), 0.0) / 60.0)
 
@@ -74,7 +74,7 @@ def _runs(step: Workingstep, clearance: float) -> list[tuple[int, int]]:
     """Trajectories from one place where the tool is up to the next, as first and end; only those with a cut."""
     at = [0, *(k for k in range(1, len(step.trajectories)) if _is_up(step.trajectories, k, clearance)),
           len(step.trajectories)]
-    cut = [any(t.motion is Motion.CUT for t in step.trajectories[a:b]) for a, b in zip(at[:-1], at[1:], strict=True)]
+    cut = [any(t.motion is TrajectoryKind.CUT for t in step.trajectories[a:b]) for a, b in zip(at[:-1], at[1:], strict=True)]
     ends = [b for b, c in zip(at[1:], cut, strict=True) if c]
     starts = [0, *ends[:-1]]
     return list(zip(starts, [*starts[1:], len(step.trajectories)], strict=True))
@@ -103,7 +103,7 @@ def _parted(step: Workingstep, parts: Sequence[int], fresh: bool, clearance: flo
 
 def _is_across(trajectory: Trajectory, clearance: float) -> bool:
     """Whether a trajectory is a rapid at the clearance plane."""
-    return trajectory.motion is Motion.RAPID and bool((trajectory.points[:, 2] >= clearance - AT_PLANE).all())
+    return trajectory.motion is TrajectoryKind.RAPID and bool((trajectory.points[:, 2] >= clearance - AT_PLANE).all())
 
 
 def _letters(n: int) -> str:

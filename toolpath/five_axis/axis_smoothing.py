@@ -34,7 +34,7 @@ from geometry.tool_body import ToolBody
 from toolpath.five_axis.oriented_pass import wanted_axes
 from toolpath.lines import true_runs
 from toolpath.passes.cutter_locations import sides, tips
-from toolpath.passes.forward_step import Profile
+from toolpath.passes.forward_step import PassProfile
 from toolpath.poses import Axes, Blocked, angles_between
 
 SPACING = 0.5  # mm between stations, at most
@@ -53,7 +53,7 @@ Met = Callable[[NDArray[np.int64], F64], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
-class Limits:
+class AxisLimits:
     """What axes along a pass keep to.
 
     cone   : rad, the most an axis may be off the one wanted
@@ -101,7 +101,7 @@ class Steered:
         return cKDTree(self.contact)
 
 
-def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: Limits,
+def steered(profile: PassProfile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: AxisLimits,
             before: Steered | None = None, off: float = 0.0) -> Steered:
     """The axes of a pass.
 
@@ -181,7 +181,7 @@ def _spread(goal: F64, weight: F64, step: float, spread: float) -> F64:
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 
-def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.bool_], met: Met, limits: Limits,
+def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.bool_], met: Met, limits: AxisLimits,
            step: float, spread: float) -> tuple[F64, NDArray[np.bool_]]:
     """Axes led round what is in the way, and where even so the tool is blocked."""
     reach = int(np.ceil(limits.cone / limits.per_mm / step)) + 1  # so many stations it takes to get round

@@ -33,7 +33,7 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.lines import true_runs
 from toolpath.passes.isoparametric_passes import Laid
 from toolpath.poses import Blocked
@@ -53,15 +53,15 @@ LOOKED, ROWS = 193, 25  # places at which what is swept is measured, along and u
 CORRECTIONS = 5
 AIMED = 0.5  # of the depth allowed: what a correction leaves
 FAR_OFF = 8.0  # times what may be left: deeper than that no standing off will mend
-MOST_BANDS = 4
+MAX_BANDS = 4
 LEFT_SHARE = 0.95  # of a band must keep to what may be left
 ENDS = 1e-3  # of the length: what the way on beyond an end is taken from
-DENSE, MOST_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
+DENSE, MAX_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
 FINER_POSES = 4  # trials, each with more poses
 
 
 @dataclass(frozen=True)
-class Wanted:
+class FlankTolerances:
     """What is asked of flank passes, mm: what may be left, how deep they may be, and what thinning out may add."""
 
     left: float
@@ -70,7 +70,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Wall:
+class FlankWall:
     """A wall over the unit square.
 
     iso : faces laid over it, passes along xi
@@ -157,7 +157,7 @@ class Band:
     left, deep : mm, the most that stays on 95 % of the band, and the most the wall is cut into
     """
 
-    wall: Wall
+    wall: FlankWall
     tool: ToolBody
     allowance: float
     low: float
@@ -187,7 +187,7 @@ class Band:
         chord   : mm, what leaving out poses may move tip and upper end of the flank by
         served  : (m,) where along the wall the pass is wanted, evenly from end to end; None: everywhere
         """
-        spacing, high = min(DENSE * self.tool.radius, MOST_DENSE), self.tool.flute_length
+        spacing, high = min(DENSE * self.tool.radius, MAX_DENSE), self.tool.flute_length
         count = int(np.ceil(max(self.wall.length / spacing, 2.0))) + 1
         for _ in range(FINER_POSES):
             tip, axis = self.poses(count)
@@ -205,13 +205,13 @@ class Band:
         gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
         out = []
         for i, j in true_runs(~met):
-            if gone[j - 1] - gone[i] >= LEAST_PIECE * self.tool.radius:
+            if gone[j - 1] - gone[i] >= MIN_PIECE * self.tool.radius:
                 rows = i + thinned_poses(tip[i:j], axis[i:j], height + self.tool.corner_radius, chord)
                 out.append(Piece(tip[rows], axis[rows], away[rows], height + self.tool.corner_radius))
         return out
 
 
-def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: float = 1.0,
+def bands(wall: FlankWall, tool: ToolBody, wanted: FlankTolerances, low: float = 0.0, high: float = 1.0,
           allowance: float = 0.0) -> list[Band]:
     """The passes of the flank over a wall, from the highest down: as few bands as leave little enough.
 
@@ -221,7 +221,7 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
     Raises
     ------
     GeometryError
-        Code 'bad_pass': not even ``MOST_BANDS`` do, or the flutes are too short for the bands.
+        Code 'bad_pass': not even ``MAX_BANDS`` do, or the flutes are too short for the bands.
     """
     room = tool.flute_length - tool.corner_radius
     if room <= 0.0 or wall.length <= 0.0:
@@ -230,7 +230,7 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
                             remedy="machine it in levels")
     least = int(np.ceil((high - low) * wall.height / room))
     told, xi = np.inf, np.linspace(0.0, 1.0, STATIONS)
-    for count in range(max(least, 1), MOST_BANDS + 1):
+    for count in range(max(least, 1), MAX_BANDS + 1):
         borders = np.linspace(low, high, count + 1)
         made: list[Band] = []
         for a, b in zip(borders[:-1], borders[1:], strict=True):
@@ -241,14 +241,14 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
         else:
             return made[::-1]
         told = max(made[-1].left, made[-1].deep)
-    raise GeometryError(f"{tool.id}: its flank misses the wall by {told:.4f} mm in {MOST_BANDS} bands; allowed is "
+    raise GeometryError(f"{tool.id}: its flank misses the wall by {told:.4f} mm in {MAX_BANDS} bands; allowed is "
                         f"{wanted.left:.4f} mm" if np.isfinite(told) else
-                        f"{tool.id}: a wall {wall.height:.1f} mm high takes more than {MOST_BANDS} bands of its flutes",
+                        f"{tool.id}: a wall {wall.height:.1f} mm high takes more than {MAX_BANDS} bands of its flutes",
                         code="bad_pass", subjects=(tool.id,), measured=told, limit=wanted.left,
                         remedy="machine it in levels")
 
 
-def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], stands: F64 | float) -> tuple[F64, F64]:
+def axis_ends(wall: FlankWall, xi: F64, shift: F64, borders: tuple[float, float], stands: F64 | float) -> tuple[F64, F64]:
     """Where the tool's axis passes a band's lower and upper border, (n, 3) mm each; stands : mm off the wall."""
     ends = []
     for at, eta in zip((xi, xi + shift), borders, strict=True):
@@ -257,7 +257,7 @@ def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], sta
     return ends[0], ends[1]
 
 
-def _fitted(band: Band, wanted: Wanted) -> Band:
+def _fitted(band: Band, wanted: FlankTolerances) -> Band:
     """A band with its shift, standing off as far as what it sweeps wants."""
     wall, tool, low, high = band.wall, band.tool, band.low, band.high
     band = replace(band, shift=_paired(wall, band.xi, (low, high), tool.radius, wanted.left))
@@ -278,7 +278,7 @@ def _fitted(band: Band, wanted: Wanted) -> Band:
     return band
 
 
-def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
+def _paired(wall: FlankWall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
     """(n,) what is added to xi at the upper border, so that the axis misses the wall least.
 
     Where many miss as little, as on a plane, the steepest is taken.
@@ -306,7 +306,7 @@ def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, le
     return np.clip(_evened(shift), -xi - beyond, 1.0 - xi + beyond)
 
 
-def _steepest(wall: Wall, xi: F64, borders: tuple[float, float]) -> F64:
+def _steepest(wall: FlankWall, xi: F64, borders: tuple[float, float]) -> F64:
     """(n, 3) unit: the steepest way up the wall, half way between the borders."""
     normal = wall.contact(xi, np.full(len(xi), 0.5 * (borders[0] + borders[1])))[1]
     up = np.array([0.0, 0.0, 1.0]) - normal[:, 2:] * normal
@@ -328,7 +328,7 @@ def _evened(shift: F64) -> F64:
     return np.asarray(solveh_banded(bands_of, shift))
 
 
-def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> tuple[F64, F64]:
+def _missed(wall: FlankWall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> tuple[F64, F64]:
     """(n,) mm: between how far the axis stands off the wall at the nearest and at the farthest of its places; and the
     axis, (n, 3), unit."""
     begin, end = axis_ends(wall, xi, shift, borders, radius)

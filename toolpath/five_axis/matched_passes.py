@@ -20,27 +20,27 @@ from scipy.interpolate import PchipInterpolator
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
+from toolpath.five_axis.tilted_end import Nose, PassContacts, strip_edges
 from toolpath.passes.cutter_locations import tips
 from toolpath.passes.isoparametric_passes import IsoSurface
 
 STATIONS = 33  # along a pass from border to border, at which tilts are looked for; as close beyond
 SPARSE = 2  # stations on, at which turns are looked for
-FIRST_STEP, LEAST_STEP = 0.05, 1e-4  # of the unit square, between passes
-MOST_PASSES = 400
+FIRST_STEP, MIN_STEP = 0.05, 1e-4  # of the unit square, between passes
+MAX_PASSES = 400
 SOLVED = 5e-3  # of the step between passes: as near the edges of neighbours are brought
 TRIALS = 14
 TURNS = np.radians(np.arange(-20.0, 21.0, 5.0))
 TURN_COST = 0.5  # of the radius, in width of the strip, by rad of turning from one station to the next
 EVEN = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0  # by which turns of neighbours are meant
-MOST_RUN_OUT = 0.2  # of the unit square
+MAX_RUN_OUT = 0.2  # of the unit square
 SPARE_RUN_OUT = 1.15  # of what the edges of a strip lag behind
 MARGIN = 0.02  # of the domain: so much farther than passes run out the surface is carried on
 FINEST = 12  # halvings of the way between two stations
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MatchTolerances:
     """What is asked of passes, mm and rad.
 
     scallop    : may stay standing between passes
@@ -56,7 +56,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class MatchedStrip:
     """A pass and what it cuts.
 
     eta        : where it lies;  xi (m,) its stations, the first and last of them beyond the border
@@ -79,7 +79,7 @@ class Strip:
 
 
 @dataclass(frozen=True, eq=False)
-class Matched:
+class MatchedPasses:
     """Passes of an end over a surface.
 
     iso     : the surface over the unit square, passes along xi
@@ -89,11 +89,11 @@ class Matched:
 
     iso: IsoSurface
     tool: ToolBody
-    wanted: Wanted
+    wanted: MatchTolerances
     run_out: float
 
     @classmethod
-    def over(cls, iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Matched:
+    def over(cls, iso: IsoSurface, tool: ToolBody, wanted: MatchTolerances) -> MatchedPasses:
         """Passes over a surface, which is carried on beyond its border for them.
 
         Raises
@@ -104,9 +104,9 @@ class Matched:
         xi = np.linspace(0.0, 1.0, STATIONS)
         length = min(float(np.linalg.norm(np.diff(iso.contact(xi, np.full(STATIONS, eta))[0], axis=0), axis=1).sum())
                      for eta in (0.0, 0.5, 1.0))
-        run_out = min(longest_lag(tool) / length, MOST_RUN_OUT)
+        run_out = min(longest_lag(tool) / length, MAX_RUN_OUT)
         first = cls(replace(iso, surface=iso.surface.extended(run_out + MARGIN)), tool, wanted, run_out)
-        farthest = min(SPARE_RUN_OUT * max(first.lag(eta) for eta in (0.0, 0.5, 1.0)), MOST_RUN_OUT)
+        farthest = min(SPARE_RUN_OUT * max(first.lag(eta) for eta in (0.0, 0.5, 1.0)), MAX_RUN_OUT)
         if farthest <= run_out:
             return first
         return cls(replace(iso, surface=iso.surface.extended(farthest + MARGIN)), tool, wanted, farthest)
@@ -144,13 +144,13 @@ class Matched:
         beyond = np.abs(self.stations - 0.5) - 0.5
         return np.asarray(beyond < np.ptp(self.stations) / (len(self.stations) - 1))
 
-    def contacts(self, xi: F64, eta: float) -> Contacts:
+    def contacts(self, xi: F64, eta: float) -> PassContacts:
         """Contacts of the pass at eta."""
         level = np.full(len(xi), eta)
         along = self.iso.tangents(np.clip(xi, 0.0, 1.0), np.clip(level, 0.0, 1.0))[0]
-        return Contacts.on(self.iso.surface, self.iso.parameters(xi, level), along)
+        return PassContacts.on(self.iso.surface, self.iso.parameters(xi, level), along)
 
-    def strip(self, eta: float, turn: F64) -> Strip:
+    def strip(self, eta: float, turn: F64) -> MatchedStrip:
         """The pass at eta; turn : (m,) rad, of the tilt at the stations, out of the feed to its left.
 
         Raises
@@ -178,27 +178,27 @@ class Matched:
             ends[0] = min(ends[0], float(xi[np.maximum(x, ahead) <= 0.0].max(initial=xi[0])))
             ends[1] = max(ends[1], float(xi[x >= 1.0].min(initial=xi[-1])))
         sides = sides if sides[0].sum() > sides[1].sum() else sides[::-1]
-        return Strip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta),
+        return MatchedStrip(eta, xi, tilt, turn, np.minimum(sides[1], eta), np.maximum(sides[0], eta),
                      (ends[0], ends[1]))
 
-    def lay_out(self) -> list[Strip]:
+    def lay_out(self) -> list[MatchedStrip]:
         """Passes from one border to the other, as few as the scallop allows.
 
         Raises
         ------
         GeometryError
-            Code 'bad_pass': they would be more than MOST_PASSES; as ``strip``.
+            Code 'bad_pass': they would be more than MAX_PASSES; as ``strip``.
         """
-        out: list[Strip] = []
+        out: list[MatchedStrip] = []
         edge, step = np.zeros(len(self.stations)), FIRST_STEP
         while edge[self.counted].min() < 1.0 and (not out or out[-1].eta < 1.0):
-            if len(out) == MOST_PASSES:
-                raise GeometryError(f"{self.tool.id}: {MOST_PASSES} passes of its end get to {out[-1].eta:.2f} of the "
+            if len(out) == MAX_PASSES:
+                raise GeometryError(f"{self.tool.id}: {MAX_PASSES} passes of its end get to {out[-1].eta:.2f} of the "
                                     "surface only", code="bad_pass", subjects=(self.tool.id,), measured=out[-1].eta,
                                     limit=1.0, remedy="take a ball, or allow a higher scallop")
             begin = out[-1].eta if out else 0.0
             out.append(self._next(edge, begin, step))
-            edge, step = out[-1].high, max(out[-1].eta - begin, LEAST_STEP)
+            edge, step = out[-1].high, max(out[-1].eta - begin, MIN_STEP)
         return out
 
     def widest_turns(self, eta: float) -> F64:
@@ -230,13 +230,13 @@ class Matched:
         turns = np.interp(self.stations, self.stations[::SPARSE], TURNS[out[::-1]])
         return np.convolve(np.pad(turns, len(EVEN) // 2, mode="edge"), EVEN, "valid")
 
-    def _next(self, edge: F64, begin: float, step: float) -> Strip:
+    def _next(self, edge: F64, begin: float, step: float) -> MatchedStrip:
         """The farthest pass beyond ``begin`` whose strip still reaches ``edge`` all along, to SOLVED of the step."""
-        def miss(s: Strip) -> float:
+        def miss(s: MatchedStrip) -> float:
             return float(np.where((edge < 1.0) & self.counted, s.low - edge, -np.inf).max())
 
         turn = self.widest_turns(min(begin + step, 1.0))
-        kept = self.strip(min(begin + LEAST_STEP, 1.0), turn)
+        kept = self.strip(min(begin + MIN_STEP, 1.0), turn)
         under, over = miss(kept), None
         if under > 0.0:  # a strip narrower than the least step: what is left beside it is for others
             return kept
@@ -256,17 +256,17 @@ class Matched:
                 trial = kept.eta + (upper - kept.eta) * float(np.clip(under / (under - over), 0.05, 0.95))
         return kept
 
-    def stands(self, at: Contacts, tilt: F64, turn: F64) -> tuple[F64, F64]:
+    def stands(self, at: PassContacts, tilt: F64, turn: F64) -> tuple[F64, F64]:
         """Tips (k, 3) mm and axes (k, 3) at contacts, for tilts and turns (k,) rad."""
         axis = self.nose.axes(at, tilt, turn)
         return tips(at.point, at.normal, self.tool, axis), axis
 
-    def poses(self, s: Strip, xi: F64) -> tuple[F64, F64, F64]:
+    def poses(self, s: MatchedStrip, xi: F64) -> tuple[F64, F64, F64]:
         """Tips (k, 3) mm, axes and normals (k, 3) of a pass at xi (k,)."""
         at = self.contacts(xi, s.eta)
         return *self.stands(at, *s.leans(xi)), at.normal
 
-    def located(self, s: Strip) -> tuple[F64, F64]:
+    def located(self, s: MatchedStrip) -> tuple[F64, F64]:
         """Tips (k, 3) mm and axes (k, 3) of a pass, where ``ways`` has it.
 
         Raises
@@ -276,7 +276,7 @@ class Matched:
         """
         return self.poses(s, self.ways(s))[:2]
 
-    def ways(self, s: Strip) -> F64:
+    def ways(self, s: MatchedStrip) -> F64:
         """Places xi (k,) of a pass so close that moves between them add no more than the chord.
 
         A move takes the tip straight and turns the axis on the great circle. Half way, what that moves the contact

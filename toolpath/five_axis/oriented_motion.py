@@ -18,24 +18,24 @@ from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.lines import dense, true_runs
 from toolpath.linking.lead_arcs import arc_onto, radii
-from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.poses import Blocked, places_along
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.stock.tool_shell import shells
 from toolpath.stock.wall_skin import Skins
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.assembly import Clearances, Disc
 
 TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
 LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most
-MOST_LEAD = 1.5  # mm
+MAX_LEAD = 1.5  # mm
 THICK = 0.12  # of the diameter: what a leaning tool may take off at once
 LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
-LEAST_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
-LEAST_WAY = 1e-3  # mm, across the axis, that says where a pass comes from
+MIN_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
+MIN_WAY = 1e-3  # mm, across the axis, that says where a pass comes from
 SQUARE = 0.7  # of a way off the wall, square to the pass: where it is less the pass does not go along the wall
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
@@ -43,13 +43,13 @@ ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than
 STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
 DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
 SKIMMED = 0.75  # of the skin, under what goes down steeper than that all the same: it adds up along a way
-LAYER, MOST_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
+LAYER, MAX_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
 WIDENED = 1.5  # of the radius: what a layer of a pass is long, at least, where it goes on before and behind
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
 LOADED = "there is more stock in its way than a leaning tool may take off"
 STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
-LEAST_FEED = 0.1  # mm/min
-LEAST_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
+MIN_FEED = 0.1  # mm/min
+MIN_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Surroundings:
     """
 
     enters: Blocked
-    turning: Turning
+    turning: RotaryAxes
     stock: StockMap
     discs: tuple[Disc, ...]
     clear: Clearances
@@ -74,7 +74,7 @@ class Surroundings:
     def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
         """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
         low = lowest(tips, axes, tool, self.discs, self.turning.up)
-        lies = np.minimum(axes @ self.turning.up, axes[:, 2]) < LEAST_UP
+        lies = np.minimum(axes @ self.turning.up, axes[:, 2]) < MIN_UP
         return self.enters(tips, axes) | lies | ~self.turning.stands(axes) | (low < self.turning.table)
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
@@ -157,7 +157,7 @@ def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings, 
             continue
         runs.append(made)
         for t in made:
-            if t.motion is Motion.CUT and t.axes is not None:
+            if t.motion is TrajectoryKind.CUT and t.axes is not None:
                 around.cut(t.points, t.axes, tool)
     return runs, refused
 
@@ -202,7 +202,7 @@ def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
     """A pass on the end of a tool, preceded by itself raised, layer by layer from the highest down, where more stands
     over it than the end takes off at once.
 
-    Where not even ``MOST_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
+    Where not even ``MAX_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
     What a pose is free of, part and fixtures, it stays free of when raised along its axis.
     """
     return [layer for _, layer in layers_over(piece, tool, around)]
@@ -220,7 +220,7 @@ def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
     layer = share * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
     dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     need, todo = np.zeros(len(dense.tips), np.int64), np.arange(len(dense.tips))
-    for k in range(MOST_LAYERS + 1):
+    for k in range(MAX_LAYERS + 1):
         there = dense.raised(k * layer)
         todo = todo[around.met(there.tips[todo], there.axes[todo], tool, thick, under)]
         need[todo] = k + 1
@@ -237,7 +237,7 @@ def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
         more = max(WIDENED * tool.radius - (high - low), 0.0) if widened else 0.0
         # to begin again in the middle of it costs more than to go on
         through = free & (gone >= low - more) & (gone <= high + more)
-        out += [(k, part.raised(k * layer)) for part in dense.parts(through, at, LEAST_PIECE * tool.radius)]
+        out += [(k, part.raised(k * layer)) for part in dense.parts(through, at, MIN_PIECE * tool.radius)]
     return [*out, (0, piece)]
 
 
@@ -252,7 +252,7 @@ def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Sur
     skims : a pass on the end goes downhill where no more than most of a skin is under it, as an upright one does: axes
             that turn less than the surface go down on one side of each wave of it
     """
-    thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
+    thick, least = THICK * tool.diameter, MIN_PIECE * tool.radius
 
     def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
         return around.met(tips, axes, tool, thick) | settings.found.bars(tool, tips)
@@ -330,19 +330,19 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     last = last[::-1]
     out: list[Trajectory] = []
 
-    def go(motion: Motion, points: F64, feed: float, axis: F64) -> None:
+    def go(motion: TrajectoryKind, points: F64, feed: float, axis: F64) -> None:
         if float(np.linalg.norm(points[-1] - points[0])) > 1e-6:
             out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
 
     a, b = axes[0], axes[-1]
-    go(Motion.APPROACH, np.array([top, first[0] + near * a]), cut.link_feed, a)
-    go(Motion.APPROACH, np.array([first[0] + near * a, first[0]]), cut.plunge_feed, a)
-    go(Motion.CONNECT, first, cut.feed, a)
+    go(TrajectoryKind.APPROACH, np.array([top, first[0] + near * a]), cut.link_feed, a)
+    go(TrajectoryKind.APPROACH, np.array([first[0] + near * a, first[0]]), cut.plunge_feed, a)
+    go(TrajectoryKind.CONNECT, first, cut.feed, a)
     for i, j in _steady(feeds):
-        out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
-    go(Motion.CONNECT, last, cut.feed, b)
-    go(Motion.LIFT, np.array([last[-1], last[-1] + off * b]), cut.feed, b)
-    go(Motion.LIFT, np.array([last[-1] + off * b, out_top]), cut.link_feed, b)
+        out.append(Trajectory(TrajectoryKind.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
+    go(TrajectoryKind.CONNECT, last, cut.feed, b)
+    go(TrajectoryKind.LIFT, np.array([last[-1], last[-1] + off * b]), cut.feed, b)
+    go(TrajectoryKind.LIFT, np.array([last[-1] + off * b, out_top]), cut.link_feed, b)
     return tuple(out)
 
 
@@ -353,18 +353,18 @@ def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | 
     reach      : mm from the tip, how far up the flank is at work
     least      : (n - 1,) minutes each block takes the machine
 
-    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake, or in a block slower than
-    ``LEAST_FEED``: a tip that all but stands says nothing of how long an axis takes to turn. On a straight move of the
+    None where the tip would go slower than ``MIN_PACE`` of the feed for the flank's sake, or in a block slower than
+    ``MIN_FEED``: a tip that all but stands says nothing of how long an axis takes to turn. On a straight move of the
     tip with an evenly turning axis no place between tip and ``reach`` goes farther than the farther of both ends.
     """
     gone = [np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)]
     minutes = np.maximum(gone[0], gone[1]) / feed
-    if gone[0].sum() < LEAST_PACE * feed * minutes.sum():
+    if gone[0].sum() < MIN_PACE * feed * minutes.sum():
         return None
     minutes = np.maximum(minutes, least)
-    if (gone[0] < LEAST_FEED * minutes).any():
+    if (gone[0] < MIN_FEED * minutes).any():
         return None
-    return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), LEAST_FEED)
+    return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), MIN_FEED)
 
 
 def _steady(feeds: F64) -> list[tuple[int, int]]:
@@ -396,7 +396,7 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         if high <= 0.0:
             return None
         down = beside + np.linspace(high, 0.0, int(np.ceil(high / (LOOK * tool.radius))) + 5)[:, None] * axis
-        over = dense(way, min(LOOK * tool.radius, MOST_LEAD / 4.0))
+        over = dense(way, min(LOOK * tool.radius, MAX_LEAD / 4.0))
         axes = np.tile(axis, (max(len(down), len(over)), 1))
         if (around.blocked(down, axes[:len(down)], tool).any() or around.blocked(over, axes[:len(over)], tool).any()
                 or len(way) > 2 and (around.met(over, axes[:len(over)], tool, thick)
@@ -422,7 +422,7 @@ def _near(down: F64, axes: F64, tool: ToolBody, around: Surroundings) -> float:
 
 def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lead]:
     """Where the tool may come down at the beginning of a piece, the best first."""
-    room, skin, axis, tip = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0], piece.tips[0]
+    room, skin, axis, tip = min(LEAD * tool.radius, MAX_LEAD), SKIN * tool.diameter, piece.axes[0], piece.tips[0]
 
     def straight(aside: F64) -> F64:
         return np.array([tip + aside, tip])
@@ -442,7 +442,7 @@ def _ahead(piece: Piece) -> F64 | None:
     axis, way = piece.axes[0], piece.tips[1:] - piece.tips[0]
     way = way - (way @ axis)[:, None] * axis
     size = np.linalg.norm(way, axis=1)
-    far = np.flatnonzero(size > LEAST_WAY)
+    far = np.flatnonzero(size > MIN_WAY)
     return way[far[0]] / size[far[0]] if len(far) else None
 
 
@@ -459,4 +459,4 @@ def _arcs_onto(piece: Piece, tool: ToolBody, aside: F64, chord: float) -> list[F
         return []
     length = float(np.linalg.norm(np.diff(piece.tips, axis=0), axis=1).sum())
     off /= np.linalg.norm(off)
-    return [arc_onto(piece.tips[0], ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MOST_LEAD]
+    return [arc_onto(piece.tips[0], ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MAX_LEAD]

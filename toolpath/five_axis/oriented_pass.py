@@ -24,7 +24,7 @@ from geometry.mesh_queries.tilted_collision import axis_frames, blocked_along
 from geometry.tool_body import ToolBody
 from toolpath.lines import true_runs
 from toolpath.passes.cutter_locations import LOOK, OFFS, chorded, contacts, sides, tips
-from toolpath.passes.forward_step import Profile
+from toolpath.passes.forward_step import PassProfile
 from toolpath.poses import Axes, Blocked, angles_between
 from zones.reach.approach_cones import assembly
 from zones.reach.assembly import Clearances
@@ -32,7 +32,7 @@ from zones.reach.tip_field import LEVEL_TOLERANCE
 
 SWING_SHARE = 0.1  # of the chordal tolerance: what turning between two locations may add
 ROUNDS = 16  # of halving ways between which the axis turns too much
-MOST_PARTS = 1000  # a step is divided into at most so many
+MAX_PARTS = 1000  # a step is divided into at most so many
 FADES = 0.2  # of a normal across Z: where it is less a leaning tool leans less
 
 """Tool axes (k, 3), unit, at contacts (k, 3) mm with normals and ways along the pass (k, 3), both unit."""
@@ -90,7 +90,7 @@ def enters(tree: TriangleTree, tool: ToolBody, clear: Clearances, allowance: flo
     return blocked
 
 
-def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Blocked, tolerance: float,
+def posed(profile: PassProfile, ends: F64, tool: ToolBody, axes: Axes, blocked: Blocked, tolerance: float,
           off: float = 0.0) -> Posed:
     """The locations of a pass, as far as the tool is free.
 
@@ -139,14 +139,14 @@ def posed(profile: Profile, ends: F64, tool: ToolBody, axes: Axes, blocked: Bloc
     return Posed(tuple(pieces), tuple(left))
 
 
-def _located(profile: Profile, way: F64, tool: ToolBody, axes: Axes) -> tuple[F64, F64, F64]:
+def _located(profile: PassProfile, way: F64, tool: ToolBody, axes: Axes) -> tuple[F64, F64, F64]:
     """Normals, tool axes and tips (k, 3) at ways (k,) mm."""
     contact, normal, axis = wanted_axes(profile, way, axes)
     side = sides(profile, way, axis) if tool.radius > tool.corner_radius else None
     return normal, axis, tips(contact, normal, tool, axis, side)
 
 
-def wanted_axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
+def wanted_axes(profile: PassProfile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
     """Contacts, normals and tool axes (k, 3) of a field at ways (k,) mm of a pass.
 
     Raises
@@ -169,7 +169,7 @@ def wanted_axes(profile: Profile, way: F64, axes: Axes) -> tuple[F64, F64, F64]:
     return contact, normal, axis
 
 
-def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first: F64 | None = None) -> F64:
+def _turned_through(profile: PassProfile, looks: F64, axes: Axes, room: float, first: F64 | None = None) -> F64:
     """Ways with others between them until the axis turns by no more than ``room`` (rad) from one to the next, but where
     it jumps.
 
@@ -179,7 +179,7 @@ def _turned_through(profile: Profile, looks: F64, axes: Axes, room: float, first
     out = looks
     if first is not None:
         turned = np.concatenate([[0.0], np.cumsum(angles_between(wanted_axes(profile, looks, axes)[2]))])
-        parts = np.clip(np.ceil(np.diff(np.interp(first, looks, turned)) / room), 1, MOST_PARTS).astype(np.int64)
+        parts = np.clip(np.ceil(np.diff(np.interp(first, looks, turned)) / room), 1, MAX_PARTS).astype(np.int64)
         climb = turned + 1e-12 * looks  # so that it can be turned round where the axis stands
         low, high = (np.interp(e, looks, climb) for e in (first[:-1], first[1:]))
         inner = [np.interp(a + (b - a) * np.arange(n) / n, climb, looks)

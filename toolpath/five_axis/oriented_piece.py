@@ -14,7 +14,7 @@ from toolpath.poses import Blocked, between
 
 RAISES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the radius, along the axis, where the end of the tool is in the way
 RISE = 0.3  # mm a mm: how fast a pass is raised and lowered again
-LEAST_PIECE = 1.0  # of the radius: what is shorter is left to others
+MIN_PIECE = 1.0  # of the radius: what is shorter is left to others
 
 
 @dataclass(frozen=True, eq=False)

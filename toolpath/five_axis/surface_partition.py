@@ -11,7 +11,7 @@ Notation
 
 A piece costs the length of its lines, and at every line the way out over its end and the way round to the next.
 Over a lattice of the unit square all pieces are priced, either way fed, and of all ways to part it by straight cuts
-from side to side the cheapest is taken, none of which gains less than LEAST_GAIN of what it cuts. How near that comes
+from side to side the cheapest is taken, none of which gains less than MIN_GAIN of what it cuts. How near that comes
 to the passes that are laid: docs/theory/matching.md.
 """
 
@@ -26,13 +26,13 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.curvature_matching import clear_tilt, mean_direction, strip_width
-from toolpath.five_axis.matched_passes import MOST_RUN_OUT, TURNS, Wanted, longest_lag
+from toolpath.five_axis.matched_passes import MAX_RUN_OUT, TURNS, MatchTolerances, longest_lag
 from toolpath.kernels.parted import price_rows
 from toolpath.passes.isoparametric_passes import IsoSurface
 
 CELLS = 16  # each way, between which cuts lie
 FINE = 4  # places a cell, each way, at which strips are looked at
-LEAST_GAIN = 0.05  # of the way of what is cut: less is not told apart from the error of the closed form
+MIN_GAIN = 0.05  # of the way of what is cut: less is not told apart from the error of the closed form
 LAST = 0.5  # of a pass, which the last one of a piece cuts beyond its border
 
 Rectangle = tuple[int, int, int, int]
@@ -54,7 +54,7 @@ class Feed:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class SurfacePiece:
     """A piece of a surface and how it is fed.
 
     iso       : the piece over the unit square, passes along xi
@@ -72,8 +72,8 @@ class Part:
     spread: float
 
 
-def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float | None = None,
-           cut: bool = True) -> list[Part]:
+def parted(iso: IsoSurface, tool: ToolBody, wanted: MatchTolerances, *, round_way: float | None = None,
+           cut: bool = True) -> list[SurfacePiece]:
     """The pieces of a surface, each fed the way that is shorter for it; one where parting does not pay.
 
     tool      : ToolBody, a flat or a bull nose
@@ -98,7 +98,7 @@ def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float 
         passes, way = price(feeds, across, (a, b, c, d), ends, lag)
         inside = (slice(c * FINE, d * FINE), slice(a * FINE, b * FINE))
         piece = replace(iso, grid=iso.grid.part(*((low[::-1], high[::-1]) if iso.turned else (low, high))))
-        out.append(Part(turned(piece) if across else piece, low, high, passes, way,
+        out.append(SurfacePiece(turned(piece) if across else piece, low, high, passes, way,
                         mean_direction(angle[inside], weight[inside])[1]))
     return out
 
@@ -115,7 +115,7 @@ def middles() -> tuple[F64, F64]:
     return xi.ravel(), eta.ravel()
 
 
-def feed_of(iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Feed:
+def feed_of(iso: IsoSurface, tool: ToolBody, wanted: MatchTolerances) -> Feed:
     """What feeding a surface along its xi does, by closed form.
 
     Notes
@@ -177,14 +177,14 @@ def price(feeds: tuple[Feed, Feed], across: bool, piece: Rectangle, ends: float,
     piece : in cells
     ends  : mm, that each pass costs besides its line;  lag : mm, by which it goes on over its end
 
-    Infinite where a line is so short that passes could not go on as far (``matched.MOST_RUN_OUT``), or has no reach.
+    Infinite where a line is so short that passes could not go on as far (``MAX_RUN_OUT``), or has no reach.
     """
     a, b, c, d = (FINE * n for n in piece)
     reach, length = feeds[across].reach, feeds[across].length
     if across:
         reach, length, (a, b, c, d) = reach.T, length.T, (c, d, a, b)
     passes, way, mean, shortest = price_rows(reach, length, a, b, c, d, lag)
-    if (b - a < CELLS * FINE and lag > MOST_RUN_OUT * shortest) or not math.isfinite(passes):
+    if (b - a < CELLS * FINE and lag > MAX_RUN_OUT * shortest) or not math.isfinite(passes):
         return np.inf, np.inf
     return passes + LAST, way + passes * ends + LAST * (mean + ends)
 
@@ -203,7 +203,7 @@ def cheapest(feeds: tuple[Feed, Feed], ends: float, lag: float, cut: bool = True
         cuts += [((a, b, c, m), (a, b, m, d)) for m in range(c + 1, d) if cut]
         for one, two in cuts:
             (x, p), (y, q) = best(*one), best(*two)
-            if x + y < min((1.0 - LEAST_GAIN) * cost, kept[0]):
+            if x + y < min((1.0 - MIN_GAIN) * cost, kept[0]):
                 kept = x + y, p + q
         return kept
 

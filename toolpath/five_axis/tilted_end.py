@@ -28,11 +28,11 @@ TRIED = 33  # the same, when a tilt is looked for: between two of them it may be
 BISECTIONS = 10  # of a tilt: to a 1000th of what it may be
 TOUCH = 1e-7  # mm: rounding of a place that touches
 ROOM = np.radians(3.0)  # a tilt is looked for up to so much beyond what is clear on a quadric
-MOST_ROOM = np.radians(40.0)
+MAX_ROOM = np.radians(40.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class PassContacts:
     """Contacts of a pass.
 
     uv     : (m, 2) parameters on the surface
@@ -45,12 +45,12 @@ class Contacts:
     way: F64
     left: F64
 
-    def every(self, step: int) -> Contacts:
+    def every(self, step: int) -> PassContacts:
         """Each so manieth of them."""
-        return Contacts(*(a[::step] for a in (self.uv, self.point, self.normal, self.way, self.left)))
+        return PassContacts(*(a[::step] for a in (self.uv, self.point, self.normal, self.way, self.left)))
 
     @classmethod
-    def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> Contacts:
+    def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> PassContacts:
         """Contacts at parameters (m, 2), fed along (m, 2), parameters by anything."""
         d, normal = surface.derivatives(uv), surface.normals(uv)
         way = d.u * along[:, :1] + d.v * along[:, 1:]
@@ -70,12 +70,12 @@ class Nose:
     tool: ToolBody
     domain: F64
 
-    def axes(self, at: Contacts, tilt: F64, turn: F64) -> F64:
+    def axes(self, at: PassContacts, tilt: F64, turn: F64) -> F64:
         """Tool axes (m, 3), unit, for tilts and turns (m,) rad."""
         behind = np.sin(turn)[:, None] * at.left - np.cos(turn)[:, None] * at.way
         return np.asarray(np.cos(tilt)[:, None] * at.normal - np.sin(tilt)[:, None] * behind)
 
-    def heights(self, at: Contacts, tilt: F64, turn: F64, angles: int = ANGLES) -> tuple[F64, F64]:
+    def heights(self, at: PassContacts, tilt: F64, turn: F64, angles: int = ANGLES) -> tuple[F64, F64]:
         """How high the nose stands, (2, m, angles) mm, on the left half and on the right one from the contact to the
         heel, and the parameters of the feet, (2, m, angles, 2)."""
         big, r = nose_radii(self.tool)
@@ -90,15 +90,15 @@ class Nose:
         shape = (2, len(at.uv), angles)
         return high.reshape(shape) - r, feet.reshape(*shape, 2)
 
-    def least_tilt(self, at: Contacts, turn: F64, depth: float, least: float) -> F64:
+    def least_tilt(self, at: PassContacts, turn: F64, depth: float, least: float) -> F64:
         """The least tilts (m,), rad, from ``least`` on, with no place of the nose deeper than ``depth`` mm in the
         surface within the domain; nan where none is small enough."""
         k_1 = np.maximum(-self.surface.curvature(np.clip(at.uv, *self.surface.domain))[:, 0], 0.0)
-        clear = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MOST_ROOM), least)
+        clear = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MAX_ROOM), least)
         low, high = np.full(len(at.uv), least), clear + ROOM
         bad = self._enters(at, high, turn, depth)
         if bad.any():
-            high = np.where(bad, clear + MOST_ROOM, high)
+            high = np.where(bad, clear + MAX_ROOM, high)
             bad = self._enters(at, high, turn, depth)
         high = np.where(self._enters(at, low, turn, depth), high, low)
         for _ in range(BISECTIONS):
@@ -107,7 +107,7 @@ class Nose:
             low, high = np.where(enters, middle, low), np.where(enters, high, middle)
         return np.where(bad, np.nan, high)
 
-    def _enters(self, at: Contacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
+    def _enters(self, at: PassContacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
         high, feet = self.heights(at, tilt, turn, TRIED)
         known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3) | ~np.isfinite(high)
         return np.asarray((known & ~(high >= -depth - TOUCH)).any(axis=(0, 2)))

@@ -21,7 +21,7 @@ from geometry.mesh import F64
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 SIZES = (0.12, 0.25, 0.5)  # radii, of the diameter of the tool: the least that gets it off the stock of the wall
-LEAST_RADIUS = 0.05  # mm
+MIN_RADIUS = 0.05  # mm
 LEVEL_SHARE = 0.9  # of its length, level: an upright pass that goes up or down steeper has no arcs
 BESIDE = 0.05  # mm off a pass: a wall it goes along is met there
 
@@ -29,7 +29,7 @@ BESIDE = 0.05  # mm off a pass: a wall it goes along is met there
 def radii(diameter: float, length: float) -> list[float]:
     """mm: radii of arcs to try, for a pass of a length, mm: both arcs are no longer than the pass."""
     sizes = (share * diameter for share in SIZES)
-    return [r for r in sizes if r >= LEAST_RADIUS and math.pi * r <= length]
+    return [r for r in sizes if r >= MIN_RADIUS and math.pi * r <= length]
 
 
 def arc_onto(start: F64, ahead: F64, off: F64, radius: float, chord: float) -> F64:

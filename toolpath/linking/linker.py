@@ -36,17 +36,17 @@ from toolpath.linking.rapid_travel import Motions, Travel
 from toolpath.stock.cut_history import Depths, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED, skims, within
 from toolpath.stock.stock_map import SURE_RIM, StockMap
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
 LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
-MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
+MAX_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
 LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
-MOST_OVER = 1.5  # layers: what stands over a pass, or a lane onto one, at most
+MAX_OVER = 1.5  # layers: what stands over a pass, or a lane onto one, at most
 BEEN_NEAR = 0.5  # of the diameter: places so near that the tool has been to are looked at, to come down to a cut beside
-MOST_BEEN = 6  # of them
+MAX_BEEN = 6  # of them
 BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
@@ -179,7 +179,7 @@ class Linker:
         tool, step = self.field.tool, self.motions.step_down
         along = dense(points, LOOK_EVERY * tool.radius)
         over = self.stock.overlap(along, tool, LOOK_RIM)
-        if (over.max() <= MOST_OVER * step or not len(self._been(points[0]))
+        if (over.max() <= MAX_OVER * step or not len(self._been(points[0]))
                 or bool(self.stock.in_air(points[:1], tool)[0]) or next(self._air_beside(points), None) is not None):
             return
         for k in range(int(over.max() / step), 0, -1):
@@ -231,27 +231,27 @@ class Linker:
         else:
             self.go.come_down(entry[0])
             if len(entry) > 1:
-                self.go.feed(Motion.APPROACH, entry, self.motions.feed)
+                self.go.feed(TrajectoryKind.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self.go.here() - cut[0]) > 1e-9:
-            self.go.feed(Motion.APPROACH, np.vstack([self.go.here(), cut[:1]]), self.motions.plunge_feed)
+            self.go.feed(TrajectoryKind.APPROACH, np.vstack([self.go.here(), cut[:1]]), self.motions.plunge_feed)
         if len(arc):
-            self._led(Motion.APPROACH, arc)
+            self._led(TrajectoryKind.APPROACH, arc)
             cut = points
         down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
         most = min(most, self.motions.front_feed) if eased else most
         head = min(most, self._descent(cut[:down + 1]))
         if head < min(most, self.motions.feed):
-            self._paced(Motion.CUT, cut[:down + 1], head)
-            self._paced(Motion.CUT, cut[down:], most)
+            self._paced(TrajectoryKind.CUT, cut[:down + 1], head)
+            self._paced(TrajectoryKind.CUT, cut[down:], most)
         else:
-            self._paced(Motion.CUT, cut, most)
+            self._paced(TrajectoryKind.CUT, cut, most)
         self.depths.cut(cut)
         self.passes += 1
         if self.walls and not eased:
             length = Line(points, closed).length
             off = self._arc(cut[-1], cut[-2] - cut[-1], length, onto=False)  # a ring may have been begun elsewhere
             if off is not None:
-                self._led(Motion.LIFT, off)
+                self._led(TrajectoryKind.LIFT, off)
         return True
 
     def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
@@ -275,11 +275,11 @@ class Linker:
                 return False
             tips = dense(arc, 0.3 * self.field.lattice.step)
             return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
-                    and self._lane(tips, MOST_OVER * self.motions.step_down))
+                    and self._lane(tips, MAX_OVER * self.motions.step_down))
 
         for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
             walked = arc if onto else np.ascontiguousarray(arc[::-1])
-            if int(self.depths.were_cut(walked).sum()) <= MOST_AGAIN and free(arc):
+            if int(self.depths.were_cut(walked).sum()) <= MAX_AGAIN and free(arc):
                 return walked
         return None
 
@@ -290,7 +290,7 @@ class Linker:
         steepest = float((drop[length > 0.0] / length[length > 0.0]).max(initial=0.0))
         return self.motions.plunge_feed / steepest if steepest > 0.0 else math.inf
 
-    def _paced(self, motion: Motion, points: F64, most: float = math.inf) -> None:
+    def _paced(self, motion: TrajectoryKind, points: F64, most: float = math.inf) -> None:
         """Go along a way (n, 3), mm, in stretches as fast as what stands there lets the tool, where a pace is given.
 
         Only where it takes stock off: a finish is not left to what the stock's lattice shows. Nor is a way down between
@@ -298,12 +298,12 @@ class Linker:
         """
         if len(points) < 2:
             return
-        slow = self.pace is None or motion is Motion.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
+        slow = self.pace is None or motion is TrajectoryKind.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
         if self.pace is None or slow:
             self.go.feed(motion, points, min(self.motions.feed, most))
             return
         for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
-            self.go.feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
+            self.go.feed(TrajectoryKind.CONNECT if air else motion, part, feed if air else min(feed, most))
 
     def _joined(self, way: F64) -> None:
         """Go along a way (n, 3), mm, to the next pass: as far as it is in air as fast as links go.
@@ -312,11 +312,11 @@ class Linker:
         """
         for quick, part in self.go.parts(way, seen=True):
             if quick:
-                self.go.feed(Motion.CONNECT, part, self.motions.link_feed)
+                self.go.feed(TrajectoryKind.CONNECT, part, self.motions.link_feed)
             else:
-                self._paced(Motion.CONNECT, part)
+                self._paced(TrajectoryKind.CONNECT, part)
 
-    def _led(self, motion: Motion, arc: F64) -> None:
+    def _led(self, motion: TrajectoryKind, arc: F64) -> None:
         """Go along an arc (n, 3), mm, on or off a pass: beside the wall at the feed of the pass, else as links go."""
         for quick, part in self.go.parts(arc, seen=False):
             self.go.feed(motion, part, self.motions.link_feed if quick else self.motions.feed)
@@ -338,11 +338,11 @@ class Linker:
             if length / self.motions.link_feed > self.go.by_plane(way[0], way[-1]):
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
-            if int(known.sum()) > MOST_AGAIN:
+            if int(known.sum()) > MAX_AGAIN:
                 continue
             free = (self.go.free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)
             if self.go.nothing_stands(way) and all(free):
-                self.go.feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+                self.go.feed(TrajectoryKind.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
                 self.gone.cut(way)
                 return True
         self.go.lift()
@@ -385,7 +385,7 @@ class Linker:
         if aside is not None:
             return aside, points, True
         ramp = self._ramp(points, closed, over)
-        if ramp is None or int(self._known_down(ramp, points).sum()) > MOST_AGAIN:
+        if ramp is None or int(self._known_down(ramp, points).sum()) > MAX_AGAIN:
             return None  # what is known of a way down can be left out only where it is come to from above
         return entry, ramp, True
 
@@ -404,7 +404,7 @@ class Linker:
             if length / m.link_feed + float(np.linalg.norm(start - q)) / m.feed > sooner:
                 continue
             if (self.go.nothing_stands(way) and self.go.free_move(here[:2], q[:2], z)
-                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MOST_AGAIN):
+                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MAX_AGAIN):
                 return np.vstack([way[1:], start])
         return None
 
@@ -432,7 +432,7 @@ class Linker:
 
     def _been_beside(self, start: F64) -> Iterator[F64]:
         """Places (3,) as high as a start of a cut, mm, that the tool has come down to, straight beside it."""
-        for x, y, _ in self._been(start)[:MOST_BEEN]:
+        for x, y, _ in self._been(start)[:MAX_BEEN]:
             q = np.array([x, y, start[2]])
             if self._shallow(dense(np.vstack([q, start]), LOOK_EVERY * self.field.tool.radius)):
                 if self._leads_onto(q, start):
@@ -445,7 +445,7 @@ class Linker:
 
     def _shallow(self, points: F64) -> bool:
         """Whether no more than a layer stands over tips (n, 3), mm, not even as a skin on the walls beside them."""
-        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MOST_OVER * self.motions.step_down
+        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MAX_OVER * self.motions.step_down
 
     def _leads_onto(self, q: F64, start: F64) -> bool:
         """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
@@ -453,7 +453,7 @@ class Linker:
             return False
         t = np.linspace(0.0, 1.0, max(2, int(np.hypot(*(start - q)[:2]) / 0.2) + 1))[:, None]
         lane = q + t * (start - q)
-        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MOST_OVER * self.motions.step_down)
+        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MAX_OVER * self.motions.step_down)
 
     def _lane(self, tips: F64, most: float) -> bool:
         """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
@@ -479,7 +479,7 @@ class Linker:
         above = max(float(self.depths.above(head).max()), 0.0)
         been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
         beside = max(float(been - points[0, 2]), 0.0)
-        if seen - beside > MOST_OVER * self.motions.step_down:
+        if seen - beside > MAX_OVER * self.motions.step_down:
             beside = math.inf
         for most in (min(beside, above, seen), min(above, seen), seen, max(seen, self.motions.step_down), highest):
             over = most + 0.1

@@ -18,8 +18,8 @@ from toolpath.stock.stock_map import SKIN
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of the same, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
-LEAST_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
-MOST_LEGS = 400
+MIN_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
+MAX_LEGS = 400
 
 
 def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: float, care: float) -> F64 | None:
@@ -41,7 +41,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     slope, skin = care * math.tan(angle) * RAMP_SHARE, care * SKIN * tool.diameter
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
     total = float(s[-1])
-    if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
+    if total < MIN_RUN * tool.radius * (2.0 if closed else 1.0):
         return None  # to and fro on the spot is drilling
     lean = _steepest(points if closed else head_of(points, 0.5 * over / slope))
     digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
@@ -52,7 +52,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     need, most = over / rest, math.tan(angle) * EASE_SHARE - (0.0 if digs else lean)
     if closed:
         laps = math.ceil(need / total)
-        if laps > MOST_LEGS:
+        if laps > MAX_LEGS:
             return None
         walked = np.concatenate([points] + [points[1:]] * laps)
         t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
@@ -63,7 +63,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
         return np.ascontiguousarray(path[: last + 1])
     leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
     legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
-    if legs > MOST_LEGS:
+    if legs > MAX_LEGS:
         return None
     head, hs = _with_knot(points, s, leg)
     head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]

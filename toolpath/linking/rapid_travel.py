@@ -19,11 +19,11 @@ from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import GUARD
 from toolpath.lines import dense, stretch
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
-MOST_IN_FRONT = 0.5  # mm
+IN_FRONT = 0.1  # of the diameter, and no more than ``MAX_IN_FRONT``, above the start of a cut: approaches slow down
+MAX_IN_FRONT = 0.5  # mm
 OVER = 0.1  # mm above what stands between, on the way across
 QUICK_SHARE = 0.06  # of the diameter: a feed for less than that is not worth a word
 
@@ -68,7 +68,7 @@ class Travel:
         assert self.at is not None
         return self.at
 
-    def feed(self, motion: Motion, points: F64, feed: float) -> None:
+    def feed(self, motion: TrajectoryKind, points: F64, feed: float) -> None:
         """Go along points (n, 3), mm, from where the tool is, at a feed, mm/min, and take off what is met."""
         self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
         self.stock.cut(points, self.field.tool)
@@ -76,7 +76,7 @@ class Travel:
 
     def rapid(self, points: F64) -> None:
         """Go along points (n, 3), mm, as a rapid; nothing is taken off."""
-        self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
+        self.trajectories.append(Trajectory(TrajectoryKind.RAPID, np.ascontiguousarray(points), 0.0))
         self.at = points[-1]
 
     def lift(self) -> None:
@@ -86,7 +86,7 @@ class Travel:
         x, y, z = self.at
         free = max(z, self.motions.rapid_floor)
         if free > z + 1e-9:
-            self.feed(Motion.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
+            self.feed(TrajectoryKind.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
         if self.motions.clearance > free + 1e-9:
             self.rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
@@ -95,8 +95,8 @@ class Travel:
         x, y, z = start
         way = self._across(start)
         if way is not None:
-            self.feed(Motion.CONNECT, way, self.motions.link_feed)
-            self.feed(Motion.APPROACH, np.array([way[-1], start]), self._onto_feed(start))
+            self.feed(TrajectoryKind.CONNECT, way, self.motions.link_feed)
+            self.feed(TrajectoryKind.APPROACH, np.array([way[-1], start]), self._onto_feed(start))
             return
         top = self.motions.clearance
         if self.at is None:
@@ -111,9 +111,9 @@ class Travel:
             self.rapid(np.array([[x, y, top], [x, y, free]]))
         slow = min(z + self._in_front, free)
         if free > slow + 1e-9:
-            self.feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
+            self.feed(TrajectoryKind.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
-            self.feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self._onto_feed(start))
+            self.feed(TrajectoryKind.APPROACH, np.array([[x, y, slow], [x, y, z]]), self._onto_feed(start))
 
     def _across(self, start: F64) -> F64 | None:
         """A way (n, 3) in air from where the tool is to just over a place to come down at, no higher than it has to be.
@@ -161,7 +161,7 @@ class Travel:
 
     @property
     def _in_front(self) -> float:
-        return min(IN_FRONT * self.field.tool.diameter, MOST_IN_FRONT)
+        return min(IN_FRONT * self.field.tool.diameter, MAX_IN_FRONT)
 
     def free_move(self, a: F64, b: F64, z: float) -> bool:
         """Whether the tool is free, as ``free`` has it, straight from a to b, (2,) mm, at height z, mm."""

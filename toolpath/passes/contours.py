@@ -28,7 +28,7 @@ from toolpath.kernels.contour import (
 from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-LEAST_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
+MIN_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
 BISECTIONS = 9  # a crossing is placed to step / 2**9
 
 
@@ -110,7 +110,7 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
     exact = np.ones(len(ids), np.bool_)
     if wanted is not None:
         middle = _middles(ids, blocked.shape[1]) * lat.step + [x0, y0]
-        more = 2 + math.ceil(overrun / (LEAST_APART * lat.step))
+        more = 2 + math.ceil(overrun / (MIN_APART * lat.step))
         exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
         xy[~exact] = middle[~exact]
     placed = np.empty((int(exact.sum()), 2))

@@ -18,7 +18,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import thinned, true_runs
 from toolpath.passes.dragged_path import STEEPEST, Limit
-from toolpath.passes.forward_step import Profile
+from toolpath.passes.forward_step import PassProfile
 
 FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
 LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does
@@ -49,7 +49,7 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, sid
     return np.asarray(out)
 
 
-def sides(profile: Profile, way: F64, axis: F64 | None = None) -> F64:
+def sides(profile: PassProfile, way: F64, axis: F64 | None = None) -> F64:
     """From the contact to the axis of a bull nose or a flat, for places (n,) mm of a pass that lie level.
 
     There any place under the flat of its end will do. It stays on the side it has at the nearest place of the pass that
@@ -110,7 +110,7 @@ def chorded(ways: F64, at: Callable[[F64], F64], tolerance: float) -> F64:
     return ways
 
 
-def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
+def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
            off: float = 0.0, most: float | None = None) -> tuple[list[F64], bool]:
     """The tips of a pass, upright, moved off the surface or raised where the part stands over them.
 
@@ -156,7 +156,7 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
     return [thinned(made[i:j + 1], 0.5 * tolerance) for i, j in runs], True
 
 
-def _raised(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
+def _raised(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), raised to the limit, and by how much (n,); mm."""
     made, high = _against(profile, way, tool, limit, off)
     rise = np.where(high > made[:, 2] + FREE, high - made[:, 2], 0.0)
@@ -172,7 +172,7 @@ def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.b
     return out
 
 
-def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
+def _against(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), off the surface where that frees them, and what the part allows there (n,); mm."""
     contact, normal = contacts(profile, way)
     side = sides(profile, way) if tool.radius > tool.corner_radius else None
@@ -189,12 +189,12 @@ def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: floa
     return made, high
 
 
-def _tips(profile: Profile, way: F64, tool: ToolBody) -> F64:
+def _tips(profile: PassProfile, way: F64, tool: ToolBody) -> F64:
     """Tips (n, 3) mm of an upright tool at ways (n,) mm."""
     return tips(*contacts(profile, way), tool, None, sides(profile, way))
 
 
-def contacts(profile: Profile, way: F64) -> tuple[F64, F64]:
+def contacts(profile: PassProfile, way: F64) -> tuple[F64, F64]:
     """Contacts (n, 3) mm and unit normals (n, 3) of a pass at ways (n,) mm."""
     contact = profile.centres(way, 0.0)
     normal = profile.centres(way, 1.0) - contact

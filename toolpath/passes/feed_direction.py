@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath
 from toolpath.passes.side_step import lay_out
 
 COARSER = 3.0  # passes of the search lie about this many times farther apart than those of the plan
@@ -26,7 +26,7 @@ class Candidate:
     way: float
 
 
-def searched(dragged: Dragged, target: Target, promise: Promise,
+def searched(dragged: Dragged, target: FinishTarget, promise: Promise,
              angles: Sequence[float] = CANDIDATES) -> list[Candidate]:
     """Coarse layouts in several directions, the least way first.
 
@@ -37,7 +37,7 @@ def searched(dragged: Dragged, target: Target, promise: Promise,
         return [Candidate(angles[0], 0, 0, 0.0)]
     thin = COARSER**2
     keep = np.random.default_rng(0).permutation(len(target.points))[:max(FEWEST, int(len(target.points) / thin))]
-    few = Target(target.points[keep], target.normals[keep], target.tips[keep], COARSER * target.spacing)
+    few = FinishTarget(target.points[keep], target.normals[keep], target.tips[keep], COARSER * target.spacing)
     easy = replace(promise, scallop=thin * promise.scallop, chord=thin * promise.chord)
     found = []
     for angle in angles:
@@ -48,6 +48,6 @@ def searched(dragged: Dragged, target: Target, promise: Promise,
     return sorted(found, key=lambda c: c.way)
 
 
-def best_direction(dragged: Dragged, target: Target, promise: Promise) -> float:
+def best_direction(dragged: Dragged, target: FinishTarget, promise: Promise) -> float:
     """Angle of the feed from x with the least way, rad."""
     return searched(dragged, target, promise)[0].angle

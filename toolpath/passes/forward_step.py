@@ -26,10 +26,10 @@ from geometry.mesh import F64
 from toolpath.kernels import forward as kernels
 
 LONGEST = 40.0  # mm
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 FIRST = 256  # intervals a pass is looked at in at first
 SHARE = 2e-4  # of the tolerance: what the cubics of a profile may be off
-MOST_PLACES = 1 << 18
+MAX_PLACES = 1 << 18
 FINEST = 0.02  # mm between places of a profile: what still jumps is an edge
 
 Curve = Callable[[F64], tuple[F64, F64]]
@@ -37,7 +37,7 @@ Curve = Callable[[F64], tuple[F64, F64]]
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class PassProfile:
     """A pass over the surface by its length.
 
     at      : (k + 1,) float64, parameters at even ways; width : mm between them
@@ -50,7 +50,7 @@ class Profile:
     normal: F64
 
     @classmethod
-    def of(cls, curve: Curve, tolerance: float, radius: float) -> Profile:
+    def of(cls, curve: Curve, tolerance: float, radius: float) -> PassProfile:
         """A pass over 0 to 1 with places so close that cubics through them are off by 2e-4 of a tolerance.
 
         tolerance : mm; radius : mm, of the ball, whose centres are to be as right as the contacts
@@ -88,7 +88,7 @@ class Profile:
             width = float(ways[-1]) / (len(ways) - 1)
             if np.maximum(off, radius * turn).max() <= SHARE * tolerance:
                 return cls(t, width, contact, normal)
-            if width < FINEST or len(t) > MOST_PLACES:
+            if width < FINEST or len(t) > MAX_PLACES:
                 off = np.maximum(off, 0.5 * radius * turn * turn)
                 if off.max() <= 0.5 * tolerance:
                     return cls(t, width, contact, normal)
@@ -148,7 +148,7 @@ def _merged(a: F64, b: F64) -> F64:
     return out
 
 
-def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.0, longest: float = LONGEST) -> F64:
+def steps(profile: PassProfile, radius: float, tolerance: float, scallop: float = 0.0, longest: float = LONGEST) -> F64:
     """Ways along a pass at which a ball is to be located.
 
     radius, tolerance : mm; longest : mm, of a step
@@ -166,7 +166,7 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
     """
     pieces, aside = profile.pieces(), _aside(radius, scallop)
     room = 1024
-    while room <= MOST_STEPS:
+    while room <= MAX_STEPS:
         ends = np.empty(room)
         count = int(kernels.forward(pieces, profile.width, profile.length, radius, aside, tolerance, longest,
                                     ends))
@@ -175,22 +175,22 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
         if count < -1:
             break
         room *= 8
-    raise GeometryError(f"a pass of {profile.length:g} mm asks for over {MOST_STEPS} steps", code="too_many_steps",
-                        measured=profile.length, limit=MOST_STEPS, remedy="allow a larger chord tolerance")
+    raise GeometryError(f"a pass of {profile.length:g} mm asks for over {MAX_STEPS} steps", code="too_many_steps",
+                        measured=profile.length, limit=MAX_STEPS, remedy="allow a larger chord tolerance")
 
 
 def _aside(radius: float, scallop: float) -> float:
     return float(np.sqrt(2.0 * scallop / radius))
 
 
-def errors(profile: Profile, ends: F64, radius: float, scallop: float = 0.0) -> F64:
+def errors(profile: PassProfile, ends: F64, radius: float, scallop: float = 0.0) -> F64:
     """(n - 1,) float64, mm: the greatest chordal error of each step between ways (n,) mm."""
     pieces, seen, out = profile.pieces(), np.empty(kernels.PLACES + 1), np.empty(6)
     return np.array([kernels.greatest(pieces, profile.width, a, b, radius, _aside(radius, scallop), seen, out)
                      for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)])
 
 
-def arc_rule(profile: Profile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
+def arc_rule(profile: PassProfile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
     """Ways by the rule of a circular arc, (n,) float64 mm: the curvature at the start of a step taken for all of it.
 
     Convex of radius R: cos phi = 1 - e / (R + r), concave 1 - e / (R - r); the step is the chord 2 R sin phi. For

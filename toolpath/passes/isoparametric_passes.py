@@ -34,7 +34,7 @@ from toolpath.passes.forward_step import Curve
 LEVEL = 1e-9  # 1/mm: what is less curved is level
 TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
 ALONG = 65  # places along a pass at which its distance to the next is looked at
-MOST_LINES = 513
+MAX_LINES = 513
 FEET = 8  # steps of Newton from a place of the square to parameters near it
 CENTRES = 513  # of the ball along a pass
 ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
@@ -182,7 +182,7 @@ class _Table:
 
     def __init__(self, iso: Laid, radius: float, scallop: float) -> None:
         count, off = 33, np.inf
-        while off > 1e-3 * scallop and count <= MOST_LINES:
+        while off > 1e-3 * scallop and count <= MAX_LINES:
             at = np.linspace(0.0, 1.0, count)
             xi, eta = np.meshgrid(at, at)
             point, normal = iso.contact(xi.ravel(), eta.ravel())

@@ -51,7 +51,7 @@ class Dragged:
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class FinishTarget:
     """Samples to be finished, and what is left is measured at.
 
     points, normals : (n, 3) float64, mm and unit, out of the material; n_z > 0 where passes are dragged
@@ -64,13 +64,13 @@ class Target:
     tips: F64
     spacing: float
 
-    def subset(self, which: I64) -> Target:
+    def subset(self, which: I64) -> FinishTarget:
         """The samples ``which`` alone."""
-        return Target(self.points[which], self.normals[which], self.tips[which], self.spacing)
+        return FinishTarget(self.points[which], self.normals[which], self.tips[which], self.spacing)
 
-    def joined(self, more: Target) -> Target:
+    def joined(self, more: FinishTarget) -> FinishTarget:
         """These samples and then others, apart as these."""
-        return Target(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
+        return FinishTarget(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
                       np.vstack([self.tips, more.tips]), self.spacing)
 
 
@@ -118,7 +118,7 @@ class Family(ABC):
     across : (n, 2) float64, unit, the way t grows at each sample
     """
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, t: F64, strips: I64, across: F64) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise, t: F64, strips: I64, across: F64) -> None:
         self.dragged, self.target, self.promise = dragged, target, promise
         # what a pass through its own tip leaves too high, no pass mends: it may not set the step of all
         lift = dragged.limit(np.ascontiguousarray(target.tips[:, :2])) - target.tips[:, 2]
@@ -234,7 +234,7 @@ class Swath(Family):
     angle : rad, of the feed from x
     """
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, angle: float) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise, angle: float) -> None:
         # the ends of a quarter turn are exact, so that passes along an axis stay on a line of the program
         c, s = round(math.cos(angle), 15), round(math.sin(angle), 15)
         self.angle, self.feed, self.side = angle, np.array([c, s]), np.array([-s, c])
@@ -286,6 +286,6 @@ def _clipped(path: F64, along: F64, lo: float, hi: float) -> F64:
     return np.vstack([ends[:1], inside, ends[1:]])
 
 
-def strip_width(dragged: Dragged, target: Target) -> float:
+def strip_width(dragged: Dragged, target: FinishTarget) -> float:
     """Width of the strips in which what is left is looked at, mm."""
     return max(1.5 * target.spacing, 0.1 * dragged.cutter.radius)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.drop import drop_contacts
-from toolpath.passes.pass_family import I64, Target
+from toolpath.passes.pass_family import I64, FinishTarget
 from zones.reach.tip_field import TipField, touchable
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them
@@ -28,8 +28,8 @@ FINEST, COARSEST = 0.125, 0.25  # spacings: nodes of the lattice are so far apar
 THIN = 0.5  # spacings between the places kept, about
 
 
-def beyond(field: TipField, target: Target, lift: float, apart: float = 0.0,
-           faces: Collection[int] | None = None) -> Target:
+def beyond(field: TipField, target: FinishTarget, lift: float, apart: float = 0.0,
+           faces: Collection[int] | None = None) -> FinishTarget:
     """Places farther out than the outermost samples, up to where the tool as a whole no longer touches the surface.
 
     field  : TipField of the tool
@@ -69,7 +69,7 @@ def beyond(field: TipField, target: Target, lift: float, apart: float = 0.0,
     kept = kept[cKDTree(rim).query(places[kept, :2])[0] <= FAR * s]
     _, first = np.unique(np.floor(places[kept, :2] / (THIN * s)).astype(np.int64), axis=0, return_index=True)
     kept = kept[np.sort(first)]
-    return Target(places[kept], normals[kept], tips[kept], s)
+    return FinishTarget(places[kept], normals[kept], tips[kept], s)
 
 
 def _rim(points: F64, near: float) -> I64:

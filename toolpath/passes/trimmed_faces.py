@@ -75,7 +75,7 @@ class TrimmedFace:
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothFaces:
+class TangentFaces:
     """Faces that join smoothly, to be gone over as one.
 
     alone : the faces, each as it would be gone over on its own
@@ -118,7 +118,7 @@ class SmoothFaces:
         return self._laid[key]
 
 
-Faces = TrimmedFace | SmoothFaces
+Faces = TrimmedFace | TangentFaces
 
 
 def _passes(pieces: Sequence[Laid], radius: float, scallop: float, flank: Flank | None) -> list[Passes]:

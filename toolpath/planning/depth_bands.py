@@ -13,7 +13,7 @@ from toolpath.counterexamples import HighWall
 from zones.machinable_area import Form
 from zones.zoning.zones import ZoneArea
 
-LEAST_DEPTH = 2.0
+MIN_DEPTH = 2.0
 """Times the thickness: no band is lower, however large the corner of a tool is that goes below it."""
 
 
@@ -40,7 +40,7 @@ def planes(walls: Iterable[HighWall], corner: float, ratio: float) -> tuple[floa
     if not high:
         return ()
     thin = min(w.thickness for w in high)
-    depth = max(ratio * thin - corner, LEAST_DEPTH * thin)
+    depth = max(ratio * thin - corner, MIN_DEPTH * thin)
     top, bottom = max(w.top for w in high), min(w.bottom for w in high)
     count = math.ceil((top - bottom) / depth - 1e-9)
     return tuple(top - k * (top - bottom) / count for k in range(1, count))

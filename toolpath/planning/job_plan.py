@@ -18,10 +18,18 @@ from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.passes.contours import dilated
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.plan_checkpoint import (
+    NOTHING,
+    CheckpointKeeper,
+    FinishSnapshot,
+    LayersSnapshot,
+    PackedLines,
+    PlanSnapshot,
+    ToolSnapshot,
+)
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
 from toolpath.planning.zone_finishing import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
@@ -52,10 +60,10 @@ class Plan:
     zones: tuple[ZonePlan, ...]
 
 
-def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: Keeper = NOTHING) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: CheckpointKeeper = NOTHING) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
@@ -77,7 +85,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
 
-    def begin(now: PlanNow | None = None) -> _Work:
+    def begin(now: PlanSnapshot | None = None) -> _Work:
         jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
                          trimmed or {}, under) for tid in order]
         return _Work(jobs, stock, settings, now)
@@ -108,7 +116,7 @@ class _Work:
     """
 
     def __init__(self, jobs: Sequence[_ToolJob], stock: StockMap, settings: PlanSettings,
-                 now: PlanNow | None = None) -> None:
+                 now: PlanSnapshot | None = None) -> None:
         self.jobs, self.stock, self.settings = jobs, stock, settings
         self.acts, self.steps = 0, list[Workingstep]()
         if now is not None:
@@ -118,9 +126,9 @@ class _Work:
                 job.go_on(there, made)
             stock.go_on(now.stock)  # last, for it is not made anew where the rest does not fit
 
-    def now(self) -> PlanNow:
+    def now(self) -> PlanSnapshot:
         """How far it is."""
-        return PlanNow(self.acts, tuple(self.steps), self.stock.now(), tuple(job.now() for job in self.jobs))
+        return PlanSnapshot(self.acts, tuple(self.steps), self.stock.now(), tuple(job.now() for job in self.jobs))
 
     def to_do(self) -> Iterator[tuple[int, Act]]:
         """All acts in their order, done or not, and how many zones of a band are finished with each."""
@@ -151,7 +159,7 @@ def _nothing(number: int) -> list[Workingstep]:
 class _ToolJob:
     """What one tool does: its layers and the finish of its zones, band by band from the top."""
 
-    def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, Target], field: TipField, cut: CutData,
+    def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, FinishTarget], field: TipField, cut: CutData,
                  stock: StockMap, settings: PlanSettings, trimmed: Mapping[str, Sequence[Faces]], under: float) -> None:
         self.zones, self.checks, self.field, self.cut, self.stock = zones, checks, field, cut, stock
         self.settings, self.trimmed, self.under = settings, trimmed, under
@@ -203,13 +211,13 @@ class _ToolJob:
         f = self.finishes.get(zone.id)
         return [] if f is None else f.walk_again(f"S{number:02d}", least)
 
-    def now(self) -> ToolNow:
+    def now(self) -> ToolSnapshot:
         """How far it is."""
-        return ToolNow(Ways.of(self.walked.ways), Ways.of(self.depths.ways),
+        return ToolSnapshot(PackedLines.of(self.walked.ways), PackedLines.of(self.depths.ways),
                        None if self.layers is None else self.layers.now(), tuple(s.id for s in self.layered),
                        tuple(f.now() for f in self.begun))
 
-    def go_on(self, now: ToolNow, steps: Mapping[str, Workingstep]) -> None:
+    def go_on(self, now: ToolSnapshot, steps: Mapping[str, Workingstep]) -> None:
         """Become what one like this, that had done nothing, had come to; steps : that were made, by id."""
         for way in now.walked.lines():
             self.walked.add(way)
@@ -223,10 +231,10 @@ class _ToolJob:
             self.finishes[there.zone] = f = self._finish(zones[there.zone], there)
             f.layers = None if there.layers is None else steps[there.layers]
 
-    def _layers(self, now: LayersNow | None = None) -> _Layers:
+    def _layers(self, now: LayersSnapshot | None = None) -> _Layers:
         return _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under, now)
 
-    def _finish(self, zone: ZoneArea, now: FinishNow | None = None) -> Finish:
+    def _finish(self, zone: ZoneArea, now: FinishSnapshot | None = None) -> Finish:
         return Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
                       self.trimmed.get(zone.id, ()), self.walked, self.depths, now)
 
@@ -235,7 +243,7 @@ class _Layers:
     """The stock above all zones of a tool, taken off in depth layers, some of them at a time."""
 
     def __init__(self, zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, depths: Depths, under: float, now: LayersNow | None = None) -> None:
+                 settings: PlanSettings, depths: Depths, under: float, now: LayersSnapshot | None = None) -> None:
         self.zones, self.field, self.cut, self.stock = zones, field, cut, stock
         self.settings, self.depths = settings, depths
         lat, tool = field.lattice, field.tool
@@ -262,9 +270,9 @@ class _Layers:
         if now is not None:
             del self.left[:-now.left]
 
-    def now(self) -> LayersNow:
+    def now(self) -> LayersSnapshot:
         """How far they are."""
-        return LayersNow(self.top, self.swept, self.above, len(self.left))
+        return LayersSnapshot(self.top, self.swept, self.above, len(self.left))
 
     def down_to(self, lowest: float, number: int) -> list[Workingstep]:
         """The layers from ``lowest`` mm up that were not walked before, as one workingstep, and where even stock is to
@@ -331,8 +339,8 @@ class _Layers:
         """Go over the stock that stands above a height, mm, in an area, down to it."""
         settings, side, fine = self.settings, 0.8 * self.field.tool.radius, 0.1 * self.field.lattice.step
         if self.bounded:
-            Clearing(linker, z, area, self.allowance, side, settings.climb, settings.either_way, depth_layers.STOCK_WORTH,
-                     fine).walk()
+            Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
+                     depth_layers.STOCK_WORTH, fine).walk()
         for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)

@@ -28,11 +28,11 @@ from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.linking.rapid_travel import Motions
 from toolpath.passes.contours import serving
 from toolpath.passes.isoparametric_passes import Flank, side_step
-from toolpath.passes.pass_family import Promise, Target
+from toolpath.passes.pass_family import FinishTarget, Promise
 from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.reach_border import beyond
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_checkpoint import FinishNow
+from toolpath.plan_checkpoint import FinishSnapshot
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.poses import Blocked
 from toolpath.stock.cut_history import Depths, Walked, still_to_walk
@@ -51,7 +51,7 @@ from toolpath.strategies import (
     zigzag,
 )
 from toolpath.tool_deflection import left_by_layers
-from toolpath.workingsteps import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 from zones.machinable_area import Form
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
@@ -63,7 +63,7 @@ PASS_SHARE = 0.85  # a sample is done when the measured residual is within this 
 REFINEMENTS = 4
 LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
 UPRIGHT = 10  # of a zone asked to lean that is walked upright, of so many parts: which strategy leaves fewest
-LEAST_AGAIN = 4  # moves of a line that it walks a second time, to be left out
+MIN_AGAIN = 4  # moves of a line that it walks a second time, to be left out
 AS_IT_IS = 1e-9  # mm, of a line that is thinned out already
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: how well the border of an area is known
 WORTH_A_TRY = 1.5  # of the way of the usual passes: iso-parametric ones that are more are not walked
@@ -98,9 +98,9 @@ class Finish:
     now : where it was when it was kept, to go on from there
     """
 
-    def __init__(self, zone: ZoneArea, checks: Target, field: TipField, cut: CutData, stock: StockMap,
+    def __init__(self, zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData, stock: StockMap,
                  settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
-                 depths: Depths | None = None, now: FinishNow | None = None) -> None:
+                 depths: Depths | None = None, now: FinishSnapshot | None = None) -> None:
         anew = partial(Finish, zone, checks, field, cut, stock, settings, faces, walked, depths)
         self.full = cut = cut.finish or cut
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
@@ -127,13 +127,13 @@ class Finish:
         if now is not None:
             self._go_on(now)
 
-    def now(self) -> FinishNow:
+    def now(self) -> FinishSnapshot:
         """Where it is, to go on with another time."""
         s, layers = self.strategy, None if self.layers is None else self.layers.id
-        return FinishNow(self.zone.id, self.residual.residual, self.met, layers, self.step, self.settled,
+        return FinishSnapshot(self.zone.id, self.residual.residual, self.met, layers, self.step, self.settled,
                          self.begun_with, self.passes, s.name, s.side_step, s.ordered, s.rejected)
 
-    def _go_on(self, now: FinishNow) -> None:
+    def _go_on(self, now: FinishSnapshot) -> None:
         if len(now.residual) != len(self.met) or len(now.met) != len(self.met):
             raise ValueError(f"what is kept of {now.zone} has other checks")
         self.residual.residual, self.met = now.residual.copy(), now.met.copy()
@@ -143,7 +143,7 @@ class Finish:
         """Count what layers have cut: where they leave no more than the scallop, as along slots, no pass follows."""
         self.layers = layers
         for t in layers.trajectories:
-            if t.motion is Motion.CUT:
+            if t.motion is TrajectoryKind.CUT:
                 self.residual.cut(t.points, layers.tool)
 
     def above(self, plane: float) -> NDArray[np.bool_]:
@@ -253,7 +253,7 @@ class Finish:
             steps.append(step_of(here, f"{here} {zone.id} {name} {self.field.tool.id} {faces}", zone.id, [zone],
                                  "finishing", name, self.field.tool, self.cut, 0.0, run, self.settings))
             for t in run:
-                if t.motion is Motion.CUT and t.axes is not None:
+                if t.motion is TrajectoryKind.CUT and t.axes is not None:
                     self.residual.cut_leaning(t.points, t.axes, self.field.tool)
                     self.stock.cut_leaning(t.points, t.axes, self.field.tool)
         rest = self._rounds(f"S{number + len(runs):02d}", wanted)
@@ -373,7 +373,7 @@ class Finish:
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:
-            lines = nearest_order(lines, linker.at, settings.either_way)
+            lines = nearest_order(lines, linker.at, settings.cut_direction.both_ways)
         for line in lines:
             if not self.strategy.ordered:
                 line = turned(line, settings)
@@ -401,7 +401,7 @@ class Finish:
                     linker.add(rest, AS_IT_IS)
             if linker.refused > refused:  # what it would have taken is too much for the layer below
                 break
-        cuts = [t.points for t in linker.trajectories[before:] if t.motion is Motion.CUT]
+        cuts = [t.points for t in linker.trajectories[before:] if t.motion is TrajectoryKind.CUT]
         for points in cuts:
             self.residual.cut(points, tool)
         for points in [line.points, *cuts] if whole else cuts:
@@ -418,7 +418,7 @@ class Finish:
             self.residual.cut(line.points[a:b + 1], self.field.tool)
         again = Walked.again(line)
         for a, b in true_runs(again):
-            again[a:b] &= b - a >= LEAST_AGAIN  # places where a line crosses or touches itself
+            again[a:b] &= b - a >= MIN_AGAIN  # places where a line crosses or touches itself
         fresh &= ~again  # that is measured where it is walked first
         return still_to_walk(line, fresh)
 
@@ -455,7 +455,7 @@ class _Strategy:
     rejected: tuple[dict[str, object], ...] = ()
 
 
-def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
+def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData,
               settings: PlanSettings) -> _Strategy:
     """How a zone is finished."""
     tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
@@ -476,12 +476,12 @@ def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
     if _has_floor(zone, tool):
 
         def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MOST_FINER else []
+            return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MAX_FINER else []
 
         return _Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
     promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
-    layout = zigzag.laid(field, checks, promise, settings.pattern, settings.climb or settings.either_way)
+    layout = zigzag.laid(field, checks, promise, settings.pattern, settings.cut_direction.climbs)
 
     def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k:
@@ -523,12 +523,12 @@ def _laid_later(anew: Callable[[], Finish], name: str) -> Rounds:
 
 def turned(line: Line, settings: PlanSettings) -> Line:
     """A line in climb order, the other way where the setup wants conventional milling."""
-    return line if settings.climb or settings.either_way else line.reversed()
+    return line if settings.cut_direction.climbs else line.reversed()
 
 
 def upright_way(steps: Iterable[Workingstep]) -> float:
     """mm that the tool cuts upright in finishing steps."""
-    return sum(t.length for s in steps if s.strategy not in LEANING for t in s.trajectories if t.motion is Motion.CUT)
+    return sum(t.length for s in steps if s.strategy not in LEANING for t in s.trajectories if t.motion is TrajectoryKind.CUT)
 
 
 def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
@@ -551,5 +551,5 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
     outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
                        settings.scallop_height, settings.chordal_tolerance, walked, outline,
-                       max(z.top for z in zones), min(z.bottom for z in zones), settings.climb, rates=settings.rates,
-                       bend=cut.bend, either_way=settings.either_way)
+                       max(z.top for z in zones), min(z.bottom for z in zones), settings.cut_direction, rates=settings.rates,
+                       bend=cut.bend)

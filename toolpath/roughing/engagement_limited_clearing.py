@@ -26,6 +26,7 @@ from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.passes.contours import moves_free
 from toolpath.roughing.inward_fronts import NARROW, Inwards
 from toolpath.stock.engagement import LOOK, SKIN_SHARE, SURE, over_limit
+from toolpath.workingsteps import CutDirection
 
 FINER = 4  # times the distance between lines is halved where too much of the cutter is in stock
 ASLANT = 2.0  # distances between lines: how far off a line begins on the one before
@@ -54,7 +55,7 @@ class Clearing:
     area      : (ny, nx) bool on the lattice, where stock is to go
     allowance : mm left beside walls
     side_step : mm between lines
-    climb     : stock on the right, else on the left; either : lines may be walked both ways
+    cut_direction : CutDirection of the lines
     worth     : mm of stock over the cutter that makes a place worth a pass
     thin      : mm, lines are thinned by
     """
@@ -64,8 +65,7 @@ class Clearing:
     area: NDArray[np.bool_]
     allowance: float
     side_step: float
-    climb: bool
-    either: bool
+    cut_direction: CutDirection
     worth: float
     thin: float
 
@@ -98,7 +98,7 @@ class Clearing:
         turns = (over + ABOVE) / (round_way * slope)
         turn = np.arange(0.0, 2.0 * math.pi * (turns + 1.0) + TURN, TURN)
         height = np.maximum(over + ABOVE - radius * slope * turn, 0.0)
-        sense = -1.0 if self.climb else 1.0
+        sense = -1.0 if self.cut_direction.climbs else 1.0
         helix = middle + np.column_stack([radius * np.cos(turn), -sense * radius * np.sin(turn), height])
         return self.linker.add(Line(helix, False), self.thin, eased=True)
 
@@ -167,8 +167,8 @@ class Clearing:
 
     def _begun(self, ways: Inwards, line: Line, gone: float) -> Line:
         """A line in the direction it is walked, from where the border of what is ``gone`` begins or passes by."""
-        here, flip = self.linker.at, not self.climb
-        if self.either and here is not None:
+        here, flip = self.linker.at, not self.cut_direction.climbs
+        if self.cut_direction.both_ways and here is not None:
             ends = np.hypot(*(line.points[[0, -1], :2] - here[:2]).T)
             flip = bool(ends[1] < ends[0])
         points = line.points[::-1] if flip else line.points

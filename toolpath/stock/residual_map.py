@@ -18,7 +18,7 @@ from toolpath.kernels.leaning import lower_leaning
 from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
 
 CELL = 0.6  # mm
-LEAST_MARGIN = 0.02  # mm
+MIN_MARGIN = 0.02  # mm
 UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
 UNIT = 1e-6  # what the length of an axis may be off 1
 
@@ -31,12 +31,12 @@ class ResidualMap:
     residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one went in
     """
 
-    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = LEAST_MARGIN) -> None:
+    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = MIN_MARGIN) -> None:
         self.points = np.ascontiguousarray(points)
         upright = np.abs(normals[:, 2]) < 0.5
         self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
-        self.cell, self.margin = cell, max(margin, LEAST_MARGIN)
+        self.cell, self.margin = cell, max(margin, MIN_MARGIN)
         self.origin, self.ncx, self.ncy, self.starts, self.items = _binned(points, cell)
 
     def copied(self) -> ResidualMap:

@@ -31,7 +31,7 @@ AIR_TOLERANCE = 0.01  # mm
 UPRIGHT = 1e-12  # of the normal of a face of a block
 LEANS = 1e-9  # of the axis of a bar: by less it stands, or lies
 ON_EDGE = 1e-9  # mm
-APART, MOST_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
+APART, MAX_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
 SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
 
@@ -157,14 +157,14 @@ class StockMap:
         self.top, self.cover, self._ceilings = other.top, other.cover, other._ceilings
         self._pooled, self._covered = other._pooled, other._covered
 
-    def now(self) -> StockNow:
+    def now(self) -> StockSnapshot:
         """What is left, to go on with another time; as views where nothing else will do."""
         if self._others is None:
-            return StockNow(self.top, self.cover, None, None)
+            return StockSnapshot(self.top, self.cover, None, None)
         cut = np.flatnonzero(self._others.known != [self.cover, self.top])
-        return StockNow(self.top, self.cover, cut, self._others.known.ravel()[cut])
+        return StockSnapshot(self.top, self.cover, cut, self._others.known.ravel()[cut])
 
-    def go_on(self, now: StockNow) -> None:
+    def go_on(self, now: StockSnapshot) -> None:
         """Become what a map like this, cut so far by none, was left as.
 
         Raises
@@ -223,7 +223,7 @@ class StockMap:
         seen from below, at poses a few lattice steps apart: neither map falls too low.
         """
         lat, self._ceilings = self.lattice, None
-        spacing = max(APART * lat.step, MOST_POSED * tool.radius)
+        spacing = max(APART * lat.step, MAX_POSED * tool.radius)
         tips, axes = between(tips, axes, places_along(tips, axes, tool.flute_length, spacing))
         r, high = tool.corner_radius, tool.flute_length
         bent = ROUND if r > 0.0 else (0.5 * np.pi,)
@@ -404,7 +404,7 @@ def _pooled(top: F64) -> F64:
 
 
 @dataclass(frozen=True, eq=False)
-class StockNow:
+class StockSnapshot:
     """Heights of a ``StockMap``, (ny, nx) mm each.
 
     cut, settled : (k,) int64, where ``cover`` and then ``top``, row by row, are not what they were when they were last

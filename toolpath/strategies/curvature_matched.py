@@ -20,26 +20,26 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.matched_passes import Matched, Strip, Wanted
+from toolpath.five_axis.matched_passes import MatchedPasses, MatchedStrip, MatchTolerances
 from toolpath.five_axis.oriented_motion import LOOK, TURN_S, Runs, Surroundings, in_turn
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece
 from toolpath.five_axis.surface_partition import parted
 from toolpath.passes.isoparametric_passes import IsoSurface, Laid
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
 
 NAME = "curvature_matched"
-LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind
+MIN_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind
 SHARE = 0.25  # of the chordal tolerance: how deep the nose may be, and what leaving out poses may add
 LAID_SHARE = 0.8  # of the scallop, given to the strips; chords and facets take the rest
 ALONG, UP = 65, 33  # places of a face at which it is asked what it serves
 TRIED = 9  # places each way at which the tool is tried before passes are laid out
-LEAST_FREE = 0.25  # of those that are wanted
+MIN_FREE = 0.25  # of those that are wanted
 OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
-LEAST_AREA = 4.0  # of the squared radius
-MOST_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses held against what stands round the pass
+MIN_AREA = 4.0  # of the squared radius
+MAX_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses held against what stands round the pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class _Lattice:
         far = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG)
         return cls(at, far <= spacing + size)
 
-    def serves(self, s: Strip) -> NDArray[np.bool_]:
+    def serves(self, s: MatchedStrip) -> NDArray[np.bool_]:
         """(ALONG,) bool, evenly along the unit square: whether a strip cuts something wanted there."""
         xi = np.linspace(0.0, 1.0, ALONG)
         low, high = np.interp(xi, s.xi, s.low), np.interp(xi, s.xi, s.high)
@@ -75,7 +75,7 @@ def suits(tool: ToolBody) -> bool:
     return tool.radius > tool.corner_radius + 1e-9
 
 
-def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData, settings: PlanSettings,
+def matched(faces: Sequence[Faces], target: FinishTarget, tool: ToolBody, cut: CutData, settings: PlanSettings,
             around: Surroundings, allowance: float, most: float) -> Runs:
     """The passes of a matched end for what of faces is wanted.
 
@@ -86,12 +86,12 @@ def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
     most      : s, what the usual passes take: passes that would take longer are not laid out
     """
     chord = SHARE * settings.chordal_tolerance
-    asked = Wanted(LAID_SHARE * settings.scallop_height, chord, LEAST_TILT, chord)
+    asked = MatchTolerances(LAID_SHARE * settings.scallop_height, chord, MIN_TILT, chord)
     ends = _Ends(tool, asked, around, allowance, settings.lift, cKDTree(target.points), target.spacing)
     found: list[tuple[str, Piece]] = []
     refused: list[str] = []
     for face in faces:
-        if face.area < LEAST_AREA * tool.radius**2:
+        if face.area < MIN_AREA * tool.radius**2:
             continue
         try:
             for laid in face.over_square:
@@ -116,7 +116,7 @@ class _Ends:
     """
 
     tool: ToolBody
-    asked: Wanted
+    asked: MatchTolerances
     around: Surroundings
     allowance: float
     lift: float
@@ -149,7 +149,7 @@ class _Ends:
         for part, lattice in found:
             if not self._free(lattice, part.iso):
                 continue
-            over = Matched.over(part.iso, self.grown, self.asked)
+            over = MatchedPasses.over(part.iso, self.grown, self.asked)
             for s in over.lay_out():
                 served = lattice.serves(s)
                 if served.any():
@@ -159,27 +159,27 @@ class _Ends:
     def _free(self, lattice: _Lattice, iso: IsoSurface) -> bool:
         """Whether the tool can stand on its end in enough of the places that are wanted."""
         rows, columns = (np.linspace(0, n - 1, TRIED).astype(int) for n in (UP, ALONG))
-        plan, free, none = Matched(iso, self.grown, self.asked, 0.0), 0, np.zeros(TRIED)
+        plan, free, none = MatchedPasses(iso, self.grown, self.asked, 0.0), 0, np.zeros(TRIED)
         for i in rows.tolist():
             at = plan.contacts(np.linspace(0.0, 1.0, TRIED), float(lattice.eta[i]))
             tilt = plan.nose.least_tilt(at, none, self.asked.depth, self.asked.least_tilt)
             tip, axis = plan.stands(at, np.nan_to_num(tilt), none)
             good = ~np.isnan(tilt) & lattice.wanted[i, columns]
             free += int((~self.blocked(tip[good], axis[good])).sum())
-        return free >= max(LEAST_FREE * float(lattice.wanted[np.ix_(rows, columns)].sum()), 1.0)
+        return free >= max(MIN_FREE * float(lattice.wanted[np.ix_(rows, columns)].sum()), 1.0)
 
-    def _walked(self, over: Matched, s: Strip, served: NDArray[np.bool_]) -> list[Piece]:
+    def _walked(self, over: MatchedPasses, s: MatchedStrip, served: NDArray[np.bool_]) -> list[Piece]:
         """The pieces of one pass where it is wanted and the tool is free."""
         xi = over.ways(s)
         tip, axis, normal = over.poses(s, xi)
         own = np.arange(len(xi), dtype=np.float64)
-        places = places_along(tip, axis, self.tool.stickout, min(LOOK * self.tool.radius, MOST_LOOK))
+        places = places_along(tip, axis, self.tool.stickout, min(LOOK * self.tool.radius, MAX_LOOK))
         whole, met = self._off(Piece(tip, axis, normal, self.tool.radius, on_end=True), places)
         here = np.clip(np.interp(places, own, xi), 0.0, 1.0)
         asked = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
         good = asked & ~met
         return [part.raised(self.allowance)
-                for part in whole.parts(good, places, LEAST_PIECE * self.tool.radius)]
+                for part in whole.parts(good, places, MIN_PIECE * self.tool.radius)]
 
     def _off(self, piece: Piece, places: F64) -> tuple[Piece, NDArray[np.bool_]]:
         """A pass as little off the surface as is free wherever standing off frees it, and (m,) bool where it is not.

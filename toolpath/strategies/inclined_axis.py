@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.axis_smoothing import Limits, Steered, steered
+from toolpath.five_axis.axis_smoothing import AxisLimits, Steered, steered
 from toolpath.five_axis.oriented_motion import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.five_axis.oriented_pass import lead_and_tilt, posed
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
-from toolpath.passes.pass_family import Target
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_settings import CutData, Leaned, PlanSettings
+from toolpath.plan_settings import CutData, PlanSettings, ToolLean
 from toolpath.poses import Axes, Blocked, places_along
 from toolpath.strategies.isoparametric import Stretch, course
 from zones.machinable_area import Form
@@ -34,13 +34,13 @@ from zones.reach.tip_field import TipField
 NAME = "inclined_axis"
 LAID_SHARE = 0.8  # of the scallop, given to the distance between passes; chords and facets take the rest
 CHORD_SHARE = 0.5  # of the chordal tolerance, given to locations; leaving out poses takes a quarter
-LIMITS = Limits(math.radians(45.0), math.radians(4.0))
+LIMITS = AxisLimits(math.radians(45.0), math.radians(4.0))
 WARY = 0.3  # mm that necks, shanks and holders keep more at stations, for what lies between these and what layers leave
 JOINED = math.radians(15.0)  # the most the axis turns from the end of a pass to the beginning of the next
 APART, ACROSS = 2.0, 0.5  # of the distance between passes, and of the radius: the tool stays down from one to the next
 LAYER = 0.6  # of what an end may take at once, a layer: cusps and lattice of the stock that one leaves take their share
 DIVIDED = 8.0  # of the radius: what is longer and cannot be walked as a whole is walked in halves
-MOST_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
+MAX_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
 TRIED = 12  # stretches of a group on which both sides of a tilt are tried
 
 
@@ -88,7 +88,7 @@ class _Nose:
             found = found.reversed()
         made = [Piece(tips, axis, axis, self.tool.radius, on_end=True).raised(self.allowance)
                 for tips, axis in found.pieces]
-        return [piece for piece in made if piece.length >= LEAST_PIECE * self.tool.radius], axes
+        return [piece for piece in made if piece.length >= MIN_PIECE * self.tool.radius], axes
 
     def free(self, s: Stretch, wanted: Axes) -> float:
         """How much of a stretch, mm, is free with the axes wanted.
@@ -103,7 +103,7 @@ class _Nose:
         return profile.length - sum(b - a for a, b in found.left)
 
 
-def asked(leaned: Leaned | None, form: Form, tool: ToolBody) -> Leaned | None:
+def asked(leaned: ToolLean | None, form: Form, tool: ToolBody) -> ToolLean | None:
     """How a tool is asked to lean on a zone of a form: not on level ones, nor without a corner; None if it is not."""
     if leaned is None or form is Form.LEVEL or tool.corner_radius <= 0.0:
         return None
@@ -112,8 +112,8 @@ def asked(leaned: Leaned | None, form: Form, tool: ToolBody) -> Leaned | None:
     return None if leaned.walls is None else replace(leaned, lead=0.0, tilt=leaned.walls)
 
 
-def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, settings: PlanSettings,
-        around: Surroundings, wary: Blocked, leaned: Leaned) -> Runs:
+def led(faces: Sequence[Faces], target: FinishTarget, field: TipField, cut: CutData, settings: PlanSettings,
+        around: Surroundings, wary: Blocked, leaned: ToolLean) -> Runs:
     """The passes of a nose that leans, for what of faces is wanted.
 
     faces  : of the zone, exact
@@ -149,12 +149,12 @@ def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, s
     return replace(runs, refused=tuple(dict.fromkeys([*refused, *runs.refused])))
 
 
-def _wanted(s: Stretch, leaned: Leaned, side: float) -> Axes:
+def _wanted(s: Stretch, leaned: ToolLean, side: float) -> Axes:
     """The axes wanted along a stretch: the nose leans forward the way it is walked, its tilt is on one side of it."""
     return lead_and_tilt(-leaned.lead if s.turned else leaned.lead, side * leaned.tilt)
 
 
-def _freer(group: Sequence[Stretch], nose: _Nose, leaned: Leaned, refused: list[str]) -> float:
+def _freer(group: Sequence[Stretch], nose: _Nose, leaned: ToolLean, refused: list[str]) -> float:
     """To which side, 1 or -1, a tilt leaves more of the passes free; what cannot be tried is told in ``refused``."""
     if leaned.tilt == 0.0:
         return 1.0
@@ -188,7 +188,7 @@ def _to_and_fro(pieces: Sequence[Piece], nose: _Nose, apart: float) -> list[Piec
     apart : mm, the most from one to the next
     """
     tool, out = nose.tool, list[Piece]()
-    look = min(LOOK * tool.radius, MOST_LOOK)
+    look = min(LOOK * tool.radius, MAX_LOOK)
     for piece in pieces:
         if out:
             tips, axes, away = (np.stack([getattr(out[-1], a)[-1], getattr(piece, a)[0]])

@@ -18,14 +18,14 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import Line, true_runs
 from toolpath.passes.cutter_locations import lifted
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import Flank, Laid
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from zones.reach.tip_field import TipField
 
 NAME = "isoparametric"
-LEAST_AREA = 1.0  # of r²: a face smaller than that is left to passes in between
+MIN_AREA = 1.0  # of r²: a face smaller than that is left to passes in between
 ALONG = 129  # places along a pass at which it is asked what it serves
 OVERRUN = 0.3  # radii of the corner a pass goes on past the last place it serves
 
@@ -46,17 +46,17 @@ class Stretch:
     high: float
     turned: bool
 
-    def stepped(self, radius: float, scallop: float, chord: float) -> tuple[Profile, F64]:
+    def stepped(self, radius: float, scallop: float, chord: float) -> tuple[PassProfile, F64]:
         """Its profile and the ways (n,) mm at which a ball is to be located; radius, scallop, chord : mm.
 
-        Raises GeometryError as ``Profile.of`` and ``steps`` do.
+        Raises GeometryError as ``PassProfile.of`` and ``steps`` do.
         """
-        profile = Profile.of(self.iso.curve(self.eta, self.low, self.high), chord, radius)
+        profile = PassProfile.of(self.iso.curve(self.eta, self.low, self.high), chord, radius)
         return profile, steps(profile, radius, chord, scallop)
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class FacePasses:
     """What passes over trimmed faces would be.
 
     groups    : stretches of each piece of a face, pass after pass; on a wall each pass is one, from the highest down
@@ -73,8 +73,8 @@ class Course:
     refused: tuple[str, ...]
 
 
-def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: float, chord: float,
-           flank: Flank | None) -> Course:
+def course(faces: Sequence[Faces], target: FinishTarget, field: TipField, scallop: float, chord: float,
+           flank: Flank | None) -> FacePasses:
     """The passes of faces as far as they serve what is to be cut.
 
     target  : Target; passes go where its points are
@@ -94,7 +94,7 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
     todo = list(faces)
     while todo:
         face = todo.pop(0)
-        if face.area < LEAST_AREA * radius**2:
+        if face.area < MIN_AREA * radius**2:
             continue
         try:
             passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), flank)
@@ -113,7 +113,7 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
             way += length
     if flank is not None:  # what stands above a pass would have to be taken off with it
         groups = [mine for _, mine in sorted(levels, key=lambda level: -level[0])]
-    return Course(tuple(groups), flank is not None, way, float(np.median(apart)) if apart else 0.0, tuple(refused))
+    return FacePasses(tuple(groups), flank is not None, way, float(np.median(apart)) if apart else 0.0, tuple(refused))
 
 
 def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
@@ -157,7 +157,7 @@ def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[flo
     return out
 
 
-def laid(planned: Course, field: TipField, scallop: float, chord: float,
+def laid(planned: FacePasses, field: TipField, scallop: float, chord: float,
          lift: float) -> tuple[list[list[Line]], tuple[str, ...]]:
     """The lines of a course, group by group, kept above the whole part, and why stretches have none, in words.
 

@@ -21,8 +21,8 @@ SAME_PLANE = 5e-4  # mm
 EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE
 FINER = 4  # times, of the lattice of one round to that of the next
 NEAR = 2.0  # steps of the planning lattice round what is left that lines are wanted in
-MOST_FINER = 2  # rounds on finer lattices
-MOST_NODES = 250_000  # of a window, where its lattice is finer than that of the planner
+MAX_FINER = 2  # rounds on finer lattices
+MAX_NODES = 250_000  # of a window, where its lattice is finer than that of the planner
 
 
 def plane_heights(tips: F64) -> list[float]:
@@ -88,7 +88,7 @@ def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField,
     for k in range(1, count + 1):
         mine = tips[group == k]
         lower, upper = mine[:, :2].min(axis=0) - cells * lat.step, mine[:, :2].max(axis=0) + cells * lat.step
-        step = max(lat.step / FINER**finer, float(np.sqrt(np.prod(upper - lower) / MOST_NODES)))
+        step = max(lat.step / FINER**finer, float(np.sqrt(np.prod(upper - lower) / MAX_NODES)))
         yield field.window(lower, upper, min(step, lat.step)), mine
 
 

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
 from toolpath.passes.dragged_path import pieces
-from toolpath.passes.pass_family import Dragged, Family, Pass, Promise, Target, strip_width
+from toolpath.passes.pass_family import Dragged, Family, FinishTarget, Pass, Promise, strip_width
 from zones.lattice import Lattice
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
@@ -26,7 +26,7 @@ SMOOTH = 1.0  # lattice steps, of the distance field
 class Rings(Family):
     """Rings at distances from the border of the tips."""
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise) -> None:
         tips = target.tips[:, :2]
         step = max(0.5 * target.spacing, 0.05 * dragged.cutter.radius)
         near = max(1, int(np.ceil(NEAR * target.spacing / step)))

@@ -12,7 +12,7 @@ from toolpath.lines import Line
 from toolpath.passes.contours import contour_pieces, dilated
 from zones.reach.tip_field import TipField
 
-LEAST_STEP = 0.02  # mm, levels are never closer
+MIN_STEP = 0.02  # mm, levels are never closer
 SHARP_DIP = 1.5e-4  # mm a sharp-cornered end goes below its level: rounding in the program must not lift it off
 
 
@@ -35,7 +35,7 @@ def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> f
     by_corner = math.sqrt(8.0 * cusp * tool.corner_radius) * np.sqrt(np.maximum(1.0 - nz * nz, 0.0))
     by_flank = cusp / np.maximum(nz, 1e-6)
     wanted = float(np.quantile(np.maximum(by_corner, by_flank), 0.05)) if len(nz) else step_down
-    return max(LEAST_STEP, min(wanted, step_down))
+    return max(MIN_STEP, min(wanted, step_down))
 
 
 def heights(top: float, bottom: float, step: float) -> F64:

@@ -14,19 +14,19 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.lines import Line, dense, pieces_where
 from toolpath.passes.contours import serving
 from toolpath.passes.feed_direction import best_direction
-from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Pass, Promise, Swath
 from toolpath.passes.side_step import lay_out
 from toolpath.plan_settings import Pattern
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach.tip_field import TipField
 
-LEAST_STEP = 0.02  # mm between passes of a round
+MIN_STEP = 0.02  # mm between passes of a round
 WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class PassLayout:
     """Passes of an area, and what is needed to put more between them.
 
     pattern   : ZIGZAG, ONE_WAY or SPIRAL
@@ -50,7 +50,7 @@ class Layout:
     def side_step(self) -> float:
         """Distance between neighbouring whole passes in plan that is usual, mm; of a single one, what it began with."""
         usual = float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
-        return max(usual, LEAST_STEP)
+        return max(usual, MIN_STEP)
 
     def near(self, failing: NDArray[np.int64]) -> list[Line]:
         """The lines as far as they serve some samples of the area (indices): a side step round their tips."""
@@ -73,20 +73,20 @@ class Layout:
         most = np.maximum(np.ceil(np.diff(at) / (1.5 * step)), 1.0)
         at = np.interp(np.arange(most.sum() + 1.0), np.concatenate([[0.0], np.cumsum(most)]), at)
         grid = np.interp(np.arange(parts * (len(at) - 1) + 1) / parts, np.arange(len(at)), at)
-        made = [swath.pass_at(t, max(width, LEAST_STEP))
+        made = [swath.pass_at(t, max(width, MIN_STEP))
                 for t, width in zip(grid[1::2].tolist(), (0.5 * (grid[2::2] - grid[:-1:2])).tolist(), strict=True)]
         return one_way(made, self.climb) if self.pattern is Pattern.ONE_WAY else to_and_fro(made)
 
 
-def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = Pattern.AUTO,
-         climb: bool = True) -> Layout:
+def laid(field: TipField, target: FinishTarget, promise: Promise, pattern: Pattern = Pattern.AUTO,
+         climb: bool = True) -> PassLayout:
     """Passes over an area: in the best direction of feed, or as a spiral.
 
     field   : TipField
     target  : Target, tips with the allowance of the field
     promise : Promise
     pattern : Pattern
-    climb   : as in ``Layout``
+    climb   : as in ``PassLayout``
     """
     dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance)
     swath = Swath(dragged, target, promise, best_direction(dragged, target, promise))
@@ -108,14 +108,14 @@ def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = P
     return replace(made[0], rejected=tuple((m.pattern, m.way) for m in made[1:]))
 
 
-def _of_a_piece(straight: Layout) -> bool:
+def _of_a_piece(straight: PassLayout) -> bool:
     """Whether an area is large and whole enough for a spiral to be tried."""
     return WORTH_A_SPIRAL <= len(straight.places) and len(straight.lines) <= 2 * len(straight.places)
 
 
-def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line], climb: bool) -> Layout:
+def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line], climb: bool) -> PassLayout:
     way = sum(line.length for line in lines) + swath.promise.link * len(lines)
-    return Layout(pattern, swath, np.array(places), tuple(lines), way, climb)
+    return PassLayout(pattern, swath, np.array(places), tuple(lines), way, climb)
 
 
 def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
