@@ -1,8 +1,8 @@
-"""A plan under way: what of it the acts that follow need, as plain values and arrays.
+"""A plan in progress: the state that its remaining acts need, as plain values and arrays.
 
-A plan is a row of acts, each the layers of a tool in a band, the finish of a zone in a band, or one more go at a zone.
-Between two of them all there is to know is here, and what can be laid out anew from the inputs of the plan is not:
-lattices, lines of passes, areas of layers.
+A plan is a sequence of acts: the layers of a tool in a band, the finish of a zone in a band, or a repeated finish of a
+zone. A checkpoint holds all state between two acts. It leaves out whatever follows from the inputs of the plan, such as
+lattices, lines of passes and areas of layers.
 """
 
 from __future__ import annotations
@@ -23,24 +23,32 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class PackedLines:
-    """Lines one behind the other: points (n, 3) float64, mm, and how many each has, (k,) int64."""
+    """Several lines in one array.
+
+    points : (n, 3) float64, mm, access frame, line after line
+    counts : (k,) int64, count of points of each line
+    """
 
     points: F64
     counts: NDArray[np.int64]
 
     @classmethod
     def of(cls, lines: Sequence[F64]) -> PackedLines:
-        """Lines (n, 3), mm, joined."""
+        """Joins lines, each (n, 3) float64, mm, access frame, tips.
+
+        lines : sequence of arrays
+        """
         return cls(np.concatenate([np.zeros((0, 3)), *lines]), np.array([len(line) for line in lines], np.int64))
 
     def lines(self) -> list[F64]:
-        """The lines that were joined."""
+        """The lines that were joined, each (n, 3) float64, mm, access frame."""
         return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
 
 @dataclass(frozen=True, eq=False)
 class FinishSnapshot:
-    """A ``Finish``: residual (n,) mm and met (n,) bool at its checks, and of its strategy all but the lines."""
+    """State of a ``Finish``: residual (n,) float64, mm, and met (n,) bool at its checks, and its strategy without the
+    lines."""
 
     zone: str
     residual: F64
@@ -58,8 +66,13 @@ class FinishSnapshot:
 
 @dataclass(frozen=True, eq=False)
 class LayersSnapshot:
-    """The layers of a tool: how high stock stood when they were laid out, what they have come to, mm, and how many
-    are left."""
+    """State of the layers of a tool.
+
+    top   : mm, height of the stock when the layers were laid out
+    swept : mm, height at which all walls were last followed
+    above : mm, height of the last layer
+    left  : count of layers to come
+    """
 
     top: float
     swept: float
@@ -69,7 +82,8 @@ class LayersSnapshot:
 
 @dataclass(frozen=True, eq=False)
 class ToolSnapshot:
-    """What a tool has walked and cut; its layers and the ids of their workingsteps; its zones that have been begun."""
+    """State of a tool: moves walked and cut, its layers with the ids of their workingsteps, and the zones it has
+    begun."""
 
     walked: PackedLines
     depths: PackedLines
@@ -80,7 +94,7 @@ class ToolSnapshot:
 
 @dataclass(frozen=True, eq=False)
 class PlanSnapshot:
-    """A plan after so many acts."""
+    """State of a plan after so many acts."""
 
     acts: int
     steps: tuple[Workingstep, ...]
@@ -89,20 +103,21 @@ class PlanSnapshot:
 
 
 class CheckpointKeeper:
-    """Who is told of a plan under way, and may know it from an attempt before; this one keeps nothing."""
+    """Keeps a plan in progress and may restore it from an earlier attempt; this one keeps nothing."""
 
     def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
-        """What ``use`` makes of the plan that is kept; None where there is none, or one that it makes nothing of.
+        """Result of ``use`` for the kept plan; None where none is kept, or where ``use`` cannot restore it.
 
-        ``use`` raises AttributeError, IndexError, KeyError, TypeError or ValueError then, and has changed nothing.
+        ``use`` then raises AttributeError, IndexError, KeyError, TypeError or ValueError and has changed nothing.
         """
         del use
         return None
 
-    def done(self, now: Callable[[], PlanSnapshot]) -> None:
-        """An act is over; ``now`` is asked where this is worth keeping."""
+    def done(self, snapshot: Callable[[], PlanSnapshot]) -> None:
+        """Called after each act; ``snapshot`` is evaluated where keeping is worthwhile."""
 
 
 NOTHING = CheckpointKeeper()
 
-__all__ = ["NOTHING", "FinishSnapshot", "CheckpointKeeper", "LayersSnapshot", "PlanSnapshot", "StockSnapshot", "ToolSnapshot", "PackedLines"]
+__all__ = ["NOTHING", "CheckpointKeeper", "FinishSnapshot", "LayersSnapshot", "PackedLines", "PlanSnapshot",
+           "StockSnapshot", "ToolSnapshot"]

@@ -1,7 +1,7 @@
-"""What the planner hands on: trajectories of the tool tip and the workingsteps made of them.
+"""Output of the planner: trajectories of the tool tip and the workingsteps made of them.
 
-Plain values, tool tip, frame of the access, mm. Rapids move Z alone, or XY alone at the clearance height; the planner
-guarantees it and nothing downstream reorders.
+Plain values of the tool tip in mm, access frame. Rapids move Z alone, or XY alone at the clearance height. The planner
+guarantees that, and nothing downstream reorders them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from toolpath.tool_deflection import DeflectionEstimate
 
 
 class TrajectoryKind(StrEnum):
-    """What a trajectory is for; the STEP-NC trajectory types follow from it."""
+    """Purpose of a trajectory; the STEP-NC trajectory types follow from it [ISO14649-10]."""
 
     RAPID = "rapid"
     APPROACH = "approach"
@@ -51,11 +51,11 @@ class CutDirection(StrEnum):
 
 @dataclass(frozen=True)
 class ArcSpan:
-    """A stretch of a trajectory on a circle as seen along Z; where Z changes it goes evenly with the angle, a helix.
+    """A stretch of a trajectory on a circle seen along Z; where Z changes, it changes evenly with the angle, a helix.
 
-    first, last : rows of the points it begins and ends at
-    centre      : mm, X and Y
-    left        : counter-clockwise seen from above, as G3 goes
+    first, last : index of the points where it begins and ends
+    centre      : mm, X and Y, access frame
+    left        : counter-clockwise seen from above, as G3
     """
 
     first: int
@@ -68,12 +68,12 @@ class ArcSpan:
 class Trajectory:
     """One polyline of the tool tip.
 
-    motion : what it is for; RAPID is a G0, everything else a G1 at ``feed``
-    points : (n, 3) float64, mm, n >= 2; the first point equals the last of the trajectory before it
+    motion : TrajectoryKind; RAPID is a G0, everything else a G1 at ``feed``
+    points : (n, 3) float64, mm, access frame, n >= 2; the first point equals the last of the trajectory before it
     feed   : mm/min; ignored for a rapid
-    axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points all the way
-    arcs   : stretches that may be gone along as G2 or G3, in order, apart but for their ends; the points between those
-             of an arc lie on it
+    axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points
+    arcs   : stretches that G2 or G3 can follow, in order, separate but for their ends; the points between those of an
+             arc lie on it
     """
 
     motion: TrajectoryKind
@@ -84,17 +84,17 @@ class Trajectory:
 
     @property
     def length(self) -> float:
-        """mm."""
+        """Length, mm."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
 def seconds_of(trajectories: Sequence[Trajectory], rates: Rates) -> float:
-    """Seconds of trajectories run one behind the other; where rapids and feed moves meet the control stands still."""
+    """Time of trajectories in sequence, s; the control stops where rapids and feed moves meet."""
     return float(trajectory_seconds(trajectories, rates).sum())
 
 
 def trajectory_seconds(trajectories: Sequence[Trajectory], rates: Rates) -> F64:
-    """(k,) float64, s, of each of k trajectories run one behind the other; see ``seconds_of``."""
+    """Time of each of k trajectories in sequence, (k,) float64, s; see ``seconds_of``."""
     if not trajectories:
         return np.zeros(0)
     count = [len(t.points) - 1 for t in trajectories]
@@ -118,9 +118,9 @@ class Workingstep:
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     access    : id of the access in whose frame all this is; '' where the plan has one frame
-    rates     : what the machine does, for times
-    bend      : what its cuts bend the tool by, as estimated; None where nobody knows
-    fresh     : the program asks for a fresh cutter before it
+    rates     : speeds and accelerations of the machine, for times
+    bend      : DeflectionEstimate of its cuts; None where it is unknown
+    fresh     : the program requests a fresh cutter before it
     cut_direction : CutDirection of its passes
     """
 

@@ -110,7 +110,7 @@ def upright(asked: ToolLean | None, zones: Sequence[ZonePlan], steps: Sequence[W
     out = []
     for z in zones:
         mine = [s for s in steps if s.zone == z.zone.id]
-        if inclined_axis.asked(asked, z.zone.form, z.zone.tool) is None or not mine:  # where layers leave nothing there are none
+        if inclined_axis.requested_lean(asked, z.zone.form, z.zone.tool) is None or not mine:  # layers left nothing
             continue
         way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is TrajectoryKind.CUT)
         told = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]

@@ -1,4 +1,4 @@
-"""The direction of feed that takes the least way over a surface."""
+"""The direction of feed with the shortest way over a surface."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toolpath.passes.side_step import lay_out
 
 COARSER = 3.0  # passes of the search lie about this many times farther apart than those of the plan
 CANDIDATES = tuple(math.radians(a) for a in range(0, 180, 30))
-FEWEST = 60  # samples a search is worth
+FEWEST = 60  # samples that make a search worthwhile
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Candidate:
 
 def searched(dragged: Dragged, target: FinishTarget, promise: Promise,
              angles: Sequence[float] = CANDIDATES) -> list[Candidate]:
-    """Coarse layouts in several directions, the least way first.
+    """Coarse layouts in several directions, the shortest first.
 
-    What is left grows with the square of the distance, so the search promises ``COARSER`` squared times the scallop:
-    the order of directions stays, and it takes a small part of the time. Of equal ways the first angle stands first.
+    Scallops grow with the square of the side step, so the search allows ``COARSER`` squared times the scallop. That
+    keeps the order of directions at a small part of the time. Among equal ways the first angle wins.
     """
     if len(target.points) < FEWEST:
         return [Candidate(angles[0], 0, 0, 0.0)]
@@ -49,5 +49,5 @@ def searched(dragged: Dragged, target: FinishTarget, promise: Promise,
 
 
 def best_direction(dragged: Dragged, target: FinishTarget, promise: Promise) -> float:
-    """Angle of the feed from x with the least way, rad."""
+    """Angle of the feed from x with the shortest way, rad."""
     return searched(dragged, target, promise)[0].angle

@@ -1,4 +1,4 @@
-"""Single touches: what no pass got to although the tool can, place by place."""
+"""Single touches at places that no pass has finished although the tool reaches them."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from toolpath.lines import Line
 from toolpath.passes.contours import moves_free
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-MAX_PLACES = 400  # places; a zone with more has another problem than a missed spot
+MAX_PLACES = 400  # a zone with more is not just missing a few spots
 APART = 0.1  # mm, places nearer than this are one
 SHORT = 0.02  # mm, length of a touch
 
 
 def touches(field: TipField, tips: F64) -> list[Line]:
-    """Short level moves that end on tips which touch what is left.
+    """Short level moves that end on tips which touch the residual.
 
     field : TipField
-    tips  : (n, 3) float64, mm, admissible
+    tips  : (n, 3) float64, mm, access frame, admissible
 
     Returns
     -------

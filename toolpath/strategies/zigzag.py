@@ -1,4 +1,4 @@
-"""Passes dragged over shallow area: straight ones to and fro or one way, or a spiral."""
+"""Passes dragged over shallow area: straight ones back and forth or one way, or a spiral."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach.tip_field import TipField
 
 MIN_STEP = 0.02  # mm between passes of a round
-WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried
+WORTH_A_SPIRAL = 8  # least straight passes at which a spiral is tried
 
 
 @dataclass(frozen=True, eq=False)
 class PassLayout:
-    """Passes of an area, and what is needed to put more between them.
+    """Passes of an area, and the data to add more between them.
 
     pattern   : ZIGZAG, ONE_WAY or SPIRAL
     swath     : the area along the feed
     places    : (k,) float64, mm, where whole passes lie; distance from the border for a spiral
     lines     : in order of machining
-    way       : mm, with what links cost
-    climb     : one way and spiral have the stock on the right, else on the left; to and fro has it on either side
-    rejected  : patterns that would be more way, with it
+    way       : mm, with the cost of links
+    climb     : one way and spiral have the stock on the right, else on the left; zigzag has it on either side
+    rejected  : longer patterns, with their way
     """
 
     pattern: Pattern
@@ -48,12 +48,15 @@ class PassLayout:
 
     @property
     def side_step(self) -> float:
-        """Distance between neighbouring whole passes in plan that is usual, mm; of a single one, what it began with."""
+        """Median distance between neighbouring whole passes in plan, mm; of a single one, the first guess."""
         usual = float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
         return max(usual, MIN_STEP)
 
     def near(self, failing: NDArray[np.int64]) -> list[Line]:
-        """The lines as far as they serve some samples of the area (indices): a side step round their tips."""
+        """The parts of the lines that serve some samples of the area: a side step round their tips.
+
+        failing : (n,) int64, index of the samples
+        """
         target, promise = self.swath.target, self.swath.promise
         return serving(self.lines, target.tips[failing, :2], self.side_step, target.spacing, promise.overrun,
                        promise.link)
@@ -61,7 +64,7 @@ class PassLayout:
     def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
         """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.
 
-        failing : indices of the samples of the area
+        failing : (n,) int64, index of the samples
         """
         swath, step, parts = self.swath.subset(failing), self.side_step, 2 ** k
         if not len(swath.t):
@@ -130,7 +133,7 @@ def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
 
 
 def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
-    """Passes as lines in order across, all walked the same way: against the feed for climb milling, else along it.
+    """Passes as lines in order across, all in one direction: against the feed for climb milling, else along it.
 
     The next pass, where the stock is, lies to the left of the feed.
     """
@@ -139,25 +142,26 @@ def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
 
 
 def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float, wall: bool = False) -> list[Line]:
-    """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
-
-    A descent is worked off only by going sideways, level or up: over a piece with a length s of such way each layer
-    after the first adds what ``slope`` times s allows. So a place where stock stands h above the pass is taken in n
-    equal layers, n the least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes
-    downhill for most of its way is walked uphill but for the pass itself where that needs fewer, on whichever side the
-    stock then is.
+    """A pass, preceded by raised copies of itself where going downhill would remove more than a skin at once.
 
     line  : Line; level ones are returned alone
     stock : StockMap as it stands
-    skin  : mm, the most that is taken off in a descent
-    slope : mm per mm, of the ramp down which the tool may go for any length
-    wall  : beside a wall, where what stands at the side of a tool is cut by its flank: only what is under its end
-            counts, and only where the pass goes down
+    skin  : mm, largest depth removed in a descent
+    slope : mm per mm, of the ramp that the tool may descend for any length
+    wall  : beside a wall the flank cuts stock at the side of the tool: only stock under the end counts, and only where
+            the pass goes down
 
     Returns
     -------
     list of Line
         The layers of each piece from the top down; the pass itself is last.
+
+    Notes
+    -----
+    Only sideways, level or rising moves work off a descent. Over a piece with a length s of such way each layer after
+    the first adds ``slope`` times s. So a place where stock stands h above the pass is cut in n equal layers, n the
+    least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes downhill for most
+    of its way is cut uphill but for the pass itself where that needs fewer layers, on whichever side the stock then is.
     """
     rise = np.ptp(line.points[:, 2])
     if rise < 1e-6:

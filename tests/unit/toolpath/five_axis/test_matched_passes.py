@@ -160,7 +160,7 @@ def test_a_tilt_below_the_least_enters_and_one_above_does_not():
 
 
 def test_where_no_tilt_is_enough_it_is_said():
-    with pytest.raises(GeometryError, match="no tilt keeps its end out") as found:
+    with pytest.raises(GeometryError, match="no tilt keeps the end of the tool out") as found:
         MatchedPasses.over(passes_along_y(bowl(5.0, 5.0)), tool(12.0, 0.0), MatchTolerances(0.005, 0.0, 0.0, 0.0003))
     assert found.value.code == "bad_pass" and "T1" in found.value.subjects
 

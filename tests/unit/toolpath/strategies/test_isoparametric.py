@@ -151,7 +151,7 @@ def test_a_sharp_end_gets_none():
     ((0, 3), (10.4, 10.0), "waterline", "more samples are left above the scallop"),
     ((2, 2), (10.4, 10.0), "isoparametric", "takes longer at equal scallop, s"),
     ((0, 0), (10.0, 10.4), "waterline", "takes longer at equal scallop, s"),
-    ((4, 4), (None, 10.4), "isoparametric", "no pass is walked")])
+    ((4, 4), (None, 10.4), "isoparametric", "no pass can be cut")])
 def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_faster(left, seconds, kept, reason):
     ways = [Line(np.array([[0.0, y, 1.0], [5.0, y, 1.0]]), False) for y in (1.0, 2.0)]
 
