@@ -19,7 +19,7 @@ from service.serialization import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.toolpath.strategies.test_isoparametric import bowl
 from toolpath.passes.pass_family import FinishTarget
-from toolpath.plan_checkpoint import CheckpointKeeper, PlanSnapshot, PackedLines
+from toolpath.plan_checkpoint import CheckpointKeeper, PackedLines, PlanSnapshot
 from toolpath.plan_settings import CutData
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
