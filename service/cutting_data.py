@@ -158,9 +158,9 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
     limit = setup.quality.scallop_height_mm if climbs else 0.5 * setup.quality.gouge_tolerance_mm
     if depth is not None:
         limit = min(LAYER_LIMIT, 0.5 * left_by_layers(depth, lattice_step(body)))
-    return DeflectionModel(body, compliance(body), material.specific_cutting_force_n_mm2, material.chip_thickness_exponent,
-                   limit, tool.flutes, data.spindle_rpm, depth is None, tool.feed_mm_min is not None,
-                   tool.plunge_feed_mm_min is not None)
+    return DeflectionModel(body, compliance(body), material.specific_cutting_force_n_mm2,
+                           material.chip_thickness_exponent, limit, tool.flutes, data.spindle_rpm, depth is None,
+                           tool.feed_mm_min is not None, tool.plunge_feed_mm_min is not None)
 
 
 def rates_of(setup: Setup) -> Rates:

@@ -45,7 +45,8 @@ def cutting(*ways, **changes) -> Workplan:
         a, b = way[0], way[-1]
         top = [(a[0], a[1], CLEAR), (a[0], a[1], a[2] + 1.0)]
         moves = (line(TrajectoryKind.RAPID, *top), line(TrajectoryKind.APPROACH, top[1], tuple(a), feed=240.0),
-                 Trajectory(TrajectoryKind.CUT, way, 600.0), line(TrajectoryKind.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
+                 Trajectory(TrajectoryKind.CUT, way, 600.0),
+                 line(TrajectoryKind.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
                  line(TrajectoryKind.RAPID, (b[0], b[1], b[2] + 1.0), (b[0], b[1], CLEAR)))
         steps.append(replace(step(k, BALL, "waterline", trajectories=moves), chordal_tolerance=HALF))
     return plan(*steps, labels={"order": "4711"}, comments=(), **changes)

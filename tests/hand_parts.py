@@ -292,7 +292,8 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True,
                             cut_direction, pattern)
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
-    checks = [FinishTarget(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
+    checks = [FinishTarget(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5)
+              for z in zones]
     plan = plan_job(zones, checks, fields, cut, stock, settings,
                     trimmed={z.id: [f for f in trimmed if f.face in z.faces] for z in zones})
     return Case(part, tree, samples, view, fields, zones, settings, before, plan)

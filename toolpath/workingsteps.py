@@ -114,7 +114,8 @@ class Workingstep:
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
     operation : 'roughing', 'semi_finishing' or 'finishing'
-    strategy  : 'depth_layers', 'waterline', 'planar_floor', 'zigzag', 'one_way', 'spiral', 'isoparametric', 'flank', 'curvature_matched', 'inclined_axis'
+    strategy  : 'depth_layers', 'waterline', 'planar_floor', 'zigzag', 'one_way', 'spiral', 'isoparametric', 'flank',
+                'curvature_matched', 'inclined_axis'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     access    : id of the access in whose frame all this is; '' where the plan has one frame

@@ -315,7 +315,8 @@ class _Aim:
             line, at = self._line(parts, at)
             toolpath = self._toolpath(f"{step.id} {trajectory.motion.value} {place}", trajectory, line, curve.axes)
             self.file.add(f"MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP('','',#{operation},#{toolpath},{place}.)")
-            if trajectory.motion is not TrajectoryKind.RAPID and written_feed(trajectory.feed) != written_feed(step.feed):
+            if (trajectory.motion is not TrajectoryKind.RAPID
+                    and written_feed(trajectory.feed) != written_feed(step.feed)):
                 technology = self._technology(step.spindle_rpm, trajectory.feed)
                 self.file.add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{toolpath},#{technology})")
 

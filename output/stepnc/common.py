@@ -153,7 +153,8 @@ def to_and_fro(step: Workingstep) -> bool:
     others where they may go either way."""
     if step.strategy != "isoparametric":
         return step.strategy == "zigzag" or step.cut_direction.both_ways
-    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
+    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories
+                     if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
     return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 
 

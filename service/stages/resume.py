@@ -66,7 +66,8 @@ class Resumed:
     def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[FinishTarget], samples: SurfaceSamples) -> None:
         self.kept, self.ready, self.checks, self.samples = kept, ready, checks, samples
 
-    def side(self, view: View, before: Sequence[Side], found: Counterexamples, make: Callable[[CheckpointKeeper], Side]) -> Side:
+    def side(self, view: View, before: Sequence[Side], found: Counterexamples,
+             make: Callable[[CheckpointKeeper], Side]) -> Side:
         """The plan of an access: the one that is kept, else what ``make`` plans, which is kept then.
 
         before : the sides planned before it; found : what proofs found along it
@@ -154,7 +155,8 @@ class _UnderWay(CheckpointKeeper):
 
     def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
         """See ``CheckpointKeeper``; told is how many workingsteps were made."""
-        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)), itemgetter(1))
+        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)),
+                                   itemgetter(1))
         return None if found is None else found[0]
 
     def done(self, now: Callable[[], PlanSnapshot]) -> None:

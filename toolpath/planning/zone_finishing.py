@@ -391,7 +391,8 @@ class Finish:
     def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
         """Cut lines of round k and measure them."""
         tool, settings = self.field.tool, self.settings
-        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if self.strategy.name == "planar_floor" else None
+        floor = self.strategy.name == "planar_floor"
+        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if floor else None
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:

@@ -132,7 +132,8 @@ def test_what_layers_leave_is_what_the_planner_leaves():
 def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
     far, near = DeflectionEstimate(0.4, 0.05, 0.2, 0.12), DeflectionEstimate(0.06, 0.05, 0.8, 0.05)
     steps = [replace(step(1, SLIM, "depth_layers"), bend=near), replace(step(2, SLIM, "depth_layers"), bend=far),
-             replace(step(3, SLIM, "waterline"), bend=DeflectionEstimate(0.004, 0.005, 1.0, 0.004)), step(4, SLIM, "zigzag"),
+             replace(step(3, SLIM, "waterline"), bend=DeflectionEstimate(0.004, 0.005, 1.0, 0.004)),
+             step(4, SLIM, "zigzag"),
              replace(step(5, SLIM, "waterline"), bend=DeflectionEstimate(0.02, 0.005, 1.0, 0.02, fixed=True))]
     told = bent(steps)
     assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]

@@ -104,6 +104,7 @@ def test_bytes_that_are_not_ours_are_refused(data):
 def planned_step():
     arcs = (ArcSpan(0, 2, (0.5, 0.5), True),)
     cut = Trajectory(TrajectoryKind.CUT, np.array([[0.0, 0, 1], [1, 0, 1], [1, 1, 1.5]]), 300.0, arcs=arcs)
-    leaning = Trajectory(TrajectoryKind.CONNECT, cut.points[1:], np.float64(20.5), np.array([[0.0, 0, 1], [0, 0.6, 0.8]]))
-    return Workingstep("S01", "S01 Z1", "Z1", (3, 4), "finishing", "waterline", BALL, 8000.0, 300.0, np.float64(0.3), 0.01,
-                       0.002, (cut, leaning), np.zeros((5, 2)), 4.0, 1.0)
+    leaning = Trajectory(TrajectoryKind.CONNECT, cut.points[1:], np.float64(20.5),
+                         np.array([[0.0, 0, 1], [0, 0.6, 0.8]]))
+    return Workingstep("S01", "S01 Z1", "Z1", (3, 4), "finishing", "waterline", BALL, 8000.0, 300.0, np.float64(0.3),
+                       0.01, 0.002, (cut, leaning), np.zeros((5, 2)), 4.0, 1.0)

@@ -240,9 +240,11 @@ def test_strings_and_reals():
 def test_rejects(write):
     cut = line(TrajectoryKind.CUT, (0, 0, 0), (1, 0, 0), feed=100)
     bad = {
-        "slanted_rapid": plan(step(1, BALL, "waterline", trajectories=(line(TrajectoryKind.RAPID, (0, 0, 0), (1, 0, 1)),))),
+        "slanted_rapid": plan(step(1, BALL, "waterline",
+                                   trajectories=(line(TrajectoryKind.RAPID, (0, 0, 0), (1, 0, 1)),))),
         "gap_in_path": plan(step(1, BALL, "waterline", trajectories=(cut, cut))),
-        "empty_step": plan(step(1, BALL, "waterline", trajectories=(line(TrajectoryKind.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
+        "empty_step": plan(step(1, BALL, "waterline",
+                                trajectories=(line(TrajectoryKind.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
         "bad_stock": plan(stock=StockBox(np.zeros(3), np.array([1.0, 1.0, 0.0]))),
         "id_twice": plan(step(1, BALL, "waterline"), step(1, BALL, "planar_floor")),
     }

@@ -73,7 +73,8 @@ def test_strips_as_wide_as_the_tool_are_cut_to_the_ends_of_the_face(surface, lea
 
 
 def test_a_level_plane_without_a_least_tilt_takes_a_strip_a_tool_wide():
-    made = MatchedPasses.over(passes_along_y(bowl(1e9, 1e9)), tool(12.0, 0.0), MatchTolerances(0.0045, 0.001, 0.0, 0.0003))
+    made = MatchedPasses.over(passes_along_y(bowl(1e9, 1e9)), tool(12.0, 0.0),
+                              MatchTolerances(0.0045, 0.001, 0.0, 0.0003))
     assert len(made.lay_out()) == 4
 
 
@@ -96,7 +97,8 @@ def test_a_place_whose_height_is_not_known_counts_as_one_the_nose_enters(monkeyp
 def test_few_passes_where_the_nose_matches():
     """On the hollow of 60 by 150 mm a flat of 12 mm cuts strips of 6.6 mm, a ball of 12 mm such of 0.5 mm."""
     body = tool(12.0, 0.0)
-    strips = MatchedPasses.over(passes_along_y(bowl(60.0, 150.0)), body, MatchTolerances(0.005, 0.0, 0.0, 0.0003)).lay_out()
+    strips = MatchedPasses.over(passes_along_y(bowl(60.0, 150.0)), body,
+                                MatchTolerances(0.005, 0.0, 0.0, 0.0003)).lay_out()
     width = strip_width(matching_tilt(np.array([1 / 60]), body), np.array([1 / 60]), np.array([1 / 150]), body, 0.005)
     assert len(strips) <= np.ceil(2 * HALF * 1.02 / (0.9 * width[0]))
 

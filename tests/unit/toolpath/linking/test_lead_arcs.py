@@ -114,7 +114,8 @@ def test_an_arc_is_gone_once():
     link = beside_the_wall(0.2)
     assert link.add(along(6.0)) and link.add(Line(np.array([[6.0, 15.999, 6.0], [20.0, 15.998, 6.0]]), False))
     assert link.add(Line(np.array([[9.0, 15.998, 6.0], [24.0, 15.999, 6.0]]), False))
-    arcs = [t.points for t in link.trajectories if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT) and len(t.points) >= 5]
+    arcs = [t.points for t in link.trajectories if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT)
+            and len(t.points) >= 5]
     moves = [tuple(np.round(np.hstack([a, b]), 4)) for arc in arcs for a, b in zip(arc[:-1], arc[1:], strict=True)]
     assert len(arcs) >= 4 and len(set(moves)) == len(moves)
 
@@ -123,7 +124,8 @@ def test_in_a_slot_with_no_room_there_are_no_arcs_and_the_pass_is_walked():
     link = beside_the_wall(0.2, slot=4.3)
     assert link.add(along(6.0))
     assert link.passes == 1
-    assert all(len(t.points) < 5 for t in link.trajectories if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT))
+    assert all(len(t.points) < 5 for t in link.trajectories
+               if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT))
 
 
 def test_level_after_level_the_tool_goes_down_off_the_wall():

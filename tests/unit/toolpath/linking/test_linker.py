@@ -66,7 +66,8 @@ def motions(link):
 def test_in_air_the_tool_comes_straight_down():
     link = linker(top=-1.0)
     assert link.add(straight(5, 20, 10, 1.0))
-    assert motions(link) == [TrajectoryKind.RAPID, TrajectoryKind.RAPID, TrajectoryKind.APPROACH, TrajectoryKind.APPROACH, TrajectoryKind.CUT]
+    assert motions(link) == [TrajectoryKind.RAPID, TrajectoryKind.RAPID, TrajectoryKind.APPROACH,
+                             TrajectoryKind.APPROACH, TrajectoryKind.CUT]
     assert link.trajectories[-1].points.tolist() == [[5, 10, 1], [20, 10, 1]]
     feeds = [t.feed for t in link.trajectories if t.motion is TrajectoryKind.APPROACH]
     assert feeds == [3000, 800]  # nothing stands where it comes down
@@ -360,7 +361,8 @@ def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     for link in (slow, fast):
         stand(link.stock, 15.0, 1.5)
         assert link.add(straight(3, 27, 10, 1.0))
-    ways = [[t for t in link.trajectories if t.motion in (TrajectoryKind.CUT, TrajectoryKind.CONNECT)] for link in (slow, fast)]
+    ways = [[t for t in link.trajectories if t.motion in (TrajectoryKind.CUT, TrajectoryKind.CONNECT)]
+            for link in (slow, fast)]
     assert [t.motion for t in ways[1]] == [TrajectoryKind.CONNECT, TrajectoryKind.CUT]
     assert [t.feed for t in ways[1]] == [3000, 800]
     np.testing.assert_allclose(np.vstack([ways[1][0].points, ways[1][1].points[1:]])[[0, -1]], ways[0][0].points)
@@ -498,7 +500,8 @@ def test_in_a_gap_it_only_just_fits_a_tool_comes_down_where_it_has_been():
     assert link.add(loop(0.8, 1.0))
     new = link.trajectories[before:]
     cuts = [t.points for t in new if t.motion is TrajectoryKind.CUT]
-    assert sum(t.length for t in new if t.motion is TrajectoryKind.CUT) < 15.0 * loop(0.8, 1.0).length  # 30 down the ramp
+    # 30 down the ramp
+    assert sum(t.length for t in new if t.motion is TrajectoryKind.CUT) < 15.0 * loop(0.8, 1.0).length
     heights = [8.0, *(float(p[-1, 2]) for p in cuts)]  # and no more than a layer and a half at once
     assert heights[-1] == 1.0 and max(np.diff(heights[::-1])) <= 1.5
     link.keep_down([])
@@ -519,7 +522,8 @@ def test_the_last_bit_of_a_way_down_is_slow_where_something_stands_there():
         link = linker(tool(4.0, 0.0), top=1.0)
         link.stock.become(StockMap(link.stock.lattice, link.stock.top, link.stock.cover + skin, link.stock.part))
         link.add(straight(5, 25, 10, 1.0))
-        down = [t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and t.points[-1, 2] < t.points[0, 2]]
+        down = [t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH
+                and t.points[-1, 2] < t.points[0, 2]]
         assert down[-1].feed == feed
 
 

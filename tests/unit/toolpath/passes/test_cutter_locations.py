@@ -73,7 +73,8 @@ def test_on_level_places_of_a_pass_the_end_stands_on_the_side_it_has_beside_them
 
 
 def level_pass(length=30.0):
-    return PassProfile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))),
+    return PassProfile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]),
+                                     np.tile([0.0, 0.0, 1.0], (len(t), 1))),
                       0.001, 3.0)
 
 

@@ -52,7 +52,8 @@ def replanned(c: Case, stock: StockMap | None = None, checks=None, cut=None, pro
     work = StockMap(before.lattice, before.top.copy(), before.cover.copy(), before.part)
     settings: PlanSettings = replace(c.settings, **changes)
     cut = cut or {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
-    checks = checks or [FinishTarget(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
+    checks = checks or [FinishTarget(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2)
+                        for z in c.zones]
     plan = plan_job(c.zones, checks, c.fields, cut, work, settings, progress)
     return replace(c, settings=settings, stock_before=before, plan=plan)
 
@@ -103,7 +104,8 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
     first = fresh()
     (step,) = first.walk("S05")
     assert not len(first.plan().left) and first.plan().step == "S05"
-    part = replace(step, id="S02", strategy="depth_layers", trajectories=step.trajectories[:len(step.trajectories) // 2])
+    part = replace(step, id="S02", strategy="depth_layers",
+                   trajectories=step.trajectories[:len(step.trajectories) // 2])
     half, whole = fresh(), fresh()
     half.measure(part)
     assert half.walk("S06") and half.plan().strategy == "waterline" and half.plan().step == "S06"
@@ -220,7 +222,8 @@ def test_every_step_carries_the_data_of_its_own_tool():
         feeds = {m: {t.feed for t in s.trajectories if t.motion is m} for m in TrajectoryKind}
         assert feeds[TrajectoryKind.CUT] == {cut.feed} and feeds[TrajectoryKind.CONNECT] <= {cut.feed, cut.link_feed}
         assert feeds[TrajectoryKind.APPROACH] <= {cut.plunge_feed, cut.feed, cut.link_feed}
-        assert {cut.link_feed} <= feeds[TrajectoryKind.LIFT] <= {cut.feed, cut.link_feed}  # off a wall on an arc, then up
+        # off a wall on an arc, then up
+        assert {cut.link_feed} <= feeds[TrajectoryKind.LIFT] <= {cut.feed, cut.link_feed}
         assert feeds[TrajectoryKind.RAPID] == {0.0}
         # a descent ends at the plunge feed, or where nothing stands at that of the cut; a way in level may be a link
         for a, b in zip(s.trajectories[:-1], s.trajectories[1:], strict=True):
@@ -255,7 +258,8 @@ def test_finishing_switched_off_leaves_the_layers_alone():
 def test_layers_alone_take_walls_to_size_as_they_go_down():
     """What a finish would take off goes in every layer, so that a wall is never cut free before it is to size."""
     plans = [replanned(case("walls"), finishing=finishing).plan for finishing in (True, False)]
-    way = [sum(w.length for s in p.steps if s.operation == "roughing" for w in s.trajectories if w.motion is TrajectoryKind.CUT)
+    way = [sum(w.length for s in p.steps if s.operation == "roughing" for w in s.trajectories
+               if w.motion is TrajectoryKind.CUT)
            for p in plans]
     assert way[1] > 1.1 * way[0] > 0.0
 

@@ -94,7 +94,8 @@ def test_climbing_has_the_stock_on_its_right(climb):
     """
     ways = []
     for t in channel(cut_direction=CutDirection.CLIMB if climb else CutDirection.CONVENTIONAL).trajectories:
-        if t.motion is TrajectoryKind.CUT and (np.abs(t.points[:, 2] - Z) < 1e-9).all() and 5.0 < t.points[:, 1].mean() < 11.0:
+        level = (np.abs(t.points[:, 2] - Z) < 1e-9).all()
+        if t.motion is TrajectoryKind.CUT and level and 5.0 < t.points[:, 1].mean() < 11.0:
             inwards = 1.0 if t.points[:, 0].mean() < 12.0 else -1.0
             ways.append(inwards * float(t.points[-1, 1] - t.points[0, 1]))
     long = [w for w in ways if abs(w) > 2.0]

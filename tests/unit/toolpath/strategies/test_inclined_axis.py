@@ -51,8 +51,10 @@ def found(leaned=TILTED, mesh=HOLLOW, allowance=0.0, turning=FREE, body=BALL, ma
                           StockMap.around(tree, HOLLOW.bounds, margin, 0.25), (), clear)
     wider = replace(clear, neck=clear.neck + inclined_axis.WARY, shank=clear.shank + inclined_axis.WARY)
     cut = CutData(10_000, FEED, 200, 3000, 3.6)
-    return inclined_axis.inclined_passes([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, SimpleNamespace(tool=body, allowance=allowance),
-                   cut, settings_of(turning), around, enters(tree, body, wider, allowance - LIFT), leaned), around
+    return inclined_axis.inclined_passes([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target,
+                                         SimpleNamespace(tool=body, allowance=allowance),
+                                         cut, settings_of(turning), around,
+                                         enters(tree, body, wider, allowance - LIFT), leaned), around
 
 
 def normals_at(poses, radius):
@@ -124,8 +126,10 @@ def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
     tree = TriangleTree(mesh)
     around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
     faces = [TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)]
-    runs = inclined_axis.inclined_passes(faces, FinishTarget(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
-                   CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around, enters(tree, BALL, clear),
+    runs = inclined_axis.inclined_passes(faces, FinishTarget(points, normals, points, 1.0),
+                                         SimpleNamespace(tool=BALL, allowance=0.0),
+                                         CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around,
+                                         enters(tree, BALL, clear),
                    ToolLean(0.0, np.radians(65.0), np.radians(65.0)))
     tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
     centre = tips + BALL.radius * axes
@@ -192,7 +196,8 @@ def test_what_the_machine_cannot_take_is_left_with_the_reason():
 def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
     asked = ToolLean(0.1, 0.2, walls=1.0)
     assert inclined_axis.requested_lean(None, Form.SHALLOW, BALL) is None
-    assert inclined_axis.requested_lean(asked, Form.LEVEL, BALL) is None and inclined_axis.requested_lean(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
+    assert inclined_axis.requested_lean(asked, Form.LEVEL, BALL) is None
+    assert inclined_axis.requested_lean(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
     assert inclined_axis.requested_lean(asked, Form.SHALLOW, BALL) == asked
     assert inclined_axis.requested_lean(asked, Form.STEEP, BALL) == ToolLean(0.0, 1.0, 1.0)
     assert inclined_axis.requested_lean(TILTED, Form.STEEP, BALL) is None
@@ -213,7 +218,8 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
              zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
              zone("Z7", Form.SHALLOW, "inclined_axis"), zone("Z8", Form.SHALLOW, "curvature_matched", "too slow")]
     steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "depth_layers"]
-    steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
+    steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0),
+              step("Z8", "spiral", 90.0)]
     first, second, third, fourth = upright(TILTED, zones, steps)
     assert first.subjects == ("Z2", "T1") and "stays upright (a reason; another)" in first.message
     assert (first.measured, first.limit) == (30.0, 15.0)

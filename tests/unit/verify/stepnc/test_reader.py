@@ -272,7 +272,8 @@ def pocket(lines):
     for k in range(begin, len(p)):
         rapid = bool(np.isnan(p.feed[k]))
         if np.abs(p.end[k] - p.start[k]).max() > 0.0:
-            ways.append(Trajectory(TrajectoryKind.RAPID if rapid else TrajectoryKind.CUT, np.array([p.start[k], p.end[k]]),
+            ways.append(Trajectory(TrajectoryKind.RAPID if rapid else TrajectoryKind.CUT,
+                                   np.array([p.start[k], p.end[k]]),
                                    0.0 if rapid else float(p.feed[k])))
     made = replace(step(1, TOOL, "depth_layers", trajectories=tuple(ways)), spindle_rpm=8000.0, feed=400.0)
     return plan(made, tools=(TOOL,), clearance_plane=20.0,
