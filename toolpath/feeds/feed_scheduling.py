@@ -80,11 +80,11 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
 
 
 def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
-    """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not.
+    """Feeds at tips (n, 3), mm, whether in stock or not, (n,) float64, mm/min.
 
-    Where nothing is engaged all of the front may be in what is skimmed, which counts as none. What is deeper than that
-    and not in front is what a row of nodes has missed: no thicker than ``SURE_RIM`` of a step, which a cutter that
-    breaks through it has in front of it over no more than 2 arccos (1 - thickness / radius).
+    Where no angle is engaged the whole front may be in a skin, which does not count. Deeper stock that is not in front
+    is missed by a row of nodes. It is no thicker than ``SURE_RIM`` of a step. A cutter that breaks through it has it in
+    front over at most 2 arccos (1 - thickness / radius).
     """
     over = stock.overlap(way, tool, lower_bound=0.0)
     depth = np.ceil(over / pace.layer * DEPTHS - 1e-9).astype(np.int64)

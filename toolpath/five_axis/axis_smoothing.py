@@ -167,11 +167,11 @@ def fan(axis: F64, half: float) -> F64:
     return np.asarray(np.einsum("nji,dj->ndi", axis_frames(axis), np.vstack(rows)))
 
 
-def _goal(axis: F64, beside: F64 | None) -> tuple[F64, float]:
+def _goal(axis: F64, neighbour: F64 | None) -> tuple[F64, float]:
     """Target of the axes and its weight."""
-    if beside is None:
+    if neighbour is None:
         return axis, 1.0
-    return (axis + BESIDE * beside) / (1.0 + BESIDE), 1.0 + BESIDE
+    return (axis + BESIDE * neighbour) / (1.0 + BESIDE), 1.0 + BESIDE
 
 
 def _spread(goal: F64, weight: F64, step: float, spread: float) -> F64:

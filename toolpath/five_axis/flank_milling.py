@@ -306,7 +306,7 @@ def _fitted(band: Band, wanted: FlankTolerances) -> Band:
 
 
 def _paired(wall: FlankWall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
-    """(n,) what is added to xi at the upper border, so that the axis misses the wall least.
+    """(n,) shift of xi at the upper border at which the axis misses the wall least.
 
     Where many miss as little, as on a plane, the steepest is taken.
     """

@@ -367,12 +367,12 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     return tuple(out)
 
 
-def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | None:
+def paced(tips: F64, axes: F64, reach: float, feed: float, min_minutes: F64) -> F64 | None:
     """Feeds of the tip, (n - 1,) float64, mm/min: no place of the flank exceeds ``feed``, and the machine keeps up.
 
-    tips, axes : (n, 3) float64, mm and unit, access frame
-    reach      : mm from the tip, how far up the flank cuts
-    least      : (n - 1,) float64, min, shortest time of each block on the machine
+    tips, axes  : (n, 3) float64, mm and unit, access frame
+    reach       : mm from the tip, how far up the flank cuts
+    min_minutes : (n - 1,) float64, min, shortest time of each block on the machine
 
     Returns None where the tip would be slower than ``MIN_PACE`` of the feed for the sake of the flank, or slower than
     ``MIN_FEED`` in a block: an almost standing tip does not define how long an axis takes to turn. On a straight move
@@ -383,7 +383,7 @@ def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | 
     minutes = np.maximum(gone[0], gone[1]) / feed
     if gone[0].sum() < MIN_PACE * feed * minutes.sum():
         return None
-    minutes = np.maximum(minutes, least)
+    minutes = np.maximum(minutes, min_minutes)
     if (gone[0] < MIN_FEED * minutes).any():
         return None
     return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), MIN_FEED)

@@ -51,7 +51,7 @@ class Posed:
     left: tuple[tuple[float, float], ...]
 
     def reversed(self) -> Posed:
-        """The pass walked the other way; ``left`` stays as it is."""
+        """The pass in the other direction; ``left`` keeps its order."""
         return Posed(tuple((tip[::-1], axis[::-1]) for tip, axis in reversed(self.pieces)), self.left)
 
 

@@ -173,7 +173,7 @@ class Linker:
             lifted = Line(points + np.array([0.0, 0.0, k * height]), line.closed)
             for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                # where the tool has been as deep, what the stock still shows is out of its reach
+                # where the tool has been as deep, it cannot reach the stock that the map still shows
                 if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
                     return False
         return True
@@ -193,7 +193,7 @@ class Linker:
             lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
             for piece in pieces_where(lifted, over > k * step, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # what still stands is out of its reach
+                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # it cannot reach the stock that is left
                     continue
                 for rest in self._unwalked(Line(walk, piece.closed)):
                     self._one(rest.points, rest.closed, unless_over=True)
@@ -401,13 +401,13 @@ class Linker:
             return aside, points, True
         ramp = self._ramp(points, closed, over)
         if ramp is None or int(self._known_down(ramp, points).sum()) > MAX_AGAIN:
-            return None  # what is known of a way down can be left out only where it is come to from above
+            return None  # the known part of a way down can be left out only where the tool comes from above
         return entry, ramp, True
 
     def _down_aside(self, points: F64, z: float) -> F64 | None:
         """From here across at height z, mm, to beside the start of a pass, down there in air, and onto it.
 
-        A way down along the pass is as long as its slope is flat, and is walked twice. None where this is longer, or
+        A flat pass has a long way down along itself, which the tool follows twice. None where this way is longer, or
         where the tool is not free in air.
         """
         here, start, m = self.go.here(), points[0], self.motions

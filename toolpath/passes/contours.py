@@ -158,7 +158,7 @@ def _middles(ids: NDArray[np.int64], nx: int) -> F64:
 
 def _along_chains(marked: NDArray[np.bool_], starts: NDArray[np.int64], closed: NDArray[np.bool_],
                   more: int) -> NDArray[np.bool_]:
-    """(n,) bool: what is ``marked`` and ``more`` neighbours on each side, chain by chain."""
+    """(n,) bool: marked places and ``more`` neighbours on each side, chain by chain."""
     out = np.zeros_like(marked)
     for k in range(len(starts) - 1):
         part = marked[starts[k]:starts[k + 1]]

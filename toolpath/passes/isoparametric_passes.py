@@ -283,7 +283,7 @@ def _first_guess(iso: Laid, eta: float, radius: float, scallop: float) -> float:
 
 
 class _Pass:
-    """A pass as centres of the corner, close together, to ask what is left beside it."""
+    """A pass as centres of the corner, close together, to measure the residual beside it."""
 
     def __init__(self, table: _Table, eta: float, radius: float, flank: Flank | None) -> None:
         point, normal = table(np.linspace(0.0, 1.0, CENTRES), np.array([eta]))
@@ -295,8 +295,10 @@ class _Pass:
             self.axes = self.centres + (flank.radius - radius) * level / size[:, None]
 
     def left(self, points: F64, normals: F64) -> F64:
-        """How far along the normals of places (m, ALONG, 3), mm, the tool begins, (m, ALONG); a little over r where it
-        is not. The second index goes along the pass."""
+        """Distance along the normals of places (m, ALONG, 3), mm, to the tool, (m, ALONG); a little over r without it.
+
+        The second index runs along the pass.
+        """
         out = np.empty(points.shape[:2])
         wide, high = (0.0, 0.0) if self.flank is None else (self.flank.radius, self.flank.height)
         left_beside(points, normals, self.centres, self.axes, self.radius, wide, high, STEEP, out)
@@ -304,7 +306,7 @@ class _Pass:
 
 
 def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
-    """The most that is left between two passes, mm."""
+    """Largest residual between two passes, mm."""
     points, normals = table(np.linspace(0.0, 1.0, ALONG), low + ROWS * (high - low))
     one, two = a.left(points, normals), b.left(points, normals)
     # the residual grows with the square of the distance from a pass: between two rows both roots are straight
@@ -317,7 +319,7 @@ def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
 
 def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
           scallop: float) -> tuple[float, _Pass]:
-    """The next pass: as far as what is left between the two allows, or the border."""
+    """The next pass: as far as the residual between the two allows, or the border."""
     low, high, step = 0.0, math.inf, min(guess, 1.0 - at)
     kept = None
     for _ in range(TRIALS):

@@ -30,7 +30,7 @@ SHARES = (0.9, 0.75, 0.5)  # of the strips that a wider step may satisfy
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A pass that was tried, with what is left between it and the one before in each strip."""
+    """A pass that was tried, with the residual between it and the one before in each strip."""
 
     step: float
     made: Pass
@@ -43,7 +43,7 @@ class _Trial:
         return float(self.left.max(initial=0.0))
 
     def without(self, strips: I64) -> _Trial:
-        """The same, those strips not looked at."""
+        """The same without those strips."""
         return replace(self, left=np.where(np.isin(self.strips, strips), 0.0, self.left))
 
 
@@ -79,7 +79,7 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
             return _trial(family, at, step, base, guess)
 
         best = widest(attempt, family.promise.scallop, min(start, last - at), least, last - at)
-        if best.worst > family.promise.scallop:  # strips that not even the closest pass keeps are left to others
+        if best.worst > family.promise.scallop:  # other passes take the strips that even the closest pass leaves
             lost = best.strips[best.left > family.promise.scallop]
 
             def without(step: float, attempt: Callable[[float], _Trial] = attempt, lost: I64 = lost) -> _Trial:
@@ -148,8 +148,8 @@ def widest(attempt: Callable[[float], _Trial], max_left: float, start: float, mi
 
 
 def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at: float, before: Envelope,
-           most: float) -> tuple[_Trial, list[Pass]]:
-    """A wider step with pieces at the spots too narrow for it, where that is less way a step; else ``best``, none."""
+           max_step: float) -> tuple[_Trial, list[Pass]]:
+    """A wider step with pieces at its narrow spots, where that shortens the way for each mm; else ``best``."""
     promise = family.promise
     chosen: tuple[_Trial, list[Pass]] = best, []
     cost = (best.made.length + promise.link) / max(best.step, 1e-9)
@@ -157,7 +157,7 @@ def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at:
         return chosen
     for share in SHARES:
         usual = float(np.quantile(best.left, share, method="lower"))
-        step = min(best.step * min(math.sqrt(AIM * promise.scallop / max(usual, 1e-12)), 2.0), most)
+        step = min(best.step * min(math.sqrt(AIM * promise.scallop / max(usual, 1e-12)), 2.0), max_step)
         if not (best.worst <= promise.scallop and step >= 1.03 * best.step):
             continue
         trial = attempt(step)
@@ -174,9 +174,9 @@ def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at:
 
 def _narrow(family: Family, a: float, over_a: Envelope, b: float, over_b: Envelope, left: F64, strips: I64,
             deeper: int) -> tuple[list[Pass], bool]:
-    """Pieces half way between two passes in the strips where too much is left, and between those again.
+    """Pieces half way between two passes in the strips with too much left, and between those again.
 
-    Also returns whether all strips are kept then.
+    Also returns whether all strips keep the tolerance then.
     """
     failing = strips[left > family.promise.scallop]
     if not len(failing):

@@ -443,7 +443,7 @@ class Finish:
         again = Walked.again(line)
         for a, b in true_runs(again):
             again[a:b] &= b - a >= MIN_AGAIN  # places where a line crosses or touches itself
-        fresh &= ~again  # that is measured where it is walked first
+        fresh &= ~again  # the first pass over a place is measured there
         return still_to_walk(line, fresh)
 
 

@@ -31,7 +31,7 @@ class Depths:
         self._cells = np.full((lattice.ny, lattice.nx), math.inf)  # mm, the same by cell, along the moves too
         self._spots = np.zeros((lattice.ny, lattice.nx, 2))  # mm, X and Y of that
         self._moves: set[tuple[bytes, bytes]] = set()
-        self.ways: list[F64] = []  # as they were cut
+        self.ways: list[F64] = []  # in their original form, as cut
 
     def cut(self, points: F64) -> None:
         """Remember a cut along a way of tips.
@@ -45,7 +45,7 @@ class Depths:
         self._moves.update(zip(keys[:-1], keys[1:], strict=True))
         way = dense(points, 0.5 * self._lattice.step)
         way = way[self._lattice.inside(way)]
-        way = way[np.argsort(-way[:, 2], kind="stable")]  # of what is written to one cell the last stays
+        way = way[np.argsort(-way[:, 2], kind="stable")]  # of several places in one cell the last one counts
         i, j = self._lattice.cells(way)
         deeper = way[:, 2] < self._cells[i, j]
         i, j, way = i[deeper], j[deeper], way[deeper]
@@ -113,7 +113,7 @@ class Walked:
 
     def __init__(self) -> None:
         self._moves: dict[int, list[tuple[F64, F64]]] = {}
-        self.ways: list[F64] = []  # as they were walked
+        self.ways: list[F64] = []  # in their original form
 
     def add(self, points: F64) -> None:
         """Remember a way that the tool has cut from end to end.
@@ -196,7 +196,7 @@ def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:
 
 
 def _written(points: F64) -> list[bytes]:
-    """A key for each of points (n, 3), mm, the same for those that a program says with the same words."""
+    """A key for each of points (n, 3), mm, the same for points that round alike in a program."""
     return [row.tobytes() for row in np.rint(points / WRITTEN).astype(np.int64)]
 
 

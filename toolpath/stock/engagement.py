@@ -23,9 +23,9 @@ UNBOUNDED = math.pi  # rad: the whole front half may be in stock
 SKIN_SHARE = 0.05  # of the radius: stock that thin over the cutter is no engagement
 SURE = 0.95  # of a skin: stock is known at nodes
 CLOSE = 1e-6  # rad: angles are multiples of a sector, and a limit may be one
-LOOK = 0.1  # of the radius, between places the angle is asked at
-WINDOW = 0.5  # of the radius: way over which places met are put together
-BEYOND = 0.5  # of the radius: how far beyond the place that is over the limit a skim goes
+LOOK = 0.1  # radii between places at which the angle is computed
+WINDOW = 0.5  # radii of way over which the places met are combined
+BEYOND = 0.5  # radii that a skim extends beyond the place that exceeds the limit
 
 
 def angles(stock: StockMap, points: F64, tool: ToolBody) -> F64:

@@ -62,37 +62,37 @@ class Shell:
         return cls(places, np.vstack(boxes), levels)
 
 
-def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, beside: float, under: float, step: float,
+def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, off_flank: float, off_end: float, step: float,
            high: float) -> tuple[Shell, Shell]:
     """Shells of the cutting part made smaller, and of neck, shank and holder with their clearance.
 
-    beside, under : mm removed from its flank and from its end
-    step          : mm of the lattice of the stock
-    high          : mm from the tip, up to which stock may stand; the shells reach at least that far
+    off_flank, off_end : mm removed from its flank and from its end
+    step               : mm of the lattice of the stock
+    high               : mm from the tip, up to which stock may stand; the shells reach at least that far
     """
     outer = ((0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
              (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
              *((d.radius, d.height, math.inf) for d in discs))
     # by powers of two, so that a few serve all passes
     high = step * 2.0 ** math.ceil(math.log2(max(high, step) / step))
-    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, beside, under, step, high)
+    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, off_flank, off_end, step, high)
 
 
 @lru_cache(maxsize=KEPT)
-def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], beside: float,
-            under: float, step: float, high: float) -> tuple[Shell, Shell]:
+def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], off_flank: float,
+            off_end: float, step: float, high: float) -> tuple[Shell, Shell]:
     flank: list[F64] = [np.zeros((0, 3))]
     inner = 0.0
-    for h in _heights(min(under, flute), min(flute, high), step):
-        # what of the cutting part is off its outside by ``under``: a rounded end, and a flank it goes over into
+    for h in _heights(min(off_end, flute), min(flute, high), step):
+        # the part of the cutter that lies ``off_end`` inside its outline: a rounded end, which passes into the flank
         low = max(corner - h, 0.0)
-        if corner > under and low > corner - under:
+        if corner > off_end and low > corner - off_end:
             continue
-        at = radius - corner + math.sqrt((corner - under) ** 2 - low * low) if corner > under else radius
-        # over the corner it is the side that counts: what may stand under the end may not stand beside it
-        low = max(corner - max(h - under, 0.0), 0.0)
-        side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - beside
-        at = max(min(max(at, side), radius - beside), 0.0)
+        at = radius - corner + math.sqrt((corner - off_end) ** 2 - low * low) if corner > off_end else radius
+        # over the corner the side counts: stock that may stand under the end may not stand beside it
+        low = max(corner - max(h - off_end, 0.0), 0.0)
+        side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - off_flank
+        at = max(min(max(at, side), radius - off_flank), 0.0)
         begin = 0.0 if len(flank) == 1 else min(inner + step, at)
         flank += [_ring(r, h, step) for r in _between(begin, at, step)]
         inner = at

@@ -122,7 +122,7 @@ def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Lin
 
 
 def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
-    """Passes as lines in order across, every second one that has any walked back."""
+    """Passes as lines in order across, every second one in the other direction."""
     out: list[Line] = []
     flip = False
     for p in passes:
