@@ -1,9 +1,15 @@
 """Deflection of the tip of a tool under its cut, and a feed that keeps it within its limit.
 
-Notation: F force N, E modulus N/mm2, I = pi d^4 / 64 second moment mm4, z heights above the tip mm; kc specific cutting
-force of a chip of 1 mm by 1 mm, N/mm2, mc its exponent; a depth, ae width of cut, b length of the edge in it, fz feed
-per tooth, h thickness of the chip, all mm; phi engaged angle, rad. Formulas, sources and omissions:
-docs/theory/feeds.md.
+Notation
+    F, E, I : force, N; modulus, N/mm2; second moment pi d^4 / 64, mm4
+    z       : height above the tip, mm
+    kc, mc  : specific cutting force of a chip of 1 mm by 1 mm, N/mm2, and its exponent
+    a, ae   : depth and width of cut, mm
+    b       : length of the edge in the cut, mm
+    fz, h   : feed per tooth and thickness of the chip, mm
+    phi     : engaged angle, rad
+
+Formulas, sources and omissions: docs/theory/feeds.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The tip path of a tool that is dragged over a part along a line in plan.
 
 The line is sampled evenly. A piece is cut in four while the tip limit at its quarters leaves its chord by more than the
-tolerance; two kinks can cancel in the middle, but not there and at both quarters. So only the chord on the true path
+tolerance. Two kinks can cancel in the middle, but not there and at both quarters. So only the chord on the true path
 bounds the forward step. Where the limit jumps (the edge of a wall) cutting ends at ``SMALLEST`` and the path breaks: no
 move may join the two sides. All points lie on the tip limit, so they are free. Places are in mm, access frame.
 """

@@ -170,9 +170,9 @@ class Finish:
         - inclined-axis passes, where the setup requests a tilt.
 
         The strategy that leaves the fewest samples above the scallop wins, among equals the fastest. Where the setup
-        requests a tilt, upright passes win only without tilted ones, and before the time the share of upright way
-        decides, to a tenth: samples that tilted passes leave are finished upright too. The choice holds for the bands
-        below; a zone in bands has no tilted passes.
+        requests a tilt, upright passes win only where no tilted ones exist. Among tilted ones the least upright share
+        of the way wins, to a tenth, before the time: samples that tilted passes leave are finished upright too. The
+        choice holds for the bands below. A zone in bands has no tilted passes.
         """
         every = np.ones(len(self.checks.points), np.bool_) if wanted is None else wanted
         if not bool((every & (self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height))).any()):

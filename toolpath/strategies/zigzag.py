@@ -182,7 +182,7 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
 
 
 def _layers(way: F64, over: F64, skin: float, slope: float) -> int:
-    """In how many layers a way (n, 3) is gone down to, ``over`` (n,) mm of stock on it."""
+    """Number of layers in which a way (n, 3) is cut, with ``over`` (n,) mm of stock on it."""
     move = np.diff(way, axis=0)
     aside = np.hypot(move[:, 0], move[:, 1])
     down = -move[:, 2] > slope * aside
@@ -192,8 +192,10 @@ def _layers(way: F64, over: F64, skin: float, slope: float) -> int:
 
 
 def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F64:
-    """(n,) float64, mm: how far stock stands above the cutter where the pass goes up or down, on a wall how far above
-    the end of the cutter where it goes down; 0 elsewhere."""
+    """Height of stock above the cutter where the pass goes up or down, (n,) float64, mm; 0 elsewhere.
+
+    On a wall it is the height above the end of the cutter, where the pass goes down.
+    """
     move = np.diff(points, axis=0)
     rise = -move[:, 2] if wall else np.abs(move[:, 2])
     steep = rise > 0.05 * np.hypot(move[:, 0], move[:, 1])  # 3 degrees
