@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from output.program_grid import GRID, I64, PER_MM
 from output.workplan import Workplan
-from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 
 BOOL = NDArray[np.bool_]
 
@@ -41,7 +41,7 @@ MOST_SLOPE = 0.1
 """Of a helix: some controls count F in the plane alone, and go 0.5 % faster on it at most."""
 SAG = 6e-4
 """mm between an arc and the chords it has as a polyline, in STEP-NC where no circle can stand: helices, tool axes."""
-ROUNDED = (Motion.CUT, Motion.APPROACH, Motion.LIFT)
+ROUNDED = (TrajectoryKind.CUT, TrajectoryKind.APPROACH, TrajectoryKind.LIFT)
 """What may have arcs: passes, and the arcs that lead on and off them."""
 BLOCK = 256
 """Moves of a pass at the most between two places at which a block ends in any case."""
@@ -108,7 +108,7 @@ def _refitted(ways: Sequence[Trajectory], round_: BOOL, tolerance: float) -> lis
         a, b = int(starts[mine.start]), int(starts[mine.stop])
         path = np.vstack([way.points[:1], rows[a:b]])
         first = starts[mine] - a
-        arcs = tuple(Arc(i, i + n, (x, y), left) for i, n, (x, y), left in zip(
+        arcs = tuple(ArcSpan(i, i + n, (x, y), left) for i, n, (x, y), left in zip(
             first[fit.is_arc[mine]].tolist(), per[mine][fit.is_arc[mine]].tolist(),
             fit.centre[mine][fit.is_arc[mine]].tolist(), _left(points, fit, mine).tolist(), strict=True))
         out.append(replace(way, points=path, arcs=arcs))

@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from output.program_grid import GRID, I64, grid_path, to_grid
 from output.program_grid import link as grid_link
 from output.workplan import Clamping, Frame, Workplan
-from toolpath.workingsteps import Arc, Motion, Workingstep
+from toolpath.workingsteps import ArcSpan, TrajectoryKind, Workingstep
 
 TURN_STEP = math.radians(2.0)  # the most either axis turns in one block of a turn
 SPARE = 0.5  # mm, outside the ball, for what a turn of joints leaves its chords by
@@ -39,12 +39,12 @@ class Leg:
     arcs   : stretches of it about Z of the setup frame, none unless both rotary axes stand at 0
     """
 
-    motion: Motion
+    motion: TrajectoryKind
     tips: F64
     axes: F64
     turns: F64
     feed: float
-    arcs: tuple[Arc, ...] = ()
+    arcs: tuple[ArcSpan, ...] = ()
 
     @property
     def is_turning(self) -> bool:
@@ -145,7 +145,7 @@ class _Walk:
         if len(path) > 1:
             points = path * GRID
             points[0], points[-1] = here, start
-            legs.append(self._straight(Motion.RAPID, points @ frame.rotation, 0.0))
+            legs.append(self._straight(TrajectoryKind.RAPID, points @ frame.rotation, 0.0))
         self.tip = start @ frame.rotation
         return legs
 
@@ -186,7 +186,7 @@ class _Walk:
             self.tip = tips[-1]
         return legs
 
-    def _arcs(self, arcs: tuple[Arc, ...], frame: Frame) -> tuple[Arc, ...]:
+    def _arcs(self, arcs: tuple[ArcSpan, ...], frame: Frame) -> tuple[ArcSpan, ...]:
         """Arcs of the frame of an access in that of the setup, where the machine stands as one of three axes does."""
         if not arcs or np.abs(self.turn).max() > AT_REST:
             return ()
@@ -197,7 +197,7 @@ class _Walk:
         """Back to where tools are changed."""
         return [*self._away(), *self._turned(np.zeros(2))]
 
-    def _straight(self, motion: Motion, tips: F64, feed: float) -> Leg:
+    def _straight(self, motion: TrajectoryKind, tips: F64, feed: float) -> Leg:
         turns = np.tile(self.turn, (len(tips), 1))
         return Leg(motion, tips, self.machine.axes(turns), turns, feed)
 
@@ -211,7 +211,7 @@ class _Walk:
         self.tip = goal
         far = np.linalg.norm(np.diff(path, axis=0), axis=1) > GRID
         keep = np.array([True, far[0], far[1]])
-        return [self._straight(Motion.RAPID, path[keep], 0.0)] if keep[1:].any() else []
+        return [self._straight(TrajectoryKind.RAPID, path[keep], 0.0)] if keep[1:].any() else []
 
     def _turned(self, wanted: F64) -> list[Leg]:
         """The turn from where the axes stand to where they shall, the tip on the ball."""
@@ -223,7 +223,7 @@ class _Walk:
         axes = self.machine.axes(turns)
         tips = self.clamping.centre + _outside(self.clamping) * axes
         self.tip, self.turn = tips[-1], turns[-1]
-        return [Leg(Motion.RAPID, tips, axes, turns, 0.0)]
+        return [Leg(TrajectoryKind.RAPID, tips, axes, turns, 0.0)]
 
 
 def _outside(clamping: Clamping) -> float:

@@ -18,7 +18,7 @@ from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from output.workplan import Workplan
-from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 
 I64 = NDArray[np.int64]
 
@@ -82,7 +82,7 @@ class GridArc:
         return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
 
-def pieces(points: I64, arcs: Sequence[Arc]) -> Iterator[I64 | GridArc]:
+def pieces(points: I64, arcs: Sequence[ArcSpan]) -> Iterator[I64 | GridArc]:
     """What a path is written as: polylines (m, k), m >= 2, without repeats, and arcs, in order.
 
     points : (n, k) int64, grid units, X, Y, Z first;  arcs : of rows of it
@@ -123,7 +123,7 @@ def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:
                               measured=float(np.linalg.norm(points[0] - end) * GRID))
         end = points[-1]
         points = without_repeats(points)
-        if trajectory.motion is Motion.RAPID:
+        if trajectory.motion is TrajectoryKind.RAPID:
             _check_rapid(points, where)
         elif not (np.isfinite(trajectory.feed) and trajectory.feed >= GRID):
             raise OutputError(f"{step.id}: trajectory {number} has no feed", code="bad_feed", subjects=where,

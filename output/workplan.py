@@ -10,7 +10,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.inverse_kinematics import RotaryMachine
-from toolpath.workingsteps import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 FIRST_NUMBER = 1000
 """Of the first program of a job."""
@@ -136,5 +136,5 @@ class Workplan:
         return known or Assembly(tool.stickout + sum(h.length for h in tool.holder))
 
 
-__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "Frame", "Motion", "StockBox", "StockCylinder",
+__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "Frame", "TrajectoryKind", "StockBox", "StockCylinder",
            "Trajectory", "Workingstep", "Workplan"]

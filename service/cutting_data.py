@@ -15,7 +15,14 @@ from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup
 from schemas.tools import Tool
-from toolpath.tool_deflection import LAYER_LIMIT, LEAST_FEED, Bending, compliance, effective_diameter, left_by_layers
+from toolpath.tool_deflection import (
+    LAYER_LIMIT,
+    MIN_FEED,
+    DeflectionModel,
+    compliance,
+    effective_diameter,
+    left_by_layers,
+)
 from zones.lattice import lattice_step
 
 DEFAULT_MAX_RPM = 18000.0
@@ -97,7 +104,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     in for layers where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says
     of the tool stands instead. Both are held to the tool's and the machine's limits; where a machine states none and
     the tool has no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
-    ``LEAST_FEED``.
+    ``MIN_FEED``.
     """
     deep = tool.corner_radius_mm if depth is None else depth
     wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
@@ -126,16 +133,16 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
         engaged = math.radians(180.0 if limit is None else limit)
         per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm) * chip_thinning(
             tool.corner_radius_mm, depth, engaged)
-        feed = min(max(per_tooth * tool.flutes * rpm, LEAST_FEED),
+        feed = min(max(per_tooth * tool.flutes * rpm, MIN_FEED),
                    machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN)
-    plunge = max(PLUNGE_FACTOR * feed, LEAST_FEED)
+    plunge = max(PLUNGE_FACTOR * feed, MIN_FEED)
     if tool.plunge_feed_mm_min is not None:
         plunge = given("plunge_feed_mm_min", tool.plunge_feed_mm_min, machine.max_feed_mm_min)
     return CuttingData(rpm, feed, plunge, rpm * math.pi * wide / 1000.0, feed / (tool.flutes * rpm), limited_by,
                        material.source, tuple(cut_back))
 
 
-def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> Bending | None:
+def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> DeflectionModel | None:
     """What the cuts of a tool bend it by; None where the material has no specific cutting force.
 
     body  : the shape of the tool; data : its speeds in this kind of work
@@ -151,9 +158,9 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
     limit = setup.quality.scallop_height_mm if climbs else 0.5 * setup.quality.gouge_tolerance_mm
     if depth is not None:
         limit = min(LAYER_LIMIT, 0.5 * left_by_layers(depth, lattice_step(body)))
-    return Bending(body, compliance(body), material.specific_cutting_force_n_mm2, material.chip_thickness_exponent,
-                   limit, tool.flutes, data.spindle_rpm, depth is None, tool.feed_mm_min is not None,
-                   tool.plunge_feed_mm_min is not None)
+    return DeflectionModel(body, compliance(body), material.specific_cutting_force_n_mm2,
+                           material.chip_thickness_exponent, limit, tool.flutes, data.spindle_rpm, depth is None,
+                           tool.feed_mm_min is not None, tool.plunge_feed_mm_min is not None)
 
 
 def rates_of(setup: Setup) -> Rates:

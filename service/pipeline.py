@@ -67,13 +67,14 @@ from service.stages.wall_support import FREE_RATIO, band_planes, in_turn
 from service.viewer.preview_picture import draw_preview
 from service.viewer.view_data import VIEW_NAME, plan_view, verification_view
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_checkpoint import Keeper
-from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
+from toolpath.plan_checkpoint import CheckpointKeeper
+from toolpath.plan_settings import CutData, Pattern, PlanSettings, ToolLean
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
 from toolpath.tool_deflection import effective_diameter
+from toolpath.workingsteps import CutDirection
 from verify.comparison.program_equivalence import carried
 from verify.gcode.dialects import dialect_of
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
@@ -230,9 +231,9 @@ class _Span:
         self.progress("prove", self.planned + (self.proved - self.planned) * share)
 
 
-def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[str, Sequence[Faces]],
+def _side(ready: Prepared, view: View, checks: list[FinishTarget], trimmed: Mapping[str, Sequence[Faces]],
           before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner,
-          blanks: dict[str, StockMap], keeper: Keeper) -> Side:
+          blanks: dict[str, StockMap], keeper: CheckpointKeeper) -> Side:
     """Plan the zones of one access; ``blanks`` keeps what the blank looks like along it for the next plan.
 
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
@@ -372,18 +373,18 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
     chord = q.chordal_tolerance_mm * (1.0 - (ARCS if ready.setup.machine.arcs else 0.0))
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
-                        floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
-                        ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
+                        floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
+                        Pattern(ops.pattern), turning_of(ready, view),
                         rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing,
                         leaned=_leaned(ops.lean))
 
 
-def _leaned(lean: Lean) -> Leaned | None:
+def _leaned(lean: Lean) -> ToolLean | None:
     """How noses are asked to lean, in the words of the plan."""
     if not lean.asked:
         return None
     walls = lean.walls_tilt_deg
-    return Leaned(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),
+    return ToolLean(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),
                   None if walls is None else math.radians(walls))
 
 

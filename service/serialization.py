@@ -20,20 +20,21 @@ import numpy as np
 
 from geometry.move_timing import Rates
 from toolpath.counterexamples import Counterexamples, HighWall
-from toolpath.plan_checkpoint import FinishNow, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.plan_checkpoint import FinishSnapshot, LayersSnapshot, PackedLines, PlanSnapshot, ToolSnapshot
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
-from toolpath.stock.stock_map import StockNow
-from toolpath.tool_deflection import Bend
-from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
+from toolpath.stock.stock_map import StockSnapshot
+from toolpath.tool_deflection import DeflectionEstimate
+from toolpath.workingsteps import ArcSpan, CutDirection, Trajectory, TrajectoryKind, Workingstep
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
 from zones.lattice import Lattice
 
 ALIGNED = 64
 CLASSES: dict[str, Any] = {c.__name__: c for c in (
-    Plan, Workingstep, Trajectory, Arc, Rates, Bend, ZonePlan, Counterexamples, HighWall, Lattice, Proof, Finding,
-    Engagement, Spent, Support, ZoneProof, FaceProof, PlanNow, StockNow, ToolNow, LayersNow, FinishNow, Ways)}
-ENUMS: dict[str, Any] = {e.__name__: e for e in (Motion, FindingKind)}
+    Plan, Workingstep, Trajectory, ArcSpan, Rates, DeflectionEstimate, ZonePlan, Counterexamples, HighWall, Lattice,
+    Proof, Finding, Engagement, Spent, Support, ZoneProof, FaceProof, PlanSnapshot, StockSnapshot, ToolSnapshot,
+    LayersSnapshot, FinishSnapshot, PackedLines)}
+ENUMS: dict[str, Any] = {e.__name__: e for e in (CutDirection, TrajectoryKind, FindingKind)}
 PLAIN = (type(None), bool, int, float, str)
 
 

@@ -10,7 +10,7 @@ from output.arc_fitting import fitted
 from output.workplan import Frame, Workplan
 from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
 from toolpath.lines import thinned
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 HALF = 0.0025
 
@@ -44,9 +44,10 @@ def cutting(*ways, **changes) -> Workplan:
     for k, way in enumerate(ways, 1):
         a, b = way[0], way[-1]
         top = [(a[0], a[1], CLEAR), (a[0], a[1], a[2] + 1.0)]
-        moves = (line(Motion.RAPID, *top), line(Motion.APPROACH, top[1], tuple(a), feed=240.0),
-                 Trajectory(Motion.CUT, way, 600.0), line(Motion.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
-                 line(Motion.RAPID, (b[0], b[1], b[2] + 1.0), (b[0], b[1], CLEAR)))
+        moves = (line(TrajectoryKind.RAPID, *top), line(TrajectoryKind.APPROACH, top[1], tuple(a), feed=240.0),
+                 Trajectory(TrajectoryKind.CUT, way, 600.0),
+                 line(TrajectoryKind.LIFT, tuple(b), (b[0], b[1], b[2] + 1.0), feed=600.0),
+                 line(TrajectoryKind.RAPID, (b[0], b[1], b[2] + 1.0), (b[0], b[1], CLEAR)))
         steps.append(replace(step(k, BALL, "waterline", trajectories=moves), chordal_tolerance=HALF))
     return plan(*steps, labels={"order": "4711"}, comments=(), **changes)
 

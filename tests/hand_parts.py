@@ -15,12 +15,12 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
 from geometry.tool_body import HolderFrustum, ToolBody
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import CutDirection, TrajectoryKind
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
@@ -258,14 +258,14 @@ class Case:
     stock_before: StockMap
     plan: Plan
 
-    def moves(self, *motions: Motion) -> list[tuple[ToolBody, F64]]:
+    def moves(self, *motions: TrajectoryKind) -> list[tuple[ToolBody, F64]]:
         """The tool and the points of every trajectory of these motions, all but rapids where none is named."""
-        wanted = motions or tuple(m for m in Motion if m is not Motion.RAPID)
+        wanted = motions or tuple(m for m in TrajectoryKind if m is not TrajectoryKind.RAPID)
         return [(s.tool, t.points) for s in self.plan.steps for t in s.trajectories if t.motion in wanted]
 
 
 def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.02, chord: float = 0.004,
-              allowance: float = 0.0, climb: bool = True, either: bool = False, roughing: bool = True,
+              allowance: float = 0.0, cut_direction: CutDirection = CutDirection.CLIMB, roughing: bool = True,
               near_net: bool = True, faces: set[int] | None = None, fixtures: tuple = (), density: float = 30.0,
               step_down: float = 0.3, spare: float = 1.0, trimmed: tuple[TrimmedFace, ...] = (),
               pattern: Pattern = Pattern.AUTO) -> Case:
@@ -289,10 +289,11 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     stock = StockMap.around(tree, mesh.bounds, 1.0, 0.12) if near_net else StockMap.box(tree, lo, hi, 0.12)
     before = StockMap(stock.lattice, stock.top.copy())
     floor = math.ceil(max(stock.highest, *(f[1][2] for f in fixtures), *(mesh.bounds[:, 2]))) + 1.0
-    settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True, climb, either,
-                            pattern)
+    settings = PlanSettings(scallop, chord, allowance, lift, floor + 1.0, floor, RAMP, roughing, True,
+                            cut_direction, pattern)
     cut = {t.id: CutData(10_000, 800, 200, 3000, step_down * t.diameter) for t in tools}
-    checks = [Target(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5) for z in zones]
+    checks = [FinishTarget(samples.points[z.samples], samples.normals[z.samples], z.tips, density ** -0.5)
+              for z in zones]
     plan = plan_job(zones, checks, fields, cut, stock, settings,
                     trimmed={z.id: [f for f in trimmed if f.face in z.faces] for z in zones})
     return Case(part, tree, samples, view, fields, zones, settings, before, plan)

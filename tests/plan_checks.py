@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import ToolBody
 from tests.hand_parts import RAMP, Case
-from toolpath.workingsteps import Motion, Workingstep
+from toolpath.workingsteps import TrajectoryKind, Workingstep
 from zones.reach.assembly import Clearances, discs_of
 
 PLUNGE_SHARE = 0.1  # of the diameter: what a descent steeper than the ramp may take off
@@ -63,7 +63,7 @@ def rapid_faults(step: Workingstep, clearance: float, floor: float) -> list[str]
     """Rapids that move Z with XY, or XY below the clearance height, or below the rapid floor."""
     out = []
     for t in step.trajectories:
-        if t.motion is not Motion.RAPID:
+        if t.motion is not TrajectoryKind.RAPID:
             continue
         move = np.diff(t.points, axis=0)
         across, along = np.hypot(move[:, 0], move[:, 1]) > 1e-9, np.abs(move[:, 2]) > 1e-9
@@ -125,7 +125,7 @@ def worst_plunge(case: Case) -> tuple[float, str]:
         seen = 0.5 * body.radius if body.corner_radius > 0 else body.radius - stock.step
         total = np.zeros_like(stock.top)
         for n, t in enumerate(step.trajectories):
-            if t.motion is Motion.RAPID:
+            if t.motion is TrajectoryKind.RAPID:
                 continue
             for a, b in zip(t.points[:-1], t.points[1:], strict=True):
                 move = b - a

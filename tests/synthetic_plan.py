@@ -11,7 +11,7 @@ from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine
 from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
-from toolpath.workingsteps import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 from zones.reach.access_view import access_rotation
 
 HOLDER = (HolderFrustum(20.0, 20.0, 30.0),)
@@ -21,7 +21,7 @@ BULL = ToolBody("rougher Ø8", 7, 8.0, 1.0, 20.0, 7.6, 30.0, 8.0, 50.0, HOLDER)
 CLEAR = 25.0
 
 
-def line(motion: Motion, *points: tuple[float, float, float], feed: float = 0.0) -> Trajectory:
+def line(motion: TrajectoryKind, *points: tuple[float, float, float], feed: float = 0.0) -> Trajectory:
     return Trajectory(motion, np.array(points, dtype=np.float64), feed)
 
 
@@ -33,13 +33,13 @@ def passes(x: float, z: float, feed: float = 600.0) -> tuple[Trajectory, ...]:
     a, b, c, d = first[0], first[-1], second[0], second[-1]
     high, low = (a[0], a[1], CLEAR), (a[0], a[1], z + 1.0)
     return (
-        line(Motion.RAPID, high, low),
-        line(Motion.APPROACH, low, tuple(a), feed=0.4 * feed),
-        Trajectory(Motion.CUT, first, feed),
-        Trajectory(Motion.CONNECT, np.array([b, c]), feed),
-        Trajectory(Motion.CUT, second, feed),
-        line(Motion.LIFT, tuple(d), (d[0], d[1], z + 1.0), feed=feed),
-        line(Motion.RAPID, (d[0], d[1], z + 1.0), (d[0], d[1], CLEAR)),
+        line(TrajectoryKind.RAPID, high, low),
+        line(TrajectoryKind.APPROACH, low, tuple(a), feed=0.4 * feed),
+        Trajectory(TrajectoryKind.CUT, first, feed),
+        Trajectory(TrajectoryKind.CONNECT, np.array([b, c]), feed),
+        Trajectory(TrajectoryKind.CUT, second, feed),
+        line(TrajectoryKind.LIFT, tuple(d), (d[0], d[1], z + 1.0), feed=feed),
+        line(TrajectoryKind.RAPID, (d[0], d[1], z + 1.0), (d[0], d[1], CLEAR)),
     )
 
 
@@ -75,12 +75,12 @@ def plan(*steps: Workingstep, **changes: object) -> Workplan:
 def tiny() -> Workplan:
     """One tool, one step, a handful of points: small enough to read as a golden file."""
     cut = (
-        line(Motion.RAPID, (0.0, 0.0, CLEAR), (0.0, 0.0, 6.0)),
-        line(Motion.APPROACH, (0.0, 0.0, 6.0), (0.0, 0.0, 5.0), feed=200.0),
-        line(Motion.CUT, (0.0, 0.0, 5.0), (10.0, 0.0, 5.0), (10.00001, 0.00001, 5.0), (10.0, 2.5, 4.99996),
+        line(TrajectoryKind.RAPID, (0.0, 0.0, CLEAR), (0.0, 0.0, 6.0)),
+        line(TrajectoryKind.APPROACH, (0.0, 0.0, 6.0), (0.0, 0.0, 5.0), feed=200.0),
+        line(TrajectoryKind.CUT, (0.0, 0.0, 5.0), (10.0, 0.0, 5.0), (10.00001, 0.00001, 5.0), (10.0, 2.5, 4.99996),
              (-0.00001, 2.5, 4.5), feed=600.0),
-        line(Motion.LIFT, (-0.00001, 2.5, 4.5), (0.0, 2.5, 6.0), feed=600.0),
-        line(Motion.RAPID, (0.0, 2.5, 6.0), (0.0, 2.5, CLEAR)),
+        line(TrajectoryKind.LIFT, (-0.00001, 2.5, 4.5), (0.0, 2.5, 6.0), feed=600.0),
+        line(TrajectoryKind.RAPID, (0.0, 2.5, 6.0), (0.0, 2.5, CLEAR)),
     )
     return plan(step(1, BALL, "waterline", trajectories=cut), labels={"order": "4711"}, comments=())
 
@@ -95,8 +95,8 @@ def long_plan(points: int, rows: int = 300) -> Workplan:
         y = np.full(n, 0.1 * k)
         row = np.column_stack([t, y, 3.0 + np.sin(0.3 * t + 0.05 * k)])[:: 1 if k % 2 == 0 else -1]
         if end is not None:
-            out.append(Trajectory(Motion.CONNECT, np.array([end, row[0]]), 600.0))
-        out.append(Trajectory(Motion.CUT, np.ascontiguousarray(row), 600.0))
+            out.append(Trajectory(TrajectoryKind.CONNECT, np.array([end, row[0]]), 600.0))
+        out.append(Trajectory(TrajectoryKind.CUT, np.ascontiguousarray(row), 600.0))
         end = row[-1]
     return plan(step(1, BALL, "zigzag", trajectories=tuple(out)))
 
@@ -106,7 +106,7 @@ def leaning(x: float, z: float, size: float = 0.2) -> tuple[Trajectory, ...]:
     out = list(passes(x, z))
     t = np.linspace(0.0, 1.0, len(out[2].points))
     axes = np.column_stack([size * np.sin(np.pi * t), 0.7 * size * np.sin(2 * np.pi * t), np.ones_like(t)])
-    out[2] = Trajectory(Motion.CUT, out[2].points, 600.0, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    out[2] = Trajectory(TrajectoryKind.CUT, out[2].points, 600.0, axes / np.linalg.norm(axes, axis=1, keepdims=True))
     return tuple(out)
 
 

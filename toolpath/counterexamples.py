@@ -1,10 +1,13 @@
-"""What a proof found wrong with a plan, as the next plan of the same job takes it into account.
+"""Findings of a proof that the next plan of the same job avoids.
 
-A planner decides by estimates: the stock is known at the nodes of a lattice, a ramp by the slope of its line, a wall by
-its profile. Where one is wrong the proof shows the place. Planned again, the tool goes there in thinner skins; where
-that does not help, or what was met is not stock under its end, its lines leave the place out, and what they do not
-finish counts as left. A sample at which more stayed is aimed lower at, and given up where that is no help either. For a
-thin wall that lacked support all tools go down in lower bands.
+A planner decides by estimates: it knows the stock at the nodes of a lattice, a ramp by the slope of its line, a wall by
+its profile. Where an estimate is wrong the proof reports the place. The next plan reacts in this order.
+
+- A place that was cut too deep: the tool goes there in thinner layers.
+- A place where that does not help, or where the tool met something besides stock under its end: lines leave it out.
+  The material there counts as left.
+- A sample with too much material left: the plan aims lower there, and gives it up where that fails again.
+- A thin wall without support: all tools go down in lower bands.
 """
 
 from __future__ import annotations
@@ -19,25 +22,28 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import dense
 
-CARE = 0.5  # of the skin, and of the slope of a ramp, near a place where these were too much
-CAREFUL = 1.0  # of the radius round a place, in plan, within which a line is one that goes there
-BARRED = 0.3  # of the radius round a place: what of a line is left out
-LEAST_BARRED = 0.2  # mm
-CROWDED = 0.75  # of the radius round a place: what of a line is skimmed first
-CLOSER = 0.7  # of its thickness that a wall counts as, each time it was found without support
-STRICTER = 0.5  # of what is aimed at, where more stayed than the plan had measured
+CARE = 0.5  # share of layer depth and ramp slope that is used near a place in ``dug``
+CAREFUL = 1.0  # radii: a line this near a place in ``dug``, in plan, goes there
+BARRED = 0.3  # radii: a line this near a place in ``barred`` leaves it out
+MIN_BARRED = 0.2  # mm
+CROWDED = 0.75  # radii: a line this near a place in ``packed`` is skimmed first
+CLOSER = 0.7  # factor on the thickness of a wall, each time it was found without support
+STRICTER = 0.5  # factor on the aimed residual where more stayed than the plan had measured
 
 
 @dataclass(frozen=True, eq=False)
 class Counterexamples:
-    """Places of the tip, frame of the plan, by tool id, (n, 3) float64, mm, and samples by zone id.
+    """Findings by tool id and by zone id.
 
-    dug    : where more than a skin was taken going down
-    barred : where the tool must not go
-    packed : where too much of the cutter was in stock
-    left   : (n,) int64, samples of a zone's checks at which more stayed than allowed
-    lost   : (n,) int64, those at which it did so again: given up
-    unheld : walls that were finished without support, thinner than they are where that has to be nearer
+    The first three hold tip places by tool id, (n, 3) float64, mm, in the frame of the plan. ``left`` and ``lost`` hold
+    (n,) int64, index into the checks of a zone, by zone id.
+
+    dug    : the descent took more than one layer at once
+    barred : the tool must not go there
+    packed : too much of the cutter was in stock
+    left   : more material stayed than allowed
+    lost   : more material stayed a second time; the plan gives these samples up
+    unheld : walls that were finished without support, with a smaller thickness where support has to be nearer
     """
 
     dug: Mapping[str, F64] = field(default_factory=dict)
@@ -48,24 +54,37 @@ class Counterexamples:
     unheld: tuple[HighWall, ...] = ()
 
     def care(self, tool: ToolBody, points: F64) -> float:
-        """What share of skin and slope a line through points (n, 3), mm, may have: 1 where nothing was found."""
+        """Share of layer depth and ramp slope that a line may use; 1 where the proof found nothing near it.
+
+        points : (n, 3) float64, mm, tips in the frame of the plan
+        """
         if tool.id not in self.dug:
             return 1.0
         way = dense(points, 0.25 * tool.radius) if len(points) > 1 else points
         return CARE if _near(self.dug[tool.id], way, CAREFUL * tool.radius, plan=True).any() else 1.0
 
     def bars(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
-        """(n,) bool: which of tips (n, 3), mm, are where the tool must not go."""
-        return _near(self.barred.get(tool.id), points, max(BARRED * tool.radius, LEAST_BARRED))
+        """Whether tips lie where the tool must not go, (n,) bool.
+
+        points : (n, 3) float64, mm, tips in the frame of the plan
+        """
+        return _near(self.barred.get(tool.id), points, max(BARRED * tool.radius, MIN_BARRED))
 
     def crowds(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
-        """(n,) bool: which of tips (n, 3), mm, are where too much of the tool was in stock."""
+        """Whether tips lie where too much of the cutter was in stock, (n,) bool.
+
+        points : (n, 3) float64, mm, tips in the frame of the plan
+        """
         return _near(self.packed.get(tool.id), points, CROWDED * tool.radius)
 
     def aims(self, zone: str, aim: float, count: int) -> F64:
-        """(count,) mm: what is aimed at at the samples of a zone, ``aim`` or, where too much stayed, less.
+        """Residual that the plan aims at for each sample of a zone: ``aim``, or less where too much stayed.
 
-        At those given up it is less than anything, so they count as left whatever the plan measures there.
+        zone  : id of the zone
+        aim   : mm
+        count : number of samples
+
+        Returns (count,) float64, mm; -inf for samples that are given up, so that they always count as left.
         """
         out = np.full(count, aim)
         out[self.left.get(zone, [])] *= STRICTER
@@ -89,9 +108,10 @@ __all__ = ["NONE", "Counterexamples"]
 
 @dataclass(frozen=True)
 class HighWall:
-    """A wall that is to keep its support.
+    """A thin wall that needs support while it is finished.
 
-    top, bottom : mm, heights between which it stands, in the frame of the access; thickness : mm
+    top, bottom : mm, heights between which it stands, access frame
+    thickness   : mm
     """
 
     top: float

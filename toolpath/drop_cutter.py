@@ -1,4 +1,7 @@
-"""Drop-cutter and push-cutter: where a cutter first touches a mesh on its way down, or along a horizontal direction."""
+"""Drop-cutter and push-cutter: where a cutter first touches a mesh, coming from above or along a horizontal direction.
+
+Places are in mm, in the frame of the mesh with Z along the tool axis.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,12 @@ from toolpath.cutter.cutter import Cutter
 
 @dataclass(frozen=True, eq=False)
 class CutterContacts:
-    """Where a cutter stops, and at what.
+    """Where a cutter stops, and what it touches there.
 
-    value    : (n,) float64, mm, what ``drop_cutter`` or ``push_cutter`` gives
-    point    : (n, 3) float64, mm, cutter contact; NaN where nothing is touched
-    triangle : (n,) int32, triangle of the mesh; -1 where nothing is touched
-    face_id  : (n,) int32, its B-rep face as in ``TriangleMesh.face_ids``; -1 where nothing is touched
+    value    : (n,) float64, mm, result of ``drop_cutter`` or ``push_cutter``
+    point    : (n, 3) float64, mm, frame of the mesh, cutter contact; NaN where nothing is touched
+    triangle : (n,) int32, index, triangle of the mesh; -1 where nothing is touched
+    face_id  : (n,) int32, index, its B-rep face as in ``TriangleMesh.face_ids``; -1 where nothing is touched
     """
 
     value: F64
@@ -31,11 +34,11 @@ class CutterContacts:
 
 
 def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike) -> F64:
-    """Lowest tip height at which the cutter leaves the mesh untouched.
+    """Lowest tip height at which the cutter leaves the mesh untouched [Yau2004].
 
-    mesh   : TriangleMesh, or a TriangleTree over it where it is used again
+    mesh   : TriangleMesh, or a TriangleTree over it for repeated use
     cutter : Cutter, upright (+z)
-    xy     : (n, 2) float64, mm, places of the cutter axis
+    xy     : (n, 2) float64, mm, frame of the mesh, places of the cutter axis
 
     Returns
     -------
@@ -47,7 +50,7 @@ def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike
     GeometryError
         ``xy`` is not (n, 2) finite numbers, or the mesh has a vertex that is not finite.
     TypeError
-        ``mesh`` or ``cutter`` is something else.
+        ``mesh`` or ``cutter`` has another type.
 
     Examples
     --------
@@ -63,7 +66,19 @@ def drop_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike
 
 
 def drop_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLike) -> CutterContacts:
-    """``drop_cutter`` with what holds each tip up; parameters and errors as there."""
+    """``drop_cutter`` with the contact that holds each tip up.
+
+    mesh   : TriangleMesh, or a TriangleTree over it for repeated use
+    cutter : Cutter, upright (+z)
+    xy     : (n, 2) float64, mm, frame of the mesh, places of the cutter axis
+
+    Raises
+    ------
+    GeometryError
+        As ``drop_cutter``.
+    TypeError
+        As ``drop_cutter``.
+    """
     tree = _tree(mesh, cutter)
     if cutter.outline is not None:
         got = outline_drop.turned_contacts(tree, xy, cutter.outline)
@@ -73,25 +88,26 @@ def drop_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, xy: ArrayLi
 
 
 def push_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLike, direction: ArrayLike) -> F64:
-    """How far the cutter, coming from far away, gets along a horizontal direction until it first touches the mesh.
+    """Distance that a cutter moves along a horizontal direction until it first touches the mesh, coming from far away.
 
-    mesh      : TriangleMesh, or a TriangleTree over it where it is used again
+    mesh      : TriangleMesh, or a TriangleTree over it for repeated use
     cutter    : Cutter, upright (+z)
-    tips      : (n, 3) float64, mm, a point on the way of each tip
-    direction : (2,) float64, of any length above 0
+    tips      : (n, 3) float64, mm, frame of the mesh, a point on the path of each tip
+    direction : (2,) float64, dimensionless, of any length above 0
 
     Returns
     -------
     (n,) float64, mm
-        From the given tip along the direction; negative where the cutter has to stop before it, +inf where nothing is
-        in its way. Exact for the mesh to 1e-9 mm over the sine of the angle between the direction and what is touched.
+        From the given tip along the direction; negative where the cutter stops before it, +inf where nothing is in its
+        path. Exact for the mesh to 1e-9 mm over the sine of the angle between the direction and the touched facet.
 
     Raises
     ------
     GeometryError
-        ``tips`` is not (n, 3) finite numbers, the direction is zero or not finite, or a vertex of the mesh is not.
+        ``tips`` is not (n, 3) finite numbers, the direction is zero or not finite, or a vertex of the mesh is not
+        finite.
     TypeError
-        ``mesh`` or ``cutter`` is something else.
+        ``mesh`` or ``cutter`` has another type.
 
     Examples
     --------
@@ -106,7 +122,20 @@ def push_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLi
 
 def push_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLike,
                   direction: ArrayLike) -> CutterContacts:
-    """``push_cutter`` with what ends each way; parameters and errors as there."""
+    """``push_cutter`` with the contact that ends each path.
+
+    mesh      : TriangleMesh, or a TriangleTree over it for repeated use
+    cutter    : Cutter, upright (+z)
+    tips      : (n, 3) float64, mm, frame of the mesh, a point on the path of each tip
+    direction : (2,) float64, dimensionless, of any length above 0
+
+    Raises
+    ------
+    GeometryError
+        As ``push_cutter``.
+    TypeError
+        As ``push_cutter``.
+    """
     tree = _tree(mesh, cutter)
     got = push.push_contacts(tree, tips, direction, _outline(cutter))
     return CutterContacts(got.distance, got.point, got.triangle, _faces(tree, got.triangle))

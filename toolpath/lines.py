@@ -1,4 +1,7 @@
-"""Lines of tool tips: the value that passes, links and layers hand to each other."""
+"""Lines of tool tips: the value that passes, links and layers hand to each other.
+
+Places are in mm, access frame.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,14 @@ from geometry.mesh import F64
 from toolpath.kernels.contour import thin
 
 SAME_PLACE = 1e-6  # mm
-BESIDE = 0.1234  # of that
+BESIDE = 0.1234  # share of that by which the borders between keys are shifted
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
     """A line of tip positions, in climb order (free side on the left where it follows a wall).
 
-    points : (n, 3) float64, mm; a closed line repeats its first point
+    points : (n, 3) float64, mm, access frame; a closed line repeats its first point
     closed : bool
     """
 
@@ -31,12 +34,16 @@ class Line:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
     def reversed(self) -> Line:
-        """The same line walked the other way."""
+        """The same line in the other direction."""
         return Line(np.ascontiguousarray(self.points[::-1]), self.closed)
 
 
 def thinned(points: F64, tolerance: float) -> F64:
-    """A polyline (n, 3) with points left out while the rest stays within ``tolerance`` mm of it."""
+    """A polyline with points left out while the rest stays within a tolerance of it [Douglas1973], (m, 3) float64, mm.
+
+    points    : (n, 3) float64, mm, access frame
+    tolerance : mm
+    """
     points = np.ascontiguousarray(points)
     keep = np.zeros(len(points), np.bool_)
     thin(points, tolerance, keep)
@@ -44,31 +51,39 @@ def thinned(points: F64, tolerance: float) -> F64:
 
 
 def place_keys(points: F64) -> list[bytes]:
-    """A key for each of points (n, k), mm, that is the same for places rounded differently.
+    """A key for each point, the same for places that differ by rounding only.
 
-    Lines cut from a lattice lie on its nice fractions: the borders of what is one place are put beside them.
+    Lines cut from a lattice lie on simple fractions of it. So the borders between keys lie beside these.
+
+    points : (n, k) float64, mm
     """
     return [row.tobytes() for row in np.floor(points / SAME_PLACE + BESIDE).astype(np.int64)]
 
 
 def dense(points: F64, spacing: float) -> F64:
-    """A polyline (n, 3) with points put in between, at most ``spacing`` mm apart along it."""
+    """A polyline with points added, at most ``spacing`` mm apart along it, (m, 3) float64, mm.
+
+    points : (n, 3) float64, mm, access frame
+    """
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
     return np.column_stack([np.interp(more, s, points[:, c]) for c in range(3)])
 
 
 def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Half-open ranges [a, b) of indices with consecutive True values of flags (n,)."""
+    """Half-open ranges [a, b) of index with consecutive True values.
+
+    flags : (n,) bool
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: float) -> list[Line]:
-    """Cut a line to the points that are wanted, each piece made longer and near pieces joined.
+    """The wanted parts of a line, each extended, with near ones joined.
 
-    wanted : (n,) bool for the points of the line
-    extend : mm added along the line at both ends of a piece
+    wanted : (n,) bool, for the points of the line
+    extend : mm, added along the line at both ends of a piece
     join   : mm, pieces nearer than this along the line become one
     """
     if not wanted.any():
@@ -99,7 +114,11 @@ def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: flo
 
 
 def stretch(points: F64, s: F64, low: float, high: float) -> F64:
-    """A polyline (n, 3), mm, from ``low`` to ``high`` mm along it; s : (n,) mm, how far along its points are."""
+    """A polyline from ``low`` to ``high`` mm along it, (m, 3) float64, mm.
+
+    points : (n, 3) float64, mm, access frame
+    s      : (n,) float64, mm, distance of its points along it
+    """
     inner = points[(s > low) & (s < high)]
     ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (low, high)])
     return np.vstack([ends[:1], inner, ends[1:]])

@@ -1,8 +1,8 @@
-"""A plan under way: what of it the acts that follow need, as plain values and arrays.
+"""A plan in progress: the state that its remaining acts need, as plain values and arrays.
 
-A plan is a row of acts, each the layers of a tool in a band, the finish of a zone in a band, or one more go at a zone.
-Between two of them all there is to know is here, and what can be laid out anew from the inputs of the plan is not:
-lattices, lines of passes, areas of layers.
+A plan is a sequence of acts: the layers of a tool in a band, the finish of a zone in a band, or a repeated finish of a
+zone. A checkpoint holds all state between two acts. It leaves out whatever follows from the inputs of the plan, such as
+lattices, lines of passes and areas of layers.
 """
 
 from __future__ import annotations
@@ -15,32 +15,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.stock.stock_map import StockNow
+from toolpath.stock.stock_map import StockSnapshot
 from toolpath.workingsteps import Workingstep
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
-    """Lines one behind the other: points (n, 3) float64, mm, and how many each has, (k,) int64."""
+class PackedLines:
+    """Several lines in one array.
+
+    points : (n, 3) float64, mm, access frame, line after line
+    counts : (k,) int64, count of points of each line
+    """
 
     points: F64
     counts: NDArray[np.int64]
 
     @classmethod
-    def of(cls, lines: Sequence[F64]) -> Ways:
-        """Lines (n, 3), mm, joined."""
+    def of(cls, lines: Sequence[F64]) -> PackedLines:
+        """Joins lines, each (n, 3) float64, mm, access frame, tips.
+
+        lines : sequence of arrays
+        """
         return cls(np.concatenate([np.zeros((0, 3)), *lines]), np.array([len(line) for line in lines], np.int64))
 
     def lines(self) -> list[F64]:
-        """The lines that were joined."""
+        """The lines that were joined, each (n, 3) float64, mm, access frame."""
         return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
 
 @dataclass(frozen=True, eq=False)
-class FinishNow:
-    """A ``Finish``: residual (n,) mm and met (n,) bool at its checks, and of its strategy all but the lines."""
+class FinishSnapshot:
+    """State of a ``Finish``: residual (n,) float64, mm, and met (n,) bool at its checks, and its strategy without the
+    lines."""
 
     zone: str
     residual: F64
@@ -57,9 +65,14 @@ class FinishNow:
 
 
 @dataclass(frozen=True, eq=False)
-class LayersNow:
-    """The layers of a tool: how high stock stood when they were laid out, what they have come to, mm, and how many
-    are left."""
+class LayersSnapshot:
+    """State of the layers of a tool.
+
+    top   : mm, height of the stock when the layers were laid out
+    swept : mm, height at which all walls were last followed
+    above : mm, height of the last layer
+    left  : count of layers to come
+    """
 
     top: float
     swept: float
@@ -68,41 +81,43 @@ class LayersNow:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolNow:
-    """What a tool has walked and cut; its layers and the ids of their workingsteps; its zones that have been begun."""
+class ToolSnapshot:
+    """State of a tool: moves walked and cut, its layers with the ids of their workingsteps, and the zones it has
+    begun."""
 
-    walked: Ways
-    depths: Ways
-    layers: LayersNow | None
+    walked: PackedLines
+    depths: PackedLines
+    layers: LayersSnapshot | None
     layered: tuple[str, ...]
-    finishes: tuple[FinishNow, ...]
+    finishes: tuple[FinishSnapshot, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class PlanNow:
-    """A plan after so many acts."""
+class PlanSnapshot:
+    """State of a plan after so many acts."""
 
     acts: int
     steps: tuple[Workingstep, ...]
-    stock: StockNow
-    tools: tuple[ToolNow, ...]
+    stock: StockSnapshot
+    tools: tuple[ToolSnapshot, ...]
 
 
-class Keeper:
-    """Who is told of a plan under way, and may know it from an attempt before; this one keeps nothing."""
+class CheckpointKeeper:
+    """Keeps a plan in progress and may restore it from an earlier attempt; this one keeps nothing."""
 
-    def taken(self, use: Callable[[PlanNow], T]) -> T | None:
-        """What ``use`` makes of the plan that is kept; None where there is none, or one that it makes nothing of.
+    def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
+        """Result of ``use`` for the kept plan; None where none is kept, or where ``use`` cannot restore it.
 
-        ``use`` raises AttributeError, IndexError, KeyError, TypeError or ValueError then, and has changed nothing.
+        ``use`` then raises AttributeError, IndexError, KeyError, TypeError or ValueError and has changed nothing.
         """
         del use
         return None
 
-    def done(self, now: Callable[[], PlanNow]) -> None:
-        """An act is over; ``now`` is asked where this is worth keeping."""
+    def done(self, snapshot: Callable[[], PlanSnapshot]) -> None:
+        """Called after each act; ``snapshot`` is evaluated where keeping is worthwhile."""
 
 
-NOTHING = Keeper()
+NOTHING = CheckpointKeeper()
 
-__all__ = ["NOTHING", "FinishNow", "Keeper", "LayersNow", "PlanNow", "StockNow", "ToolNow", "Ways"]
+__all__ = ["NOTHING", "CheckpointKeeper", "FinishSnapshot", "LayersSnapshot", "PackedLines", "PlanSnapshot",
+           "StockSnapshot", "ToolSnapshot"]

@@ -1,4 +1,4 @@
-"""What a plan is asked for: speeds of a tool, tolerances and heights."""
+"""Settings of a plan: speeds of a tool, tolerances and heights."""
 
 from __future__ import annotations
 
@@ -14,27 +14,35 @@ from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.tool_deflection import LEAST_FEED, Bend, Bending, effective_diameter
+from toolpath.tool_deflection import MIN_FEED, DeflectionEstimate, DeflectionModel, effective_diameter
+from toolpath.workingsteps import CutDirection
 
 
 class Pattern(StrEnum):
-    """How passes over shallow area follow each other."""
+    """Order of passes over shallow area."""
 
     AUTO = "auto"
-    """Zigzag or spiral, whichever is less way."""
+    """Zigzag or spiral, whichever is shorter."""
     ZIGZAG = "zigzag"
-    """Straight passes, to and fro."""
+    """Straight passes, back and forth."""
     ONE_WAY = "one_way"
-    """Straight passes, all walked the same way."""
+    """Straight passes, all in the same direction."""
     SPIRAL = "spiral"
-    """Rings from the border inwards, joined turn by turn."""
+    """Rings from the border inwards, joined turn by turn to a spiral."""
 
 
 @dataclass(frozen=True)
 class CutData:
-    """How fast one tool cuts: 1/min and mm/min; step_down in mm, the deepest layer it takes; engaged in rad, most of
-    the front of the cutter that may be in stock; finish: the same in finishing, None where it is no other; bending:
-    what it bends by under a cut, None where nobody knows; bend: what that is at this feed, None before it is asked."""
+    """Cutting data of one tool.
+
+    spindle_rpm                   : 1/min
+    feed, plunge_feed, link_feed  : mm/min
+    step_down                     : mm, the deepest layer
+    engaged                       : rad, largest engaged angle of the front of the cutter
+    finish                        : the same for finishing; None where it does not differ
+    bending                       : DeflectionModel of the tool; None where it is unknown
+    bend                          : DeflectionEstimate at this feed; None before it is computed
+    """
 
     spindle_rpm: float
     feed: float
@@ -43,25 +51,28 @@ class CutData:
     step_down: float
     engaged: float = math.pi
     finish: CutData | None = None
-    bending: Bending | None = None
-    bend: Bend | None = None
+    bending: DeflectionModel | None = None
+    bend: DeflectionEstimate | None = None
 
     def under(self, depth: float, width: float) -> CutData:
-        """The same with the feed eased to where a cut of a depth and a width, mm, bends the tool no more than it may.
+        """The same with the feed reduced to where a cut deflects the tool no more than its limit.
+
+        depth, width : mm, of the cut
 
         Ways down are no faster than that.
         """
         if self.bending is None:
             return self
         bend = self.bending.under(self.feed, depth, width)
-        feed = max(LEAST_FEED, bend.share * self.feed)
+        feed = max(MIN_FEED, bend.share * self.feed)
         down = self.plunge_feed if self.bending.ways_fixed else min(self.plunge_feed, feed)
         return replace(self, feed=feed, plunge_feed=down, bend=bend)
 
     def feed_under(self, tool: ToolBody, depth: float, angle: float) -> float:
-        """mm/min at which a cut of a depth, mm, and an engaged angle, rad, bends the tool no more than it may.
+        """Feed, mm/min, at which a cut of a depth, mm, and an engaged angle, rad, deflects the tool no more than its
+        limit.
 
-        Never less than the feed, which is for the worst, nor more than that was before it was eased.
+        It is at least ``feed``, which is for the worst cut, and at most the feed before it was reduced.
         """
         if self.bending is None or self.bend is None or self.bend.share >= 1.0:
             return self.feed
@@ -71,14 +82,14 @@ class CutData:
 
 
 @dataclass(frozen=True)
-class Turning:
-    """What rotary axes can do, in the frame of an access.
+class RotaryAxes:
+    """Abilities of the rotary axes, in the access frame.
 
-    stands  : for which tool axes (n, 3), unit, they have a place, (n,) bool
-    along   : a path of tips (n, 3), mm, and axes (n, 3), unit, as they follow it, and the least minutes each of its
-              blocks takes them, (m, 3), (m, 3) and (m - 1,); None where they do not get along it
+    stands  : (n,) bool, whether the machine can take tool axes, (n, 3) float64, unit
+    along   : the path that the machine follows for tips (n, 3) float64, mm, and axes (n, 3), and the shortest time of
+              each block, (m, 3), (m, 3) and (m - 1,) min; None where the rotary axes cannot follow
     up      : (3,) float64, unit, away from the table
-    table   : mm along ``up``, below which nothing of a leaning tool may come
+    table   : mm along ``up``, below which no part of a tilted tool may come
     """
 
     stands: Callable[[F64], NDArray[np.bool_]]
@@ -88,10 +99,12 @@ class Turning:
 
 
 @dataclass(frozen=True)
-class Leaned:
-    """How far a nose is asked to lean off the normal of faces, rad: forwards along a pass, and to one side of it.
+class ToolLean:
+    """Requested tilt of a ball or bull nose off the normal of faces, rad.
 
-    walls : to one side on walls; None where it leans on others alone
+    lead  : forward along a pass
+    tilt  : to one side of it
+    walls : to one side on walls; None where walls get no tilt
     """
 
     lead: float
@@ -105,16 +118,16 @@ class PlanSettings:
 
     lift            : distance along the normal within which a touch counts as reach
     clearance       : height of rapid moves across
-    rapid_floor     : height down to which a rapid may go
-    either_way      : walls may be cut in both directions; climb : else climb, or conventional when False
+    rapid_floor     : lowest height of a rapid
+    cut_direction   : CutDirection of passes along walls
     pattern         : of passes over shallow area
-    turning         : what the rotary axes can do; None on a machine without
-    leaned          : how far noses are asked to lean on faces; None where that is left to the plan
-    found           : what a proof found wrong with the plans before, in the frame of this one
-    rates           : what the machine does, for times
-    planes          : heights of contact, descending, above which all is finished before any tool goes below
+    turning         : RotaryAxes; None on a machine without
+    leaned          : requested tilt on faces; None where the plan chooses
+    found           : findings of proofs of earlier plans, in the frame of this one
+    rates           : speeds and accelerations of the machine, for times
+    planes          : heights of contact, descending: all above one is finished before any tool goes below it
                       (``toolpath.planning.depth_bands``)
-    semi_finishing  : between the layers too, so that they leave even stock
+    semi_finishing  : cuts between the layers too, so that they leave even stock
     """
 
     scallop_height: float
@@ -126,12 +139,11 @@ class PlanSettings:
     ramp_angle: float
     roughing: bool = True
     finishing: bool = True
-    climb: bool = True
-    either_way: bool = False
+    cut_direction: CutDirection = CutDirection.CLIMB
     pattern: Pattern = Pattern.AUTO
-    turning: Turning | None = None
+    turning: RotaryAxes | None = None
     found: Counterexamples = NONE
     rates: Rates = RATES
     planes: tuple[float, ...] = ()
     semi_finishing: bool = False
-    leaned: Leaned | None = None
+    leaned: ToolLean | None = None

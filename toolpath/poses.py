@@ -1,4 +1,7 @@
-"""Poses: tips with a tool axis each, and places between them."""
+"""Poses: tips with a tool axis each, and places between them.
+
+Arrays are float64. Tips are in mm, axes dimensionless unit vectors from tip to spindle, both in the access frame.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,26 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 
 Axes = Callable[[F64, F64, F64], F64]
+"""Tool axes (k, 3), unit, at contacts (k, 3), mm, with normals and directions along the pass, (k, 3), both unit."""
+
 Blocked = Callable[[F64, F64], NDArray[np.bool_]]
+"""Whether a tool enters something, (k,) bool, with its tip at (k, 3), mm, and unit axes (k, 3)."""
 
 
 def angles_between(axis: F64) -> F64:
-    """(k - 1,) rad between neighbouring axes (k, 3)."""
+    """Angles between neighbouring axes, (k - 1,) float64, rad.
+
+    axis : (k, 3) float64, unit, access frame
+    """
     cross = np.linalg.norm(np.cross(axis[1:], axis[:-1]), axis=1)
     return np.asarray(np.arctan2(cross, (axis[1:] * axis[:-1]).sum(axis=1)))
 
 
 def places_along(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
-    """Numbers (m,) of poses with fractions between, ``spacing`` mm apart at most at the tip and ``reach`` mm up.
+    """Poses with fractions between, (m,) float64, index, at most ``spacing`` mm apart at the tip and ``reach`` mm up
+    the axis.
 
-    tips, axes : (n, 3) float64, mm and unit
+    tips, axes : (n, 3) float64, mm and unit, access frame
     """
     gone = np.maximum(*(np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)))
     counts = np.maximum(np.ceil(gone / spacing), 1).astype(int).tolist()
@@ -30,9 +40,11 @@ def places_along(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
 
 
 def between(tips: F64, axes: F64, places: F64) -> tuple[F64, F64]:
-    """Tips and axes (m, 3) at ``places_along``: tips straight between poses, axes evenly on the great circle.
+    """Tips and axes, both (m, 3) float64, at fractional poses: tips straight between poses, axes evenly on the great
+    circle [Shoemake1985].
 
-    tips, axes : (n, 3) float64, mm and unit; places : (m,) numbers of poses with fractions
+    tips, axes : (n, 3) float64, mm and unit, access frame
+    places     : (m,) float64, index of poses with fractions, as ``places_along`` gives them
     """
     k = np.clip(places.astype(np.int64), 0, max(len(tips) - 2, 0))
     share = (places - k)[:, None]

@@ -13,18 +13,18 @@ ROUNDS = 60
 
 
 def roots(f: Callable[[F64, NDArray[np.int64]], F64], a: F64, b: F64, at_a: F64, at_b: F64, tolerance: float) -> F64:
-    """Where functions change sign between a and b.
+    """Places where functions change sign between a and b, by the Illinois rule [Dowell1971].
 
-    f          : of places (k,) and the numbers (k,) int64 of the functions they are put to; may be infinite
-    a, b       : (n,) float64, ends of the brackets
+    f          : values at places (k,) of the functions with index (k,) int64; may be infinite
+    a, b       : (n,) float64, ends of the brackets, dimensionless or any unit
     at_a, at_b : (n,) float64, values there, of different signs or zero
     tolerance  : a bracket this narrow, or a value this small, ends the search
 
     Returns
     -------
     (n,) float64
-        By false position, the end that stays being halved so that both ends move (the Illinois rule); by halving
-        where an end is infinite.
+        By false position. The value at the end that stays is halved, so that both ends move. A bracket with an infinite
+        value is halved.
     """
     out = np.where(at_a == 0.0, a, b)
     k = np.flatnonzero((at_a != 0.0) & (at_b != 0.0))

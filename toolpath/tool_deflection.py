@@ -1,9 +1,15 @@
-"""How far the tip of a tool bends under what it cuts, and a feed at which it bends no more than it may.
+"""Deflection of the tip of a tool under its cut, and a feed that keeps it within its limit.
 
-Notation: F force N, E modulus N/mm2, I = pi d^4 / 64 second moment mm4, z heights above the tip mm; kc specific cutting
-force of a chip of 1 mm by 1 mm, N/mm2, mc its exponent; a depth, ae width of cut, b length of the edge in it, fz feed
-per tooth, h thickness of the chip, all mm; phi engaged angle, rad. Formulas, sources and what is left out:
-docs/theory/feeds.md.
+Notation
+    F, E, I : force, N; modulus, N/mm2; second moment pi d^4 / 64, mm4
+    z       : height above the tip, mm
+    kc, mc  : specific cutting force of a chip of 1 mm by 1 mm, N/mm2, and its exponent
+    a, ae   : depth and width of cut, mm
+    b       : length of the edge in the cut, mm
+    fz, h   : feed per tooth and thickness of the chip, mm
+    phi     : engaged angle, rad
+
+Formulas, sources and omissions: docs/theory/feeds.md.
 """
 
 from __future__ import annotations
@@ -17,23 +23,25 @@ CARBIDE = 600e3
 """N/mm2, modulus of cemented carbide."""
 CORE = 0.8
 """Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
-LEAST_SHARE = 0.2
-"""A feed is not eased to less than this share of itself: below, edges rub and the tool wears for nothing."""
+MIN_SHARE = 0.2
+"""Least share to which a feed is reduced: below it, edges rub and the tool wears without cutting."""
 LAYER_LIMIT = 0.05
-"""mm, most that a tool may bend in layers, where half of what they leave is not less."""
+"""mm, largest deflection of a tool in layers, unless half of the stock they leave is less."""
 LEFT_SHARE, LEFT_STEPS = 0.1, 1.5
-"""What layers leave for the finish: of the deepest layer, and of the lattice step; the greater."""
-LEAST_FEED = 0.1
+"""Stock that layers leave for the finish: share of the deepest layer, and lattice steps; the greater counts."""
+MIN_FEED = 0.1
 """mm/min."""
 
 
 @dataclass(frozen=True)
-class Bend:
-    """What a cut bends a tool by.
+class DeflectionEstimate:
+    """Deflection of a tool under a cut.
 
-    full  : mm, at the feed of material and tool; limit : mm, that it may
-    share : of that feed at which the tool goes; deflection : mm, at it
-    fixed : the feed is the setup's own and was not eased
+    full       : mm, at the feed of material and tool
+    limit      : mm
+    share      : dimensionless, share of that feed at which the tool moves
+    deflection : mm, at that share
+    fixed      : the setup gives the feed, which is not reduced
     """
 
     full: float
@@ -44,15 +52,17 @@ class Bend:
 
 
 @dataclass(frozen=True)
-class Bending:
-    """A tool that cuts a material, as far as its bending goes.
+class DeflectionModel:
+    """Stiffness of a tool and cutting force of a material.
 
     compliance : mm/N, of the tip
     kc, mc     : of the material
-    limit      : mm, that the tip may bend
-    flutes     : number of teeth; rpm : of the spindle, 1/min
-    finishing  : only what of the force stands square to the cut surface counts
-    fixed      : its feed is the setup's own and not eased; ways_fixed : that of ways down
+    limit      : mm, largest deflection of the tip
+    flutes     : count of teeth
+    rpm        : of the spindle, 1/min
+    finishing  : only the force square to the cut surface counts
+    fixed      : the setup gives the feed, which is not reduced
+    ways_fixed : the same for ways down
     """
 
     tool: ToolBody
@@ -66,8 +76,14 @@ class Bending:
     fixed: bool = False
     ways_fixed: bool = False
 
-    def under(self, feed: float, depth: float, width: float) -> Bend:
-        """What a cut of a depth and a width, mm, bends the tool by at a feed, mm/min, and how far that is eased."""
+    def under(self, feed: float, depth: float, width: float) -> DeflectionEstimate:
+        """Deflection under a cut at a feed, mm/min, and the share to which the feed is reduced [Kienzle1952]
+        [Timoshenko1955].
+
+        depth, width : mm, of the cut
+
+        The force grows with feed^(1 - mc), so the share is (limit / full)^(1 / (1 - mc)), at least ``MIN_SHARE``.
+        """
         tool = self.tool
         force = cutting_force(self.kc, self.mc, feed / (self.flutes * self.rpm), depth, width, tool, self.flutes)
         if self.finishing:
@@ -75,15 +91,16 @@ class Bending:
         full = force * self.compliance
         share = 1.0
         if full > self.limit and not self.fixed:
-            share = max(LEAST_SHARE, (self.limit / full) ** (1.0 / (1.0 - self.mc)))
-        return Bend(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
+            share = max(MIN_SHARE, (self.limit / full) ** (1.0 / (1.0 - self.mc)))
+        return DeflectionEstimate(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
 
 
 def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
-    """mm/N at the tip of a tool held at the nose of its holder, under a force at the tip square to its axis.
+    """Deflection of the tip for each N of force, mm/N, for a tool held at the nose of its holder [Timoshenko1955].
 
-    Cylinders end to end: flutes as a bar of ``CORE`` of the diameter, neck, shank. The moment at the height z is F z,
-    so that tip / F = sum (z1^3 - z0^3) / (3 E I) over the cylinders from z0 to z1.
+    The force acts at the tip, square to the axis. The tool is a stepped bar: flutes as a bar of ``CORE`` of the
+    diameter, neck, shank. The moment at the height z is F z, so tip / F = sum (z1^3 - z0^3) / (3 E I) over the
+    cylinders from z0 to z1. Shear and the holder's compliance are left out.
     """
     total, low = 0.0, 0.0
     for top, wide in ((tool.flute_length, CORE * tool.diameter), (tool.neck_length, tool.neck_diameter),
@@ -106,7 +123,10 @@ def effective_diameter(diameter: float, corner_radius: float, depth: float) -> f
 
 
 def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
-    """Rad, of a side cut at the effective diameter D: cos(phi) = 1 - 2 ae / D; pi in a slot; depth and width in mm.
+    """Engaged angle of a side cut at the effective diameter D, rad: cos(phi) = 1 - 2 ae / D; pi in a slot
+    [Altintas2012].
+
+    depth, width : mm
 
     >>> round(math.degrees(engaged_angle(ToolBody("T1", 1, 10.0, 0.0, 20.0, 10.0, 20.0, 10.0, 40.0), 5.0, 2.5)), 9)
     60.0
@@ -117,7 +137,7 @@ def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
 
 def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: float, tool: ToolBody,
                   flutes: int) -> float:
-    """Cutting force of a milling tool, N: that of all teeth in the cut, of one at least.
+    """Cutting force of a milling tool, N: that of all teeth in the cut, of at least one [Kienzle1952].
 
     kc, mc                   : N/mm2 and its exponent
     per_tooth, depth, width  : mm
@@ -137,9 +157,13 @@ def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: f
 
 
 def left_by_layers(step_down: float, spacing: float) -> float:
-    """mm that layers leave on a wall for its finish; step_down : mm, deepest layer; spacing : mm, of the lattice."""
+    """Stock that layers leave on a wall for its finish, mm.
+
+    step_down : mm, deepest layer
+    spacing   : mm, of the lattice
+    """
     return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing)
 
 
-__all__ = ["CARBIDE", "CORE", "LAYER_LIMIT", "LEAST_FEED", "LEAST_SHARE", "Bend", "Bending", "compliance",
-           "cutting_force", "effective_diameter", "engaged_angle", "left_by_layers"]
+__all__ = ["CARBIDE", "CORE", "LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel",
+           "compliance", "cutting_force", "effective_diameter", "engaged_angle", "left_by_layers"]

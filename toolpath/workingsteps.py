@@ -1,7 +1,7 @@
-"""What the planner hands on: trajectories of the tool tip and the workingsteps made of them.
+"""Output of the planner: trajectories of the tool tip and the workingsteps made of them.
 
-Plain values, tool tip, frame of the access, mm. Rapids move Z alone, or XY alone at the clearance height; the planner
-guarantees it and nothing downstream reorders.
+Plain values of the tool tip in mm, access frame. Rapids move Z alone, or XY alone at the clearance height. The planner
+guarantees that, and nothing downstream reorders them.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates, move_seconds
 from geometry.tool_body import ToolBody
-from toolpath.tool_deflection import Bend
+from toolpath.tool_deflection import DeflectionEstimate
 
 
-class Motion(StrEnum):
-    """What a trajectory is for; the STEP-NC trajectory types follow from it."""
+class TrajectoryKind(StrEnum):
+    """Purpose of a trajectory; the STEP-NC trajectory types follow from it [ISO14649-10]."""
 
     RAPID = "rapid"
     APPROACH = "approach"
@@ -28,13 +28,34 @@ class Motion(StrEnum):
     LIFT = "lift"
 
 
-@dataclass(frozen=True)
-class Arc:
-    """A stretch of a trajectory on a circle as seen along Z; where Z changes it goes evenly with the angle, a helix.
+class CutDirection(StrEnum):
+    """On which side of its way a tool has the material, seen from the spindle of a right-hand cutter."""
 
-    first, last : rows of the points it begins and ends at
-    centre      : mm, X and Y
-    left        : counter-clockwise seen from above, as G3 goes
+    CLIMB = "climb"
+    """Material on the right."""
+    CONVENTIONAL = "conventional"
+    """Material on the left."""
+    EITHER = "either"
+    """Passes may go both ways; the first of them climbs."""
+
+    @property
+    def climbs(self) -> bool:
+        """Whether the first pass climbs."""
+        return self is not CutDirection.CONVENTIONAL
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether passes may go both ways."""
+        return self is CutDirection.EITHER
+
+
+@dataclass(frozen=True)
+class ArcSpan:
+    """A stretch of a trajectory on a circle seen along Z; where Z changes, it changes evenly with the angle, a helix.
+
+    first, last : index of the points where it begins and ends
+    centre      : mm, X and Y, access frame
+    left        : counter-clockwise seen from above, as G3
     """
 
     first: int
@@ -47,37 +68,37 @@ class Arc:
 class Trajectory:
     """One polyline of the tool tip.
 
-    motion : what it is for; RAPID is a G0, everything else a G1 at ``feed``
-    points : (n, 3) float64, mm, n >= 2; the first point equals the last of the trajectory before it
+    motion : TrajectoryKind; RAPID is a G0, everything else a G1 at ``feed``
+    points : (n, 3) float64, mm, access frame, n >= 2; the first point equals the last of the trajectory before it
     feed   : mm/min; ignored for a rapid
-    axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points all the way
-    arcs   : stretches that may be gone along as G2 or G3, in order, apart but for their ends; the points between those
-             of an arc lie on it
+    axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points
+    arcs   : stretches that G2 or G3 can follow, in order, separate but for their ends; the points between those of an
+             arc lie on it
     """
 
-    motion: Motion
+    motion: TrajectoryKind
     points: F64
     feed: float
     axes: F64 | None = None
-    arcs: tuple[Arc, ...] = ()
+    arcs: tuple[ArcSpan, ...] = ()
 
     @property
     def length(self) -> float:
-        """mm."""
+        """Length, mm."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
 def seconds_of(trajectories: Sequence[Trajectory], rates: Rates) -> float:
-    """Seconds of trajectories run one behind the other; where rapids and feed moves meet the control stands still."""
+    """Time of trajectories in sequence, s; the control stops where rapids and feed moves meet."""
     return float(trajectory_seconds(trajectories, rates).sum())
 
 
 def trajectory_seconds(trajectories: Sequence[Trajectory], rates: Rates) -> F64:
-    """(k,) float64, s, of each of k trajectories run one behind the other; see ``seconds_of``."""
+    """Time of each of k trajectories in sequence, (k,) float64, s; see ``seconds_of``."""
     if not trajectories:
         return np.zeros(0)
     count = [len(t.points) - 1 for t in trajectories]
-    rapid = np.repeat([t.motion is Motion.RAPID for t in trajectories], count)
+    rapid = np.repeat([t.motion is TrajectoryKind.RAPID for t in trajectories], count)
     feed = np.where(rapid, rates.rapid, np.repeat([t.feed for t in trajectories], count))
     stop = np.concatenate([[False], rapid[1:] != rapid[:-1]])
     way = np.concatenate([np.diff(t.points, axis=0) for t in trajectories])
@@ -93,14 +114,15 @@ class Workingstep:
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
     operation : 'roughing', 'semi_finishing' or 'finishing'
-    strategy  : 'depth_layers', 'waterline', 'planar_floor', 'zigzag', 'one_way', 'spiral', 'isoparametric', 'flank', 'curvature_matched', 'inclined_axis'
+    strategy  : 'depth_layers', 'waterline', 'planar_floor', 'zigzag', 'one_way', 'spiral', 'isoparametric', 'flank',
+                'curvature_matched', 'inclined_axis'
     outline   : (k, 2) float64, mm, closed outline (first point repeated) of the machined area in plan
     top, bottom : mm, z of the feature
     access    : id of the access in whose frame all this is; '' where the plan has one frame
-    rates     : what the machine does, for times
-    bend      : what its cuts bend the tool by, as estimated; None where nobody knows
-    fresh     : the program asks for a fresh cutter before it
-    either_way: its passes may go in both directions; climb says that of the first
+    rates     : speeds and accelerations of the machine, for times
+    bend      : DeflectionEstimate of its cuts; None where it is unknown
+    fresh     : the program requests a fresh cutter before it
+    cut_direction : CutDirection of its passes
     """
 
     id: str
@@ -119,12 +141,11 @@ class Workingstep:
     outline: F64
     top: float
     bottom: float
-    climb: bool = True
+    cut_direction: CutDirection = CutDirection.CLIMB
     access: str = ""
     rates: Rates = RATES
-    bend: Bend | None = None
+    bend: DeflectionEstimate | None = None
     fresh: bool = False
-    either_way: bool = False
 
     @property
     def seconds(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from geometry.mesh import F64
 from toolpath.linking.linker import Linker
 from toolpath.passes.contours import dilated
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
@@ -48,7 +48,7 @@ class Plain(Finish):
                           self.settings.found)
 
 
-def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Callable[[float], None] | None = None, first_step: int = 1,
              trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:

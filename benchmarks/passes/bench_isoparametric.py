@@ -40,9 +40,9 @@ from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402
 from toolpath.passes.cutter_locations import FREE, lifted, tips  # noqa: E402
-from toolpath.passes.forward_step import Profile, arc_rule, steps  # noqa: E402
+from toolpath.passes.forward_step import PassProfile, arc_rule, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out  # noqa: E402
-from toolpath.passes.pass_family import Dragged, Promise, Swath, Target  # noqa: E402
+from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath  # noqa: E402
 from toolpath.passes.side_step import lay_out as parallel  # noqa: E402
 from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
@@ -100,7 +100,7 @@ def passes_of(piece: Squared, surface: NurbsSurface, radius: float, scallop: flo
     """Tips (n, 3) of each pass over a piece, mm, and their length in all; kept : mm of scallop to lay out for."""
     iso, out, way = IsoSurface(surface, piece.map), [], 0.0
     for eta in lay_out(iso, radius, kept).tolist():
-        profile = Profile.of(iso.curve(eta), chord, radius)
+        profile = PassProfile.of(iso.curve(eta), chord, radius)
         out.append(profile.centres(steps(profile, radius, chord, scallop), radius) - [0.0, 0.0, radius])
         way += profile.length
     return out, way
@@ -132,7 +132,7 @@ def plane_parallel(trim: Trim) -> tuple[int, float, float]:
     facet_deviation(trim.surface, trim.surface.discretised(*large))
     tree = TriangleTree(trim.surface.discretised(large[0] / 3.0, large[1] / 3.0))
     cutter = Cutter.ball(diameter=2.0 * RADIUS, length=20.0)
-    target = Target(points, normals, points + RADIUS * normals - [0.0, 0.0, RADIUS], spacing)
+    target = FinishTarget(points, normals, points + RADIUS * normals - [0.0, 0.0, RADIUS], spacing)
     begin = time.perf_counter()
     made = parallel(Swath(Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree), target,
                           Promise(SCALLOP, SCALLOP, 0.3 * RADIUS, 10.0), 0.0), subdivide=False)
@@ -187,7 +187,7 @@ def chords() -> None:
                 off: list[F64] = []
                 total = bends = 0
                 for eta in np.linspace(0.0, 1.0, 12).tolist():
-                    profile = Profile.of(iso.curve(eta), tolerance, RADIUS)
+                    profile = PassProfile.of(iso.curve(eta), tolerance, RADIUS)
                     ends = steps(profile, RADIUS, tolerance) if name == "ours" else arc_rule(profile, RADIUS, tolerance)
                     whole = np.diff(ends) < 39.99
                     whole[-1] = False
@@ -199,7 +199,7 @@ def chords() -> None:
                       f"{every.mean():8.4f} {(every > 1.001).sum():10d}", flush=True)
 
 
-def inflections(profile: Profile) -> int:
+def inflections(profile: PassProfile) -> int:
     """How often the curvature of a pass along the normal changes its sign."""
     bend = (np.diff(profile.contact, 2, axis=0) * profile.normal[1:-1]).sum(axis=1)[::8]
     return int((np.sign(bend[1:]) != np.sign(bend[:-1])).sum())
@@ -301,7 +301,7 @@ def faces(step: Path, given: dict, radius: float, scallop: float, chord: float, 
             lines, way, count = [], 0.0, 0
             for iso, etas in face.passes(radius, scallop - chord - off, flank):
                 for eta in etas.tolist():
-                    profile = Profile.of(iso.curve(eta), chord, radius)
+                    profile = PassProfile.of(iso.curve(eta), chord, radius)
                     line, _ = lifted(profile, steps(profile, radius, chord, scallop), tool, limit, chord, off)
                     lines += line
                     way, count = way + profile.length, count + 1
@@ -368,7 +368,7 @@ def leaning_faces(parts: Path, lean: float) -> None:
             begin, pieces, way, out, count = time.perf_counter(), [], 0.0, 0.0, 0
             for iso, etas in face.passes(body.radius, scallop - chord - off, None):
                 for eta in etas.tolist():
-                    profile = Profile.of(iso.curve(eta), chord, body.radius)
+                    profile = PassProfile.of(iso.curve(eta), chord, body.radius)
                     made = posed(profile, steps(profile, body.radius, chord, scallop), body, leaned(np.radians(angle)),
                                  blocked, chord, off)
                     pieces += made.pieces

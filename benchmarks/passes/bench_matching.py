@@ -40,8 +40,8 @@ from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
 from service.stages.preparation import placement_of  # noqa: E402
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width  # noqa: E402
-from toolpath.five_axis.matched_passes import Matched, Wanted  # noqa: E402
-from toolpath.five_axis.surface_partition import Part, parted  # noqa: E402
+from toolpath.five_axis.matched_passes import MatchedPasses, MatchTolerances  # noqa: E402
+from toolpath.five_axis.surface_partition import SurfacePiece, parted  # noqa: E402
 from toolpath.passes.cutter_locations import tips  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface  # noqa: E402
 from toolpath.passes.isoparametric_passes import lay_out as ball_passes  # noqa: E402
@@ -145,9 +145,9 @@ def metres(passes: list[Poses]) -> float:
     return 1e-3 * float(sum(np.linalg.norm(np.diff(tip, axis=0), axis=1).sum() for tip, _ in passes))
 
 
-def laid(isos: list[IsoSurface], tool: ToolBody, wanted: Wanted) -> list[Poses]:
+def laid(isos: list[IsoSurface], tool: ToolBody, wanted: MatchTolerances) -> list[Poses]:
     """Passes over pieces of a surface."""
-    made = [Matched.over(iso, tool, wanted) for iso in isos]
+    made = [MatchedPasses.over(iso, tool, wanted) for iso in isos]
     return [m.located(s) for m in made for s in m.lay_out()]
 
 
@@ -162,7 +162,7 @@ def ranges(names: list[str]) -> None:
         balls = len(ball_passes(iso, 15.0, SCALLOP))
         for tool in (end(60.0, 0.0), end(60.0, 3.0)):
             begin = time.perf_counter()
-            passes = laid([iso], tool, Wanted(LEFT_SHARE * SCALLOP, DEPTH, least, CHORD))
+            passes = laid([iso], tool, MatchTolerances(LEFT_SHARE * SCALLOP, DEPTH, least, CHORD))
             seconds = time.perf_counter() - begin
             most, deep = measured(*everywhere(surface), tool, passes)
             mean, worst = bound(iso, tool, least)
@@ -181,7 +181,7 @@ def split(names: list[str]) -> None:
         height, turned = RANGES[name]
         surface = spline_of(height)
         iso = whole(surface, turned)
-        wanted = Wanted(LEFT_SHARE * SCALLOP, DEPTH, float(np.radians(LEAST[name])), CHORD)
+        wanted = MatchTolerances(LEFT_SHARE * SCALLOP, DEPTH, float(np.radians(LEAST[name])), CHORD)
         for tool in (end(60.0, 0.0), end(60.0, 3.0)):
             one, several = (parted(iso, tool, wanted, cut=cut) for cut in (False, True))
             same = len(several) == 1
@@ -200,7 +200,7 @@ def row(*told: object) -> None:
     print(f"| {' | '.join(map(str, told))} |", flush=True)
 
 
-def described(parts: list[Part]) -> str:
+def described(parts: list[SurfacePiece]) -> str:
     """Pieces in words."""
     return "; ".join(f"{p.low[0]:.2f}-{p.high[0]:.2f}, {p.low[1]:.2f}-{p.high[1]:.2f}, "
                      f"{'v' if p.iso.turned else 'u'}" for p in parts)
@@ -254,7 +254,7 @@ def blade(folder: Path | None) -> None:
         return
     print("| face | tool | split | pieces: xi, eta, feed | passes | m | most left mm | deepest mm | s |")
     print("|---|---|---|---|---|---|---|---|---|")
-    wanted = Wanted(LEFT_SHARE * BLADE_SCALLOP, DEPTH, BLADE_LEAST, BLADE_CHORD)
+    wanted = MatchTolerances(LEFT_SHARE * BLADE_SCALLOP, DEPTH, BLADE_LEAST, BLADE_CHORD)
     for told, (face, uv) in blade_faces(folder).items():
         isos = [IsoSurface(face.surface, piece.map) for piece in face.pieces]
         laid_out = inside(isos, uv)

@@ -29,7 +29,7 @@ from geometry.tool_body import ToolBody  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.passes.feed_direction import best_direction  # noqa: E402
-from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target  # noqa: E402
+from toolpath.passes.pass_family import Dragged, FinishTarget, Pass, Promise, Swath  # noqa: E402
 from toolpath.passes.reach_border import beyond  # noqa: E402
 from toolpath.passes.side_step import lay_out  # noqa: E402
 from verify.moves import Moves
@@ -57,7 +57,7 @@ class Case:
 
     surface: NurbsSurface
     tree: TriangleTree
-    target: Target
+    target: FinishTarget
     dragged: Dragged
     deviation: float
 
@@ -89,7 +89,7 @@ def case(surface: NurbsSurface, radius: float, scallop: float, chord: float, spa
     tree = TriangleTree(surface.discretised(large[0] / FINER, large[1] / FINER))
     points, normals = samples_of(surface, spacing)
     cutter = Cutter.ball(diameter=2.0 * radius, length=20.0)
-    target = Target(points, normals, points + radius * normals - [0.0, 0.0, radius], spacing)
+    target = FinishTarget(points, normals, points + radius * normals - [0.0, 0.0, radius], spacing)
     return Case(surface, tree, target, Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree), deviation)
 
 

@@ -35,7 +35,7 @@ from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
 from service.stages.preparation import Prepared, placement_of  # noqa: E402
 from toolpath.plan_settings import Pattern
-from toolpath.workingsteps import Motion, Workingstep  # noqa: E402
+from toolpath.workingsteps import TrajectoryKind, Workingstep  # noqa: E402
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
 from zones.machinable_area import AreaForm  # noqa: E402
@@ -81,7 +81,7 @@ class Measure:
 
 def cuts(steps: list[Workingstep]) -> Moves | None:
     """The cutting moves of steps."""
-    lines = [t.points for s in steps for t in s.trajectories if t.motion is Motion.CUT]
+    lines = [t.points for s in steps for t in s.trajectories if t.motion is TrajectoryKind.CUT]
     if not lines:
         return None
     start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
@@ -149,8 +149,8 @@ class Compared(finish.Finish):
         planned = trial.residual.residual[:given]
         scored: NDArray[np.bool_] = planned <= h
         left = left_by(moves, self.field.tool, self.checks.points[:given], self.checks.normals[:given])
-        way = sum(t.length for s in steps for t in s.trajectories if t.motion is Motion.CUT)
-        lines = sum(t.motion is Motion.CUT for s in steps for t in s.trajectories)
+        way = sum(t.length for s in steps for t in s.trajectories if t.motion is TrajectoryKind.CUT)
+        lines = sum(t.motion is TrajectoryKind.CUT for s in steps for t in s.trajectories)
         print(f"{self.zone.id:5} {strategy.name:14} {self.zone.form:8} {self.field.tool.id:3} {given:7d} "
               f"{way:8.0f} {sum(s.seconds for s in steps):7.1f} {lines:6d} {int((~scored).sum()):6d} "
               f"{np.quantile(left[scored], 0.99) if scored.any() else 0:8.4f} "

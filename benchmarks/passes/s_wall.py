@@ -37,9 +37,9 @@ from geometry.parameterization.grid_map import GridMap  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import HolderFrustum, ToolBody  # noqa: E402
 from output.inverse_kinematics import RotaryMachine  # noqa: E402
-from toolpath.five_axis.axis_smoothing import Limits, steered  # noqa: E402
+from toolpath.five_axis.axis_smoothing import AxisLimits, steered  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, posed  # noqa: E402
-from toolpath.passes.forward_step import Profile, steps  # noqa: E402
+from toolpath.passes.forward_step import PassProfile, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
@@ -52,7 +52,7 @@ FEED = 1000.0  # mm/min
 FLANK = ToolBody("T1", 1, 16.0, 1.0, 36.0, 15.0, 60.0, 16.0, 60.0)
 BALL = ToolBody("T2", 2, 8.0, 4.0, 16.0, 7.6, 40.0, 8.0, 50.0, (HolderFrustum(20.0, 32.0, 40.0),))
 AWAY = 32.0  # mm, of the post from the middle of the wall
-LEANS, LIMITS = np.radians(65.0), Limits(np.radians(40.0), np.radians(4.0))
+LEANS, LIMITS = np.radians(65.0), AxisLimits(np.radians(40.0), np.radians(4.0))
 WARY = 0.3  # mm kept more at the stations of a led pass, for what lies between them
 MACHINE = RotaryMachine("table-table-AC", None, np.radians([[-110.0, 110.0], [-3600.0, 3600.0]]))
 EVEN, BACK = 0.5, 0.05  # mm between stations; deg
@@ -119,9 +119,9 @@ def reversals(angle: F64) -> int:
 
 def flanked(surface: NurbsSurface, planned: bool) -> list[tuple[F64, F64]]:
     """The flank pass as it is planned, or with the ruling of every station looked for alone."""
-    wall, kept = flank.Wall(over_square(surface)), (flank.TURNING, flank.EVENED)
+    wall, kept = flank.FlankWall(over_square(surface)), (flank.TURNING, flank.EVENED)
     if planned:
-        made = flank.bands(wall, FLANK, flank.Wanted(SCALLOP, DEPTH, CHORD))
+        made = flank.bands(wall, FLANK, flank.FlankTolerances(SCALLOP, DEPTH, CHORD))
     else:
         xi = np.linspace(0.0, 1.0, flank.STATIONS)
         try:
@@ -144,7 +144,7 @@ def by_ball(surface: NurbsSurface, tree: TriangleTree, led: bool, tilt: float) -
     out: list[tuple[F64, F64]] = []
     before, blocked, whole = None, 0.0, 0.0
     for eta in lay_out(iso, BALL.corner_radius, SCALLOP - CHORD).tolist():
-        profile = Profile.of(iso.curve(eta), CHORD, BALL.corner_radius)
+        profile = PassProfile.of(iso.curve(eta), CHORD, BALL.corner_radius)
         ends = steps(profile, BALL.corner_radius, CHORD, SCALLOP)
         before = steered(profile, BALL, field, wary, LIMITS, before, OFF) if led else None
         made = posed(profile, ends, BALL, before or field, free, CHORD, OFF)

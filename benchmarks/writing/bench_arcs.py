@@ -41,7 +41,7 @@ from service.from_wire import parse_setup  # noqa: E402
 from service.stages import programs  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
-from toolpath.workingsteps import Motion  # noqa: E402
+from toolpath.workingsteps import TrajectoryKind  # noqa: E402
 from verify.gcode import block_motion  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.program.program import Program  # noqa: E402
@@ -69,11 +69,11 @@ def deviation(work: Workplan, made: Workplan, text: str) -> float:
     at, worst = 0, 0.0
     for step, new in zip(work.steps, made.steps, strict=True):
         for t, way in zip(step.trajectories, new.trajectories, strict=True):
-            if t.motion is Motion.RAPID:
+            if t.motion is TrajectoryKind.RAPID:
                 continue
             count = sum(1 if isinstance(x, GridArc) else len(x) - 1 for x in pieces(to_grid(way.points), way.arcs))
             rows, at = feeds[begins[at]:begins[at + count]], at + count
-            if t.motion is Motion.CUT and count:
+            if t.motion is TrajectoryKind.CUT and count:
                 gone = np.vstack([p.start[rows[:1]], p.end[rows]])
                 worst = max(worst, off(gone[::max(1, len(gone) // 2000)], t.points), off(between(t.points), gone))
     assert at == len(begins) - 1
@@ -129,7 +129,7 @@ def row(name: str, folder: Path, part: Path, setup: dict[str, Any]) -> str:
     if not all(texts) or work is None or made is None:
         return f"| {name} | {' and '.join(t[0] for t in told)} |"
     blocks = [len(_MOVE.findall(t)) for t in texts]
-    cuts = [t for s in made.steps for t in s.trajectories if t.motion is Motion.CUT]
+    cuts = [t for s in made.steps for t in s.trajectories if t.motion is TrajectoryKind.CUT]
     length = sum(t.length for t in cuts)
     round_ = sum(float(np.linalg.norm(np.diff(t.points[a.first:a.last + 1], axis=0), axis=1).sum())
                  for t in cuts for a in t.arcs)

@@ -25,7 +25,7 @@ from output.stepnc.ap238 import stream_stepnc_aim  # noqa: E402
 from output.stepnc.iso14649 import stream_stepnc_arm  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
 from tests.synthetic_plan import clamped, long_plan  # noqa: E402
-from toolpath.workingsteps import Motion, Trajectory  # noqa: E402
+from toolpath.workingsteps import Trajectory, TrajectoryKind  # noqa: E402
 from verify.kinematics import Kinematics  # noqa: E402
 from verify.stepnc.reader import read_stepnc  # noqa: E402
 
@@ -48,7 +48,7 @@ def job(points: int, leaning: bool) -> Workplan:
 
 def _swung(t: Trajectory) -> Trajectory:
     """A pass whose axis swings aside and back, upright at both ends."""
-    if t.motion is not Motion.CUT:
+    if t.motion is not TrajectoryKind.CUT:
         return t
     share = np.linspace(0.0, 1.0, len(t.points))
     lean = 0.2 * np.sin(np.pi * share)

@@ -16,7 +16,7 @@ import numpy as np  # noqa: E402
 from benchmarks.passes.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
-from toolpath.passes.forward_step import Profile, arc_rule, steps  # noqa: E402
+from toolpath.passes.forward_step import PassProfile, arc_rule, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
@@ -74,7 +74,7 @@ def chord(path: Path) -> None:
     iso = IsoSurface(trim.surface, piece.map)
     eta = float(lay_out(iso, RADIUS, SCALLOP)[3])
     wide, tall, tolerance = 900.0, 260.0, 0.005
-    profile = Profile.of(iso.curve(eta), tolerance, RADIUS)
+    profile = PassProfile.of(iso.curve(eta), tolerance, RADIUS)
     rows = {}
     for words, ends in (("circular arc at the start of the step", arc_rule(profile, RADIUS, tolerance)),
                         ("true profile", steps(profile, RADIUS, tolerance))):

@@ -34,7 +34,7 @@ from output.gcode.dialects.base import Dialect
 from output.header_text import decimal, face_words, height_word, step_title, tool_name
 from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.workplan import FIRST_NUMBER, Clamping, Workplan
-from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 
 UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
 _PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts for fresh cutters
@@ -124,7 +124,7 @@ class _Walk:
         self.lines += self.dialect.arc(arc, self._changed(feed))
         self.rapid = None
 
-    def _wind(self, points: I64, arcs: Sequence[Arc], feed: float) -> None:
+    def _wind(self, points: I64, arcs: Sequence[ArcSpan], feed: float) -> None:
         """A path with arcs; points (n, k) on the grid, the first is where the tool stands."""
         for piece in pieces(points, arcs):
             if isinstance(piece, GridArc):
@@ -217,7 +217,7 @@ class _Upright(_Walk):
         if trajectory.arcs:
             self._wind(to_grid(trajectory.points), trajectory.arcs, trajectory.feed)
         elif len(points) > 1:
-            self._say(self._rows(points), trajectory.motion is Motion.RAPID, trajectory.feed)
+            self._say(self._rows(points), trajectory.motion is TrajectoryKind.RAPID, trajectory.feed)
 
 
 class _Turning(_Walk):
@@ -301,7 +301,7 @@ class _Turning(_Walk):
         points = np.column_stack([to_grid(linear), turns])
         if self.position is not None:
             points[0] = self.position
-        rapid = leg.motion is Motion.RAPID
+        rapid = leg.motion is TrajectoryKind.RAPID
         in_time = not self.machine.tcp and not rapid and leg.is_turning
         self.position = points[-1]
         if leg.arcs:

@@ -44,12 +44,12 @@ from output.stepnc.common import (
 )
 from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Ap238, Workplan
-from toolpath.workingsteps import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
 _TYPE = {
-    Motion.RAPID: "connect", Motion.APPROACH: "approach", Motion.CUT: "trajectory path",
-    Motion.CONNECT: "connect", Motion.LIFT: "lift",
+    TrajectoryKind.RAPID: "connect", TrajectoryKind.APPROACH: "approach", TrajectoryKind.CUT: "trajectory path",
+    TrajectoryKind.CONNECT: "connect", TrajectoryKind.LIFT: "lift",
 }
 _NONE = "''"
 _CLT = "'cutter location trajectory'"
@@ -315,7 +315,8 @@ class _Aim:
             line, at = self._line(parts, at)
             toolpath = self._toolpath(f"{step.id} {trajectory.motion.value} {place}", trajectory, line, curve.axes)
             self.file.add(f"MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP('','',#{operation},#{toolpath},{place}.)")
-            if trajectory.motion is not Motion.RAPID and written_feed(trajectory.feed) != written_feed(step.feed):
+            if (trajectory.motion is not TrajectoryKind.RAPID
+                    and written_feed(trajectory.feed) != written_feed(step.feed)):
                 technology = self._technology(step.spindle_rpm, trajectory.feed)
                 self.file.add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{toolpath},#{technology})")
 
@@ -345,7 +346,7 @@ class _Aim:
         if axes is not None:
             leaning = add(f"POLYLINE('',{refs(self.file.vectors(axes))})")
             self._property("tool axis", _CLT, toolpath, add(f"REPRESENTATION('',(#{leaning}),#{self.space})"))
-        if trajectory.motion is Motion.RAPID:
+        if trajectory.motion is TrajectoryKind.RAPID:
             self._property("speed profile", _CLT, toolpath, self.rapid)
         return toolpath
 
@@ -370,7 +371,7 @@ class _Aim:
         kind = "uv" if along_faces else "plane cutter location"
         strategy = add(f"FREEFORM_MILLING_STRATEGY({quoted(operation_words(step))},'{kind}','','')")
         words = {"pathmode": "zigzag" if to_and_fro(step) else "forward",
-                 "cutmode": "climb" if step.climb else "conventional"}
+                 "cutmode": "climb" if step.cut_direction.climbs else "conventional"}
         for name, value in words.items():
             self._property(name, f"'{kind}'", strategy, self._symbol(value))
         limits = [self._length("chordal tolerance", step.chordal_tolerance),
@@ -437,7 +438,7 @@ def _square_to(axis: F64) -> Sequence[float]:
 
 def _purpose(step: Workingstep) -> str:
     """What the strategy was asked for: class 1 carries no strategy object."""
-    direction = "climb or conventional" if step.either_way else "climb" if step.climb else "conventional"
+    direction = "climb or conventional" if step.cut_direction.both_ways else step.cut_direction.value
     return (f"{step.strategy}, {direction}, side step {decimal(step.side_step)} mm, "
             f"scallop {decimal(step.scallop_height)} mm, chordal tolerance {decimal(step.chordal_tolerance)} mm, "
             f"{height_word(step)} {decimal(step.top)} to {decimal(step.bottom)} mm")

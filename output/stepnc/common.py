@@ -17,7 +17,7 @@ from output.inverse_kinematics import RotaryMachine
 from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
 from output.stepnc.part21 import Part21, real
 from output.workplan import Workplan
-from toolpath.workingsteps import Motion, Trajectory, Workingstep
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def _rapid(points: I64) -> tuple[Curve, ...]:
     """A rapid through grid points; none where they are one."""
     if len(points) < 2:
         return ()
-    return (Curve(Trajectory(Motion.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
+    return (Curve(Trajectory(TrajectoryKind.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
 
 
 def _curves(legs: Sequence[Leg], machine: RotaryMachine | None = None) -> tuple[Curve, ...]:
@@ -139,7 +139,7 @@ def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
         return (0.0, 0.0, 1.0)
     double = 0.0 + 0.0j  # directions, not senses: angles are doubled, so that zig and zag add up
     for trajectory in step.trajectories:
-        if trajectory.motion is Motion.CUT:
+        if trajectory.motion is TrajectoryKind.CUT:
             move = np.diff(trajectory.points[:, :2], axis=0)
             z = move[:, 0] + 1j * move[:, 1]
             length = np.abs(z)
@@ -152,8 +152,9 @@ def to_and_fro(step: Workingstep) -> bool:
     """Whether passes are walked to and fro: those along the borders of faces where most go against the one before, all
     others where they may go either way."""
     if step.strategy != "isoparametric":
-        return step.strategy == "zigzag" or step.either_way
-    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is Motion.CUT]).reshape(-1, 3)
+        return step.strategy == "zigzag" or step.cut_direction.both_ways
+    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories
+                     if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
     return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 
 

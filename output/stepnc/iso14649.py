@@ -45,11 +45,11 @@ from output.stepnc.common import (
 )
 from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
 from output.workplan import Workplan
-from toolpath.workingsteps import Motion, Workingstep
+from toolpath.workingsteps import TrajectoryKind, Workingstep
 
 _TYPE = {
-    Motion.RAPID: ".CONNECT.", Motion.APPROACH: ".APPROACH.", Motion.CUT: ".TRAJECTORY_PATH.",
-    Motion.CONNECT: ".CONNECT.", Motion.LIFT: ".LIFT.",
+    TrajectoryKind.RAPID: ".CONNECT.", TrajectoryKind.APPROACH: ".APPROACH.", TrajectoryKind.CUT: ".TRAJECTORY_PATH.",
+    TrajectoryKind.CONNECT: ".CONNECT.", TrajectoryKind.LIFT: ".LIFT.",
 }
 _END = "''"
 _M_PER_S = 1.0 / 60_000.0  # of one mm/min
@@ -270,7 +270,7 @@ class _Arm:
         at, numbers = self.file.points(path_points(path)), []
         for curve in path:
             trajectory = curve.trajectory
-            rapid = trajectory.motion is Motion.RAPID
+            rapid = trajectory.motion is TrajectoryKind.RAPID
             speed = "SPEED_NAME(.RAPID.)" if rapid else "$"
             for part in curve.parts():
                 if isinstance(part, GridArc):
@@ -315,7 +315,7 @@ class _Arm:
         add = self.file.add
         tolerances = add(f"TOLERANCES({real(step.chordal_tolerance, 6)},{real(step.scallop_height, 6)})")
         mode = ".ZIGZAG." if to_and_fro(step) else ".FORWARD."
-        cut = ".CLIMB." if step.climb else ".CONVENTIONAL."
+        cut = ".CLIMB." if step.cut_direction.climbs else ".CONVENTIONAL."
         side = real(step.side_step) if step.side_step > 0.0 else "$"
         if step.strategy == "isoparametric":
             along = add(f"DIRECTION('along the passes in parameters',{reals((1.0, 0.0, 0.0), 6)})")

@@ -19,8 +19,8 @@ from service.stages.preparation import Prepared, clearances
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
-from toolpath.tool_deflection import Bend
-from toolpath.workingsteps import Motion, Workingstep
+from toolpath.tool_deflection import DeflectionEstimate
+from toolpath.workingsteps import TrajectoryKind, Workingstep
 from verify.model import Proof
 from zones.plan_view.regions import Labels
 from zones.remainder.remainder import RemainderEntry, explain
@@ -258,7 +258,7 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
 def cutting_length(step: Workingstep) -> float:
     """Length of the cutting passes of a step, mm."""
     return float(sum(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum() for t in step.trajectories
-                     if t.motion is Motion.CUT))
+                     if t.motion is TrajectoryKind.CUT))
 
 
 def _step(step: Workingstep) -> dict[str, Any]:
@@ -270,7 +270,7 @@ def _step(step: Workingstep) -> dict[str, Any]:
             **_bend(step.bend)}
 
 
-def _bend(bend: Bend | None) -> dict[str, Any]:
+def _bend(bend: DeflectionEstimate | None) -> dict[str, Any]:
     """How far a tool bends in a step, and the share of its feed at which it goes for that."""
     if bend is None:
         return {"deflection_mm": None, "deflection_limit_mm": None, "feed_share": None}

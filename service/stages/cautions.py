@@ -18,12 +18,12 @@ from schemas.setup import Setup
 from service.cutting_data import cutting_data
 from service.stages.preparation import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
-from toolpath.linking.ramp_entry import LEAST_RUN
-from toolpath.plan_settings import Leaned
+from toolpath.linking.ramp_entry import MIN_RUN
+from toolpath.plan_settings import ToolLean
 from toolpath.planning.zone_finishing import LEANING, ZonePlan, upright_way
 from toolpath.strategies import inclined_axis
-from toolpath.tool_deflection import Bend
-from toolpath.workingsteps import Motion, Workingstep
+from toolpath.tool_deflection import DeflectionEstimate
+from toolpath.workingsteps import TrajectoryKind, Workingstep
 from verify.model import Support
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
@@ -99,20 +99,20 @@ def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
     used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
     return [Caution("center_cutting", (tool.id,),
                     f"tool {tool.id} does not cut to its centre, and its ways down into stock, of 3 degrees at most, "
-                    f"may be {LEAST_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
-                    LEAST_RUN * used[tool.id].radius, tool.diameter_mm,
+                    f"may be {MIN_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
+                    MIN_RUN * used[tool.id].radius, tool.diameter_mm,
                     "look at its first cuts in closed pockets, drill them first, or take one that cuts to the centre")
             for tool in setup.tools if not tool.center_cutting and tool.id in used]
 
 
-def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
+def upright(asked: ToolLean | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
     """Zones finished by an upright tool, or mostly so, although it is asked to lean there, each with the reasons."""
     out = []
     for z in zones:
         mine = [s for s in steps if s.zone == z.zone.id]
-        if inclined_axis.asked(asked, z.zone.form, z.zone.tool) is None or not mine:  # where layers leave nothing there are none
+        if inclined_axis.requested_lean(asked, z.zone.form, z.zone.tool) is None or not mine:  # layers left nothing
             continue
-        way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is Motion.CUT)
+        way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is TrajectoryKind.CUT)
         told = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]
         if z.strategy not in LEANING:
             found, without = "stays upright", "it is finished in bands, or no pass lies on it"
@@ -163,7 +163,7 @@ def unheld(support: Support) -> list[Caution]:
 
 def bent(steps: Sequence[Workingstep]) -> list[Caution]:
     """Tools that would bend too far, in layers and in finishing, each with the worst of its steps."""
-    groups: dict[tuple[str, str], list[tuple[Workingstep, Bend]]] = {}
+    groups: dict[tuple[str, str], list[tuple[Workingstep, DeflectionEstimate]]] = {}
     for s in steps:
         if s.bend is not None and s.bend.full > s.bend.limit:
             groups.setdefault((s.tool.id, s.operation), []).append((s, s.bend))

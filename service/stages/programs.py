@@ -30,7 +30,7 @@ from service.stages.preparation import TABLE_SPARE, Prepared, table_height
 from service.stages.trimmed_faces import exact_faces
 from service.version import VERSION
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_settings import Turning
+from toolpath.plan_settings import RotaryAxes
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import View
 
@@ -175,7 +175,7 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     return replace(work, clamping=clamping)
 
 
-def turning_of(ready: Prepared, view: View) -> Turning | None:
+def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:
     """What the rotary axes can do in the frame of a view; None on a machine without, or where they only index."""
     setup, turn = ready.setup, view.rotation
     machine = rotary_machine(setup.machine)
@@ -200,7 +200,7 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
         return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
 
     table = table_height(setup, ready.blank) + setup.clearance_mm.rapid + TABLE_SPARE
-    return Turning(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
+    return RotaryAxes(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:

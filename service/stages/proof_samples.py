@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.stages.preparation import Prepared, machinable_triangles
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.planning.job_plan import Plan
 from zones.machinable_area import forms_of
 from zones.plan_view.regions import Labels
@@ -45,7 +45,7 @@ class Score:
     zone: NDArray[np.int32]
     tips: NDArray[np.float64]
 
-    def checks(self, ready: Prepared) -> list[Target]:
+    def checks(self, ready: Prepared) -> list[FinishTarget]:
         """Per zone, what its passes are measured at: its samples here, and the borders of its faces."""
         out = []
         for k, z in enumerate(ready.zones, start=1):
@@ -53,7 +53,7 @@ class Score:
             border = ready.samples.area[z.samples] == 0
             edge = z.samples[border]
             here = turned_samples(self.samples.subset(mine), view.rotation @ ready.views[0].rotation.T)
-            out.append(Target(np.vstack([here.points, view.samples.points[edge]]),
+            out.append(FinishTarget(np.vstack([here.points, view.samples.points[edge]]),
                               np.vstack([here.normals, view.samples.normals[edge]]),
                               np.vstack([self.tips[mine], z.tips[border]]), PROOF_DENSITY ** -0.5))
         return out

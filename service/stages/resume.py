@@ -37,8 +37,8 @@ from service.stages.access_plan import Side
 from service.stages.preparation import Prepared
 from service.version import code_version
 from toolpath.counterexamples import Counterexamples
-from toolpath.passes.pass_family import Target
-from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
+from toolpath.passes.pass_family import FinishTarget
+from toolpath.plan_checkpoint import NOTHING, CheckpointKeeper, PlanSnapshot
 from toolpath.planning.job_plan import Plan
 from toolpath.stock.stock_map import StockMap
 from verify.model import NcProgram, Proof
@@ -63,10 +63,11 @@ class Resumed:
     samples : SurfaceSamples of the proof
     """
 
-    def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[Target], samples: SurfaceSamples) -> None:
+    def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[FinishTarget], samples: SurfaceSamples) -> None:
         self.kept, self.ready, self.checks, self.samples = kept, ready, checks, samples
 
-    def side(self, view: View, before: Sequence[Side], found: Counterexamples, make: Callable[[Keeper], Side]) -> Side:
+    def side(self, view: View, before: Sequence[Side], found: Counterexamples,
+             make: Callable[[CheckpointKeeper], Side]) -> Side:
         """The plan of an access: the one that is kept, else what ``make`` plans, which is kept then.
 
         before : the sides planned before it; found : what proofs found along it
@@ -145,19 +146,20 @@ class Resumed:
         return _digest(*told, self.samples.points, self.samples.normals)
 
 
-class _UnderWay(Keeper):
+class _UnderWay(CheckpointKeeper):
     """Keeps a plan of an access while it is made, now and then, each time instead of the time before."""
 
     def __init__(self, resumed: Resumed, name: str) -> None:
         self.resumed, self.name = resumed, name
         self.next = time.monotonic() + ACTS_EVERY_S
 
-    def taken(self, use: Callable[[PlanNow], T]) -> T | None:
-        """See ``Keeper``; told is how many workingsteps were made."""
-        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanNow, v)), len(v.steps)), itemgetter(1))
+    def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
+        """See ``CheckpointKeeper``; told is how many workingsteps were made."""
+        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)),
+                                   itemgetter(1))
         return None if found is None else found[0]
 
-    def done(self, now: Callable[[], PlanNow]) -> None:
+    def done(self, now: Callable[[], PlanSnapshot]) -> None:
         """Keep it where the time for that has come."""
         begun = time.monotonic()
         if begun >= self.next:

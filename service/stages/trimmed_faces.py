@@ -13,7 +13,7 @@ from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
 from service.stages.preparation import Prepared, placement_of
-from toolpath.passes.trimmed_faces import Faces, SmoothFaces, TrimmedFace
+from toolpath.passes.trimmed_faces import Faces, TangentFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
 from zones.machinable_area import AreaForm
 
@@ -46,7 +46,7 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
         uv[rows] = patch.parameters(uv[rows].reshape(-1, 2)).reshape(-1, 3, 2)
     smooth = [e.faces for e in ready.part.edges if e.kind is EdgeKind.SMOOTH and abs(e.angle) < TURN]
     there: dict[str, dict[int, list[TrimmedFace]]] = {}
-    joined: dict[tuple[str, tuple[int, ...]], SmoothFaces] = {}
+    joined: dict[tuple[str, tuple[int, ...]], TangentFaces] = {}
     out: dict[str, tuple[Faces, ...]] = {}
     for access in {z.access for z in wanted}:
         turn = np.eye(4)
@@ -66,7 +66,7 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
                 continue
             key = z.access, group
             if key not in joined:
-                joined[key] = SmoothFaces(alone, ready.view(z.access).part.mesh, uv)
+                joined[key] = TangentFaces(alone, ready.view(z.access).part.mesh, uv)
             mine.append(joined[key])
         if z.form is AreaForm.STEEP:
             mine += [face for f in z.faces if f in flat for face in there[z.access].get(f, ())]
@@ -76,7 +76,7 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
 
 def exact_faces(faces: Faces) -> tuple[TrimmedFace, ...]:
     """The faces that are gone over as one, each by itself."""
-    return faces.alone if isinstance(faces, SmoothFaces) else (faces,) if isinstance(faces, TrimmedFace) else ()
+    return faces.alone if isinstance(faces, TangentFaces) else (faces,) if isinstance(faces, TrimmedFace) else ()
 
 
 def _together(faces: list[int], smooth: list[tuple[int, int]]) -> list[tuple[int, ...]]:

@@ -18,7 +18,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from verify.gcode.reader import read_program
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -106,7 +106,7 @@ def test_the_verifiers_reader_finds_the_planned_path(job):
     program = read_program(write_linuxcnc(wanted), tools={t.number for t in wanted.tools})
     assert not program.remarks
     for s in wanted.steps:
-        feeds = [t.points for t in s.trajectories if t.motion is not Motion.RAPID]
+        feeds = [t.points for t in s.trajectories if t.motion is not TrajectoryKind.RAPID]
         planned = np.concatenate([np.hstack([p[:-1], p[1:]]) for p in feeds])
         moving = np.abs(planned[:, :3] - planned[:, 3:]).max(axis=1) > 1.5e-4  # longer than the grid: surely written
         mine = (program.tool == s.tool.number) & (program.kind != 0)

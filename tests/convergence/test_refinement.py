@@ -16,7 +16,7 @@ from tests.plan_checks import dense
 from toolpath.cutter.cutter import Cutter
 from toolpath.lines import thinned
 from toolpath.passes.contours import contours
-from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath
 
 RADIUS = 12.0
 SHAPES = {
@@ -92,7 +92,7 @@ def test_the_scallop_of_parallel_passes_falls_with_the_square_of_the_side_step(l
     dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree)
     for step in steps:
         promise = Promise(1.0, 1e-4, 0.3, 1.0)
-        swath = Swath(dragged, Target(points, np.tile(normal, (len(points), 1)), tips, 0.05), promise, 0.0)
+        swath = Swath(dragged, FinishTarget(points, np.tile(normal, (len(points), 1)), tips, 0.05), promise, 0.0)
         at = step * np.arange(math.floor(swath.t[0] / step), math.ceil(swath.t[-1] / step) + 1)
         lines = [line for t in at.tolist() for line in swath.pass_at(t, float(step)).lines]
         centres = cKDTree(np.vstack([dense(line, 0.01) for line in lines]) + [0.0, 0.0, r])

@@ -13,7 +13,7 @@ from service.from_wire import parse_setup
 from service.stages import programs
 from tests.arc_plans import off
 from tests.step_files import write_step
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from verify.gcode import block_motion
 from verify.gcode.reader import read_program
 
@@ -66,7 +66,7 @@ def test_the_program_is_within_its_share_of_the_plan(job, monkeypatch):
     p = read_program((out / "program.linuxcnc.ngc").read_text())
     most = 0.5 * CHORDAL + 2e-4  # and the grid
     for step in work.steps:
-        planned = [t.points for t in step.trajectories if t.motion is Motion.CUT]
+        planned = [t.points for t in step.trajectories if t.motion is TrajectoryKind.CUT]
         mine = np.flatnonzero((p.tool == step.tool.number) & ~np.isnan(p.feed))
         ends = np.vstack([p.start[mine[:1]], p.end[mine]])
         assert off(np.vstack(planned)[::5], ends) <= most

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from schemas.materials import MATERIALS
 from service.from_wire import parse_setup
 from service.pipeline import cut_table
-from toolpath.tool_deflection import LEAST_SHARE
+from toolpath.tool_deflection import MIN_SHARE
 
 KINDS = st.sampled_from(["ball", "flat", "bull"])
 
@@ -45,12 +45,12 @@ def test_a_longer_tool_never_gets_more_feed(material, kind, diameter, neck, shan
 def test_an_eased_feed_keeps_the_limit_or_stands_on_the_floor(material, kind, diameter, neck, deep, wide):
     full = table(material, kind, diameter, neck, 4.0).finish
     cut = full.under(deep * diameter, wide * diameter)
-    assert LEAST_SHARE <= cut.bend.share <= 1.0
+    assert MIN_SHARE <= cut.bend.share <= 1.0
     assert cut.feed == pytest.approx(max(0.1, cut.bend.share * full.feed))
     assert cut.plunge_feed == pytest.approx(min(full.plunge_feed, cut.feed))
-    if cut.bend.share > LEAST_SHARE:
+    if cut.bend.share > MIN_SHARE:
         assert cut.bend.deflection <= cut.bend.limit * (1.0 + 1e-9)
-    if full.feed * LEAST_SHARE > 0.2:  # what is reported is what a cut at that feed bends it by
+    if full.feed * MIN_SHARE > 0.2:  # what is reported is what a cut at that feed bends it by
         again = replace(full.bending, limit=1e9).under(cut.feed, deep * diameter, wide * diameter)
         assert again.full == pytest.approx(cut.bend.deflection, rel=1e-9)
 

@@ -97,7 +97,7 @@ def test_level_passes_touch_all_that_is_in_reach(opening, turn, body):
     flat = body.radius - body.corner_radius
     left = np.arange(len(points))
     counts = []
-    for finer in range(planar_floor.MOST_FINER + 1):
+    for finer in range(planar_floor.MAX_FINER + 1):
         lines = [line for group in planar_floor.planes(field, tips[left], CHORD, finer) for line in group]
         walked = np.vstack([dense(line.points, SPACING) for line in lines])
         assert np.ptp(walked[:, 2]) == 0.0  # level, whatever stands beside it

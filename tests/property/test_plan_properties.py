@@ -38,7 +38,7 @@ from tests.plan_checks import (
     worst_meeting,
     worst_plunge,
 )
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import CutDirection, TrajectoryKind
 from zones.reach.tip_field import touchable
 
 
@@ -60,7 +60,7 @@ CASES = {
     "valley": lambda: plan_part(valley(), [ball(3.0)]),
     "valley by bull": lambda: plan_part(valley(), [tool(4.0, 1.0)], near_net=False),
     "walls with allowance": lambda: plan_part(low_walls(), [ball(3.0)], allowance=0.2),
-    "walls conventional": lambda: plan_part(low_walls(), [ball(3.0)], climb=False),
+    "walls conventional": lambda: plan_part(low_walls(), [ball(3.0)], cut_direction=CutDirection.CONVENTIONAL),
     "finishing only": lambda: plan_part(valley(), [ball(3.0)], roughing=False),
     "two high walls": lambda: plan_part(walls(), [ball(3.0)], near_net=False),
 }
@@ -81,7 +81,7 @@ def case(name: str) -> Case:
 @pytest.mark.parametrize("name", names(set(CASES) - SLOW))
 def test_no_feed_move_enters_the_part(name):
     c = case(name)
-    assert c.moves(Motion.CUT)
+    assert c.moves(TrajectoryKind.CUT)
     # the chordal tolerance holds for the path; the lattice never does
     assert deepest_gouge(c, c.settings.chordal_tolerance, c.settings.stock_allowance) <= 1e-6
 
@@ -93,10 +93,10 @@ def test_trajectories_join_and_rapids_move_one_way_at_a_time(name):
         assert gaps_between(step) < 1e-9
         assert rapid_faults(step, c.settings.clearance, c.settings.rapid_floor) == []
         first, last = step.trajectories[0], step.trajectories[-1]
-        assert first.motion is Motion.RAPID and last.points[-1, 2] == pytest.approx(c.settings.clearance)
+        assert first.motion is TrajectoryKind.RAPID and last.points[-1, 2] == pytest.approx(c.settings.clearance)
         for t in step.trajectories:
             assert len(t.points) >= 2 and np.isfinite(t.points).all()
-            assert t.motion is Motion.RAPID or t.feed > 0
+            assert t.motion is TrajectoryKind.RAPID or t.feed > 0
 
 
 @pytest.mark.parametrize("name", names(PLUNGES))
@@ -115,7 +115,7 @@ def test_the_scallop_left_is_within_the_request(name):
     fresh = fresh.subset(fresh.normals[:, 2] > -0.02)
     lift, body = 0.002, c.zones[0].tool
     fresh = fresh.subset(touchable(c.fields[body.id], fresh.points, fresh.normals, lift)[1])
-    left = brute_residual(fresh.points, c.moves(Motion.CUT))
+    left = brute_residual(fresh.points, c.moves(TrajectoryKind.CUT))
     assert len(left) > 500 and left.min() >= -c.settings.chordal_tolerance
     assert left.max() <= c.settings.scallop_height  # between samples 0.2 mm apart, up to the border of the reach
 
@@ -126,7 +126,7 @@ def test_what_stock_of_another_zone_was_in_the_way_of_is_finished_after_that_zon
     first, again = (s for s in finish if s.zone == "Z1")
     assert [s.zone for s in finish] == ["Z1", "Z2", "Z1"] and first.strategy == again.strategy == "zigzag"
     left = [brute_residual(c.samples.points[c.zones[0].samples], [
-        (s.tool, t.points) for s in steps for t in s.trajectories if t.motion is Motion.CUT])
+        (s.tool, t.points) for s in steps for t in s.trajectories if t.motion is TrajectoryKind.CUT])
         for steps in (finish[:1], finish)]
     assert left[0].max() > c.settings.scallop_height >= left[1].max()
 
@@ -158,7 +158,7 @@ def hill(fixtures=()):
 
 def cut_by(c: Case, *strategies: str) -> list:
     return [(s.tool, t.points) for s in c.plan.steps if s.strategy in strategies for t in s.trajectories
-            if t.motion is Motion.CUT]
+            if t.motion is TrajectoryKind.CUT]
 
 
 def test_steep_and_shallow_passes_overlap_where_they_meet():
@@ -167,7 +167,7 @@ def test_steep_and_shallow_passes_overlap_where_they_meet():
     fresh = fresh.subset(fresh.face == 2)
     fresh = fresh.subset(touchable(c.fields["T1"], fresh.points, fresh.normals, 0.002)[1])
     h = c.settings.scallop_height
-    assert brute_residual(fresh.points, c.moves(Motion.CUT)).max() <= h
+    assert brute_residual(fresh.points, c.moves(TrajectoryKind.CUT)).max() <= h
     lean = np.degrees(np.arccos(fresh.normals[:, 2]))  # waterlines from 45 degrees on
     for strategies, low, high in ((("zigzag", "spiral"), 42.0, 52.0), (("waterline",), 42.0, 48.0)):
         near = (low < lean) & (lean < high)
@@ -191,10 +191,10 @@ def test_an_allowance_stays_on_the_part():
     c = case("walls with allowance")
     points = np.vstack([c.samples.points[z.samples] for z in c.zones])[::3]
     normals = np.vstack([c.samples.normals[z.samples] for z in c.zones])[::3]
-    left = brute_residual(points + 0.2 * normals, c.moves(Motion.CUT))
+    left = brute_residual(points + 0.2 * normals, c.moves(TrajectoryKind.CUT))
     assert np.quantile(left, 0.99) <= c.settings.scallop_height
     # and no cutter comes nearer to the part itself than the allowance
-    assert brute_residual(points, c.moves(Motion.CUT)).min() >= 0.2 - c.settings.chordal_tolerance
+    assert brute_residual(points, c.moves(TrajectoryKind.CUT)).min() >= 0.2 - c.settings.chordal_tolerance
 
 
 def turn_round_walls(c: Case) -> tuple[float, float]:
@@ -204,7 +204,7 @@ def turn_round_walls(c: Case) -> tuple[float, float]:
         if s.strategy != "waterline":
             continue
         for t in s.trajectories:
-            if t.motion is not Motion.CUT:
+            if t.motion is not TrajectoryKind.CUT:
                 continue
             a, b = t.points[:-1], t.points[1:]
             run = np.hypot(*(b - a)[:, :2].T)
@@ -236,7 +236,7 @@ def test_conventional_also_turns_the_walls_round_floors_and_the_layers():
             if s.strategy != strategy:
                 continue
             for t in s.trajectories:
-                if t.motion is not Motion.CUT:
+                if t.motion is not TrajectoryKind.CUT:
                     continue
                 a, b = t.points[:-1], t.points[1:]
                 run = np.hypot(*(b - a)[:, :2].T)
@@ -248,7 +248,8 @@ def test_conventional_also_turns_the_walls_round_floors_and_the_layers():
                     total += sign * float(run[keep][hit].sum())
         return total
 
-    one = [plan_part(corner(), [tool(4.0, 0.0)], climb=climb) for climb in (True, False)]
+    one = [plan_part(corner(), [tool(4.0, 0.0)], cut_direction=way)
+           for way in (CutDirection.CLIMB, CutDirection.CONVENTIONAL)]
     for strategy in ("planar_floor", "depth_layers"):
         assert sense(one[0], strategy) > 5 and sense(one[1], strategy) < -5, strategy
 
@@ -275,7 +276,7 @@ def test_shank_and_holder_stay_clear_of_the_walls():
 def test_a_wide_holder_keeps_off_a_high_block_also_from_beside_it():
     mesh = terraces([0, 4, 10], [0, 5], [[13, 2]])
     c = plan_part(mesh, [ball(4.0, stickout=8.0, holder=(HolderFrustum(30, 30, 30),))])
-    assert c.moves(Motion.CUT)
+    assert c.moves(TrajectoryKind.CUT)
     for body, points in c.moves():
         assert body_intrusion(c.tree, body, points, 0.2, 1.0) <= 1e-4
 
@@ -283,5 +284,5 @@ def test_a_wide_holder_keeps_off_a_high_block_also_from_beside_it():
 def test_the_same_input_gives_the_same_plan():
     one, two = (plan_part(corner(), [ball(3.0), tool(4.0, 0.0, "T2")]) for _ in range(2))
     assert [s.name for s in one.plan.steps] == [s.name for s in two.plan.steps]
-    for a, b in zip(one.moves(*Motion), two.moves(*Motion), strict=True):
+    for a, b in zip(one.moves(*TrajectoryKind), two.moves(*TrajectoryKind), strict=True):
         assert a[1].tobytes() == b[1].tobytes()

@@ -14,7 +14,7 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
 from toolpath.drop_cutter import drop_cutter
 from toolpath.passes.feed_direction import CANDIDATES, best_direction
-from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath
 from toolpath.passes.side_step import lay_out
 from toolpath.strategies.spiral import Rings, spiralled
 
@@ -34,7 +34,7 @@ class Field:
         side = self.normals[:, :2] / np.maximum(np.linalg.norm(self.normals[:, :2], axis=1, keepdims=True), 1e-12)
         tips = self.points + corner * self.normals - [0.0, 0.0, corner]
         tips[:, :2] += flat * side
-        self.target = Target(self.points, self.normals, tips, spacing)
+        self.target = FinishTarget(self.points, self.normals, tips, spacing)
         self.dragged = Dragged(cutter, lambda xy: drop_cutter(tree, cutter, xy), tree)
         self.dense = self.over(half, int(half / 0.025), disc)
 

@@ -2,3 +2,7 @@
 
 No path is planned here.
 """
+
+from toolpath.cutter.cutter import Cutter
+
+__all__ = ["Cutter"]

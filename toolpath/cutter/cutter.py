@@ -1,4 +1,7 @@
-"""The cutting part of a tool under its milling names."""
+"""The cutting part of a tool by its milling name: ball, flat, bull nose, tapered, barrel or any outline.
+
+Frame of the tool: the tip is the origin, Z points along the axis to the spindle.
+"""
 
 from __future__ import annotations
 
@@ -43,24 +46,39 @@ class Cutter:
 
     @classmethod
     def ball(cls, *, diameter: float, length: float) -> Cutter:
-        """A ball-end cutter, mm."""
+        """A ball-end cutter.
+
+        diameter, length : float, mm
+        """
         return cls(diameter, 0.5 * diameter, length)
 
     @classmethod
     def flat(cls, *, diameter: float, length: float) -> Cutter:
-        """A flat-end cutter with sharp corners, mm."""
+        """A flat-end cutter with sharp corners.
+
+        diameter, length : float, mm
+        """
         return cls(diameter, 0.0, length)
 
     @classmethod
     def bull(cls, *, diameter: float, length: float, corner_radius: float) -> Cutter:
-        """A bull-nose cutter, mm."""
+        """A bull-nose cutter.
+
+        diameter, length, corner_radius : float, mm
+        """
         return cls(diameter, corner_radius, length)
 
     @classmethod
     def tapered(cls, *, diameter: float, tip_diameter: float, angle_deg: float, length: float) -> Cutter:
-        """A tapered ball: a ball of ``tip_diameter`` and a cone tangent to it up to ``diameter``, mm.
+        """A tapered ball: a ball of ``tip_diameter`` and a tangent cone up to ``diameter``.
 
-        angle_deg : half the angle of the cone, between its side and the axis, > 0 and < 90
+        diameter, tip_diameter, length : float, mm
+        angle_deg                      : float, deg, between the side of the cone and the axis, above 0 and below 90
+
+        Raises
+        ------
+        SetupError
+            The angle is out of range, or the tip is not narrower than the cutter.
         """
         if not 0.0 < angle_deg < 90.0:
             raise SetupError(f"the half angle of a tapered cutter must lie between 0 and 90 degrees, got {angle_deg}",
@@ -76,9 +94,16 @@ class Cutter:
 
     @classmethod
     def barrel(cls, *, diameter: float, tip_diameter: float, side_radius: float, length: float) -> Cutter:
-        """A barrel: a ball of ``tip_diameter`` and a side of ``side_radius`` tangent to it, widest at ``diameter``, mm.
+        """A barrel: a ball of ``tip_diameter`` and a tangent side of ``side_radius``, widest at ``diameter``.
 
-        The side has its widest place where the cylinder above begins. tip_diameter < diameter < 2 side_radius.
+        The side is widest where the cylinder above begins. tip_diameter < diameter < 2 side_radius.
+
+        diameter, tip_diameter, side_radius, length : float, mm
+
+        Raises
+        ------
+        SetupError
+            The three sizes do not fit together.
         """
         r, widest = 0.5 * tip_diameter, 0.5 * diameter
         if not 0.0 < r < widest < side_radius:
@@ -94,12 +119,12 @@ class Cutter:
 
     @classmethod
     def turned(cls, outline: Outline, *, length: float) -> Cutter:
-        """A cutter of any outline."""
+        """A cutter of any outline; length : mm, of the cutting part."""
         return cls(2.0 * outline.radius, 0.0, length, outline)
 
     @classmethod
     def assembly(cls, tool: ToolBody) -> Cutter:
-        """Cutting part, shank and holder of a tool as one body, without clearances; the neck where it is wider."""
+        """Cutting part, shank and holder of a tool as one body without clearances, and the neck where it is wider."""
         r, d = tool.corner_radius, 0.5 * tool.diameter - tool.corner_radius
         pieces: list[OutlineArc | OutlineLine] = [OutlineLine(d, 0.0)] if d > 0.0 else []
         if r > 0.0:

@@ -1,12 +1,12 @@
-"""What a cutter leaves under its swept envelope, for any cutter.
+"""Material that a cutter leaves under its swept envelope, for a cutter of any outline.
 
-Over (x, y) a cutter of outline h that goes along a path c leaves material up to
+Over (x, y) a cutter of outline h that follows a path c leaves material up to
 
     E(x, y) = min over the path of c_z + h(rho),   rho the distance in plan of (x, y) from c,
 
-and -E = max of -c_z - h(rho): the tip of that same cutter, dropped over the path turned upside down. So the envelope
-is had from the drop kernel, exactly, for every outline it knows. The scallop at a point of the surface is how far
-along its normal the envelope lies.
+and -E = max of -c_z - h(rho). That is the tip of the same cutter, dropped over the path turned upside down. So the drop
+kernel computes the envelope exactly, for every outline it knows. The scallop at a point of the surface is its distance
+along the normal to the envelope. Places are in mm, access frame.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 from toolpath.root_finding import roots
 
-OUTWARDS = 12  # steps along a normal until the envelope is passed
+OUTWARDS = 12  # steps along a normal in search of the envelope
 
 
 class Envelope:
@@ -44,18 +44,24 @@ class Envelope:
         self.tree = TriangleTree(TriangleMesh(points * [1.0, 1.0, -1.0], moves))
 
     def heights(self, xy: F64) -> F64:
-        """E over xy (n, 2) mm: (n,) float64, mm; +inf where the cutter does not come."""
+        """Height of the envelope over places in plan.
+
+        xy : (n, 2) float64, mm, access frame
+
+        Returns (n,) float64, mm; +inf where the cutter does not come.
+        """
         return -drop_cutter(self.tree, self.cutter, xy)
 
     def along(self, points: F64, normals: F64) -> F64:
-        """Distance from each point along its normal to the envelope; to one crossing where there are several.
+        """Distance from points along their normals to the envelope; to one of the crossings where there are several.
 
-        points, normals : (n, 3) float64, mm and unit, n_z > 0
+        points  : (n, 3) float64, mm, access frame
+        normals : (n, 3) float64, dimensionless, unit, n_z > 0, access frame
 
         Returns
         -------
         (n,) float64, mm
-            Negative where the cutter has been below the point; inf where it does not come. Right to 1e-9 mm.
+            Negative where the cutter has been below the point; inf where it does not come. Exact to 1e-9 mm.
         """
         left = np.full(len(points), np.inf)
         up = self.heights(points[:, :2]) - points[:, 2]

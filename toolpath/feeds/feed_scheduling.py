@@ -1,8 +1,9 @@
-"""How fast a tool goes along a pass that takes stock off: in air like a link, in stock as what stands there lets it.
+"""Feeds along a pass that removes stock: that of links in air, and in stock a feed by depth and engaged angle.
 
-A feed is made for the worst a layer has, a slot as deep as the layer. Along a pass less stands in front most of the
-time: a ring takes a strip from the side, a rim the allowance, a layer over a step next to nothing. What stands there is
-read off the stock map, depth and engaged angle, and rounded up; the least feed counts some way before and behind.
+The feed of a tool is made for the worst cut of a layer, a slot as deep as the layer. Most of a pass meets less: a ring
+takes a strip from the side, a rim takes the allowance, a layer over a step takes next to nothing. Depth and engaged
+angle come from the stock map and are rounded up. The slowest feed counts a short distance before and behind. Places are
+tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -21,21 +22,22 @@ from toolpath.lines import stretch
 from toolpath.stock.engagement import SKIN_SHARE, angles
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 
-GUARD = 0.1  # of the diameter, and two lattice steps at least, before and after stock: as slow as in it
-ASKED = 4  # places on that way
-DEPTHS = 8  # of a layer: depths are rounded up to a part of it
+GUARD = 0.1  # diameters, two lattice steps at least: before and after stock the feed is that in stock
+LOOKS = 4  # places looked at within the guard
+DEPTHS = 8  # depths are rounded up to this part of a layer
 ANGLE = math.radians(15.0)  # engaged angles are rounded up to a multiple
-STEP = 1.25  # between one feed and the next: a program that says F at every place is read by nobody
+STEP = 1.25  # ratio between feeds, so that a program does not change F at every place
 
 
 @dataclass(frozen=True)
 class Pace:
     """Feeds of one tool in layers, mm/min.
 
-    feed  : at which the worst is cut; air : where nothing stands
-    under : where a cut has a depth and an engaged angle, mm and rad; no less than ``feed`` counts
-    layer : mm, depth of a layer
-    hidden: where the stock map shows nothing, on passes that take what it does not show; None: that is air
+    feed   : for the worst cut
+    air    : where no stock stands
+    under  : feed for a depth, mm, and an engaged angle, rad; ``feed`` is the minimum
+    layer  : mm, depth of a layer
+    hidden : where the stock map shows nothing, on passes that remove what the map does not show; None: that is air
     """
 
     feed: float
@@ -46,28 +48,31 @@ class Pace:
 
 
 def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
-    """A pass (n, 3), mm, in stretches: whether one is in air, its points, and its feed, mm/min.
+    """A pass in stretches: whether each is in air, its points, (m, 3) float64, mm, and its feed, mm/min.
 
-    Where the stock map shows nothing all along, it is one that takes what the map does not show; where moves in air are
-    no faster than those in stock, it stays whole. A pass with a feed for what is hidden has no stretch in air.
+    Where the stock map shows nothing along the whole pass, the pass removes what the map does not show. Where moves in
+    air are no faster than those in stock, the pass stays whole. A pass with a feed for hidden stock has no stretch in
+    air.
+
+    points : (n, 3) float64, mm, access frame, tips
     """
     calm = pace.air if pace.hidden is None else pace.hidden
     if max(calm, pace.air) <= pace.feed:
         return [(False, points, pace.feed)]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     guard = max(GUARD * tool.diameter, 2.0 * stock.lattice.step)
-    at = np.linspace(0.0, s[-1], max(2, math.ceil(ASKED * s[-1] / guard) + 1))
+    at = np.linspace(0.0, s[-1], max(2, math.ceil(LOOKS * s[-1] / guard) + 1))
     way = np.column_stack([np.interp(at, s, points[:, c]) for c in range(3)])
-    busy = stock.overlap(way, tool, SURE_RIM, least=0.0) > AIR_TOLERANCE
+    busy = stock.overlap(way, tool, SURE_RIM, lower_bound=0.0) > AIR_TOLERANCE
     if not busy.any():
         return [(False, points, pace.feed if pace.hidden is None else pace.hidden)]
     feeds = np.full(len(at), calm)
     feeds[busy] = _in_stock(way, stock, tool, pace)[busy]
-    feeds = minimum_filter1d(feeds, 2 * ASKED + 1, mode="nearest")
-    # what is faster for less than a guard's way is not worth a word
-    feeds = maximum_filter1d(minimum_filter1d(feeds, ASKED + 1, mode="nearest"), ASKED + 1, mode="nearest")
+    feeds = minimum_filter1d(feeds, 2 * LOOKS + 1, mode="nearest")
+    # a stretch of higher feed shorter than the guard is left out
+    feeds = maximum_filter1d(minimum_filter1d(feeds, LOOKS + 1, mode="nearest"), LOOKS + 1, mode="nearest")
     between = np.minimum(feeds[1:], feeds[:-1])
-    near = maximum_filter1d(busy, 2 * ASKED + 1, mode="nearest")  # stock may be cut as fast as moves in air go
+    near = maximum_filter1d(busy, 2 * LOOKS + 1, mode="nearest")  # stock may be cut as fast as moves in air go
     cuts = near[1:] | near[:-1] | (between < pace.air) | (pace.hidden is not None)
     ends = np.concatenate([[0], np.flatnonzero((np.diff(between) != 0.0) | (np.diff(cuts))) + 1, [len(between)]])
     return [(not cuts[a], stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
@@ -75,13 +80,13 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
 
 
 def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
-    """(n,) float64, mm/min, of tips (n, 3), mm, whether in stock or not.
+    """Feeds at tips (n, 3), mm, whether in stock or not, (n,) float64, mm/min.
 
-    Where nothing is engaged all of the front may be in what is skimmed, which counts as none. What is deeper than that
-    and not in front is what a row of nodes has missed: no thicker than ``SURE_RIM`` of a step, which a cutter that
-    breaks through it has in front of it over no more than 2 arccos (1 - thickness / radius).
+    Where no angle is engaged the whole front may be in a skin, which does not count. Deeper stock that is not in front
+    is missed by a row of nodes. It is no thicker than ``SURE_RIM`` of a step. A cutter that breaks through it has it in
+    front over at most 2 arccos (1 - thickness / radius).
     """
-    over = stock.overlap(way, tool, least=0.0)
+    over = stock.overlap(way, tool, lower_bound=0.0)
     depth = np.ceil(over / pace.layer * DEPTHS - 1e-9).astype(np.int64)
     turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
     missed = 2.0 * math.acos(max(1.0 - SURE_RIM * stock.lattice.step / tool.radius, 0.0))

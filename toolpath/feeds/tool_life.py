@@ -1,8 +1,8 @@
-"""How long tools are in cut, and steps parted where the life of a cutter ends.
+"""Time that tools are in cut, and steps split where the life of a cutter ends.
 
-A feed move is taken to be in cut unless it is a link as fast as those in air are, so that what is counted is never less
-than what the proof finds in stock. Minutes are those of ``geometry.move_timing``, speeding up and slowing down counted. A
-cutter is changed between two passes, where the tool is up at the clearance plane along Z, or between two steps.
+A feed move counts as in cut unless it is a link as fast as those in air. So the count is never less than the time that
+the proof finds in stock. Times are those of ``geometry.move_timing``, with acceleration. A cutter is changed between
+two passes, where the tool is up at the clearance plane along Z, or between two steps.
 """
 
 from __future__ import annotations
@@ -13,24 +13,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath.workingsteps import Motion, Trajectory, Workingstep, trajectory_seconds
+from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep, trajectory_seconds
 
 AT_PLANE = 1e-9  # mm
 AS_FAST = 1.0 + 1e-9
 
 
 def minutes_in_cut(step: Workingstep) -> NDArray[np.float64]:
-    """(k,) float64, min: what each trajectory of a step keeps the tool in cut at most."""
-    links = [t.feed for t in step.trajectories if t.motion not in (Motion.RAPID, Motion.CUT)]
+    """Upper bound of the time that each trajectory of a step is in cut, (k,) float64, min."""
+    links = [t.feed for t in step.trajectories if t.motion not in (TrajectoryKind.RAPID, TrajectoryKind.CUT)]
     air = max(links, default=0.0) / AS_FAST
-    told = air > step.feed  # else nothing tells a link in air from one in stock
-    cuts = np.array([t.motion is Motion.CUT or t.motion is not Motion.RAPID and not (told and t.feed >= air)
+    distinct = air > step.feed  # else links in air and in stock have the same feed
+    cuts = np.array([t.motion is TrajectoryKind.CUT
+                     or t.motion is not TrajectoryKind.RAPID and not (distinct and t.feed >= air)
                      for t in step.trajectories])
     return np.asarray(np.where(cuts, trajectory_seconds(step.trajectories, step.rates), 0.0) / 60.0)
 
 
 def worn(steps: Iterable[Workingstep]) -> dict[str, float]:
-    """Minutes in cut of the cutter that is in each tool after some steps, by tool id."""
+    """Minutes in cut of the cutter in each tool after some steps, by tool id."""
     out: dict[str, float] = {}
     for s in steps:
         out[s.tool.id] = (0.0 if s.fresh else out.get(s.tool.id, 0.0)) + float(minutes_in_cut(s).sum())
@@ -39,14 +40,14 @@ def worn(steps: Iterable[Workingstep]) -> dict[str, float]:
 
 def with_fresh_cutters(steps: Sequence[Workingstep], lives: Mapping[str, float], clearance: float,
                        used: Mapping[str, float] | None = None) -> list[Workingstep]:
-    """Steps with a fresh cutter asked for before the life of the last one ends.
+    """Steps that change to a fresh cutter before the life of the last one ends.
 
-    lives     : min in cut, by tool id; tools it does not hold last for ever
+    lives     : min in cut, by tool id; other tools last forever
     clearance : mm, height at which rapids across are free
-    used      : min, what the cutters have been in cut before
+    used      : min, time in cut that the cutters have already
 
-    Returns the steps, those that a change falls into in parts named S07, S07b, S07c and so on, each of them a step by
-    itself. A run that is longer than a life alone gets a cutter of its own.
+    Returns the steps. A step that needs a change within it comes in parts named S07, S07b, S07c and so on. A run that
+    is longer than a whole life gets a cutter of its own.
     """
     spent, out = dict(used or {}), []
     for step in steps:
@@ -74,7 +75,8 @@ def _runs(step: Workingstep, clearance: float) -> list[tuple[int, int]]:
     """Trajectories from one place where the tool is up to the next, as first and end; only those with a cut."""
     at = [0, *(k for k in range(1, len(step.trajectories)) if _is_up(step.trajectories, k, clearance)),
           len(step.trajectories)]
-    cut = [any(t.motion is Motion.CUT for t in step.trajectories[a:b]) for a, b in zip(at[:-1], at[1:], strict=True)]
+    cut = [any(t.motion is TrajectoryKind.CUT for t in step.trajectories[a:b])
+           for a, b in zip(at[:-1], at[1:], strict=True)]
     ends = [b for b, c in zip(at[1:], cut, strict=True) if c]
     starts = [0, *ends[:-1]]
     return list(zip(starts, [*starts[1:], len(step.trajectories)], strict=True))
@@ -103,7 +105,7 @@ def _parted(step: Workingstep, parts: Sequence[int], fresh: bool, clearance: flo
 
 def _is_across(trajectory: Trajectory, clearance: float) -> bool:
     """Whether a trajectory is a rapid at the clearance plane."""
-    return trajectory.motion is Motion.RAPID and bool((trajectory.points[:, 2] >= clearance - AT_PLANE).all())
+    return trajectory.motion is TrajectoryKind.RAPID and bool((trajectory.points[:, 2] >= clearance - AT_PLANE).all())
 
 
 def _letters(n: int) -> str:

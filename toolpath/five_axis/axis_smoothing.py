@@ -1,19 +1,22 @@
-"""Tool axes along a pass: as near to those wanted as what stands around lets them, and turning evenly.
+"""Tool axes along a pass: near the wanted axes, free of obstacles, and turning evenly.
 
 Notation
-    w_k : axis wanted at station k;  u_k : axis taken;  b_k : axis of the pass before, beside it; all unit
+    w_k : axis wanted at station k;  u_k : axis chosen;  b_k : axis of the neighbouring pass beside it; all unit
     h   : mm between stations;  l : mm, over which a turn is spread
 
-Without anything in the way the axes taken have the least
+Without obstacles the chosen axes minimise
 
     sum h |u_k - w_k|² + h g |u_k - b_k|² + (l² / h) |u_k+1 - u_k|²
 
-a tridiagonal system, made unit after. A sudden turn by an angle t is spread as t exp(-s / l) / 2 on both sides, so axes
-turn by t / (2 l) a millimetre at most: l grows until they keep to the limit. Where the tool would be in something with
-its smoothed axis, a fan of axes round it is asked, and through all stations the chain is taken that has the fewest
-blocked places and then the least of the same sum (dynamic programming). The fan is coarse, so that chain is drawn
-towards the least of the sum station by station, each time only as far as the tool stays free. Where axes still turn
-too fast that is done again with a longer l; what blocks fewest stations is taken, then what turns slowest.
+This is a tridiagonal system; its solution is made unit afterwards. A sudden turn by an angle t is spread as
+t exp(-s / l) / 2 on both sides, so axes turn by t / (2 l) a millimetre at most. l grows until they keep to the limit.
+
+Where the tool would hit something with its smoothed axis, a fan of axes round it is tried. Dynamic programming takes
+the chain through all stations with the fewest blocked places, then the least sum. The fan is coarse. So the chain is
+relaxed towards the least sum station by station, as far as the tool stays free. Where axes still turn too fast this
+repeats with a longer l; the result with the fewest blocked stations wins, then the one that turns slowest.
+
+Arrays are float64. Places are in mm, axes and normals dimensionless unit vectors, both in the access frame.
 """
 
 from __future__ import annotations
@@ -34,31 +37,31 @@ from geometry.tool_body import ToolBody
 from toolpath.five_axis.oriented_pass import wanted_axes
 from toolpath.lines import true_runs
 from toolpath.passes.cutter_locations import sides, tips
-from toolpath.passes.forward_step import Profile
+from toolpath.passes.forward_step import PassProfile
 from toolpath.poses import Axes, Blocked, angles_between
 
-SPACING = 0.5  # mm between stations, at most
+SPACING = 0.5  # mm between stations at most
 FAN = np.radians(4.0)  # between neighbouring axes of a fan
 BESIDE = 0.5  # weight of the axes of the pass before
 BLOCKED = 1e3  # cost of a blocked station: more than any turn
-STIFFER = 4  # trials, l twice as long each time, where axes turn too fast round what is in the way
-WIDER = 1.5  # by which l grows, where axes turn too fast
-SWEEPS = 120  # of drawing a chain towards the least of the sum
-SETTLED = 1e-3  # rad, below which a sweep changes nothing
-SHORTER = (1.0, 0.5, 0.25)  # of a step towards the least, where the whole of it is not free
-HOLD = 1e-3  # weight of what is wanted at a blocked station: its axis lies between its neighbours
+STIFFER = 4  # trials, l twice as long each time, where axes turn too fast round an obstacle
+WIDER = 1.5  # factor on l where axes turn too fast
+SWEEPS = 120  # of relaxation at most
+SETTLED = 1e-3  # rad: a sweep that moves axes less ends the relaxation
+SHORTER = (1.0, 0.5, 0.25)  # shares of a step that are tried until one is free
+HOLD = 1e-3  # weight of the wanted axis at a blocked station: its axis lies between its neighbours
 
 Met = Callable[[NDArray[np.int64], F64], NDArray[np.bool_]]
 """(k,) bool: whether the tool is in something at stations (k,) with axes (k, 3)."""
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What axes along a pass keep to.
+class AxisLimits:
+    """Limits of the axes along a pass.
 
-    cone   : rad, the most an axis may be off the one wanted
-    per_mm : rad/mm, the most it may turn along the contacts of a pass
-    spread : mm, over which a turn is spread at least
+    cone   : rad, largest angle between an axis and the one wanted
+    per_mm : rad/mm, fastest turn along the contacts of a pass
+    spread : mm, least length over which a turn is spread
     """
 
     cone: float
@@ -68,12 +71,12 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Steered:
-    """The field of axes of one pass; it can be asked for axes as any other (``toolpath.poses.Axes``).
+    """Field of axes of one pass, called like any other (``toolpath.poses.Axes``).
 
-    contact : (m, 3) float64, mm, its stations, evenly spaced
+    contact : (m, 3) float64, mm, its stations, evenly spaced, access frame
     axis    : (m, 3) float64, unit, tip to spindle
-    free    : (m,) bool; where False no axis of the fan frees the tool, and it lies between its neighbours
-    per_mm  : rad/mm, the fastest it turns where the tool is free
+    free    : (m,) bool; False where no axis of the fan frees the tool, so that the axis lies between its neighbours
+    per_mm  : rad/mm, the fastest turn where the tool is free
     """
 
     contact: F64
@@ -101,22 +104,22 @@ class Steered:
         return cKDTree(self.contact)
 
 
-def steered(profile: Profile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: Limits,
+def steered(profile: PassProfile, tool: ToolBody, wanted: Axes, blocked: Blocked, limits: AxisLimits,
             before: Steered | None = None, off: float = 0.0) -> Steered:
     """The axes of a pass.
 
-    profile : Profile of the pass
+    profile : PassProfile of the pass
     tool    : ToolBody, a ball, a bull nose or a flat
-    wanted  : the field of axes wanted
+    wanted  : field of the wanted axes
     blocked : whether the tool enters something, or the machine cannot take the axis
-    limits  : Limits
-    before  : axes of the pass beside it, which these stay near to
+    limits  : AxisLimits
+    before  : axes of the neighbouring pass, which these stay near
     off     : mm, that the tool may stand off along the normal (``toolpath.five_axis.oriented_pass.posed``)
 
     Raises
     ------
     GeometryError
-        Code 'bad_axis': the field wanted gives none somewhere.
+        Code 'bad_axis': the wanted field gives no axis somewhere.
     """
     count = max(int(np.ceil(profile.length / SPACING)) + 1, 2)
     way = np.linspace(0.0, profile.length, count)
@@ -148,11 +151,12 @@ def _fastest(axis: F64, bad: NDArray[np.bool_]) -> float:
 
 
 def fan(axis: F64, half: float) -> F64:
-    """Axes spread evenly round others, each itself first.
+    """Axes spread evenly round others, each of these first.
 
-    axis : (n, 3) float64, unit; half : rad, how far out
+    axis : (n, 3) float64, dimensionless, unit, access frame
+    half : rad, half the opening of the fan
 
-    Returns (n, d, 3) float64, unit.
+    Returns (n, d, 3) float64, dimensionless, unit.
     """
     rows = [np.array([[0.0, 0.0, 1.0]])]
     for k in range(1, int(half / FAN + 1e-9) + 1):
@@ -163,11 +167,11 @@ def fan(axis: F64, half: float) -> F64:
     return np.asarray(np.einsum("nji,dj->ndi", axis_frames(axis), np.vstack(rows)))
 
 
-def _goal(axis: F64, beside: F64 | None) -> tuple[F64, float]:
-    """What axes are drawn to, and how strongly."""
-    if beside is None:
+def _goal(axis: F64, neighbour: F64 | None) -> tuple[F64, float]:
+    """Target of the axes and its weight."""
+    if neighbour is None:
         return axis, 1.0
-    return (axis + BESIDE * beside) / (1.0 + BESIDE), 1.0 + BESIDE
+    return (axis + BESIDE * neighbour) / (1.0 + BESIDE), 1.0 + BESIDE
 
 
 def _spread(goal: F64, weight: F64, step: float, spread: float) -> F64:
@@ -181,10 +185,10 @@ def _spread(goal: F64, weight: F64, step: float, spread: float) -> F64:
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 
-def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.bool_], met: Met, limits: Limits,
+def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.bool_], met: Met, limits: AxisLimits,
            step: float, spread: float) -> tuple[F64, NDArray[np.bool_]]:
-    """Axes led round what is in the way, and where even so the tool is blocked."""
-    reach = int(np.ceil(limits.cone / limits.per_mm / step)) + 1  # so many stations it takes to get round
+    """Axes steered round obstacles, (m, 3), and (m,) bool where the tool is blocked all the same."""
+    reach = int(np.ceil(limits.cone / limits.per_mm / step)) + 1  # stations that a detour takes
     near = maximum_filter1d(bad, 2 * reach + 1, mode="constant")
     rows = np.flatnonzero(near)
     tries = fan(smooth[rows], limits.cone)
@@ -204,10 +208,10 @@ def _round(smooth: F64, wanted: F64, goal: F64, weight: float, bad: NDArray[np.b
             out[i:j] = tries[at][np.arange(j - i), taken]
             blocked[i:j] = hit[at][np.arange(j - i), taken]
         out, blocked = _drawn(out, blocked, rows, wanted, goal, weight * step, met, float(np.cos(limits.cone)), stiff)
-        told = int(blocked.sum()), max(_fastest(out, blocked), limits.per_mm * step)
-        if best is None or told < best[0]:
-            best = told, out, blocked
-        if told[1] <= limits.per_mm * step:
+        rank = int(blocked.sum()), max(_fastest(out, blocked), limits.per_mm * step)
+        if best is None or rank < best[0]:
+            best = rank, out, blocked
+        if rank[1] <= limits.per_mm * step:
             break
         spread *= 2.0
     assert best is not None
@@ -241,10 +245,10 @@ def _chain(tries: F64, cost: F64, stiff: float, ends: tuple[F64 | None, F64 | No
 
 
 def _drawn(axis: F64, blocked: NDArray[np.bool_], rows: NDArray[np.int64], wanted: F64, goal: F64, weight: float,
-           met: Met, least: float, stiff: float) -> tuple[F64, NDArray[np.bool_]]:
-    """Axes drawn towards the least of the sum, those of ``rows``, as far as each stays free.
+           met: Met, min_cosine: float, stiff: float) -> tuple[F64, NDArray[np.bool_]]:
+    """Axes of ``rows`` relaxed towards the least sum, as far as each stays free.
 
-    least : cosine of the most an axis may be off the one wanted
+    min_cosine : cosine of the largest angle between an axis and the one wanted
     """
     out, blocked, last = axis.copy(), blocked.copy(), len(axis) - 1
     for _ in range(SWEEPS):
@@ -263,9 +267,9 @@ def _drawn(axis: F64, blocked: NDArray[np.bool_], rows: NDArray[np.int64], wante
                 trial = out[at] + share * (target[todo] - out[at])
                 trial /= np.linalg.norm(trial, axis=1)[:, None]
                 off = (trial * wanted[at]).sum(axis=1)
-                hit = (off < least) & (off < (out[at] * wanted[at]).sum(axis=1))
+                hit = (off < min_cosine) & (off < (out[at] * wanted[at]).sum(axis=1))
                 hit[~hit] = met(at[~hit], trial[~hit])
-                done = ~hit | blocked[at]  # what is blocked anyway may stand wherever that is even
+                done = ~hit | blocked[at]  # a blocked axis may lie anywhere, so it turns evenly
                 if done.any():
                     moved = max(moved, float(np.linalg.norm(trial[done] - out[at[done]], axis=1).max()))
                 out[at[done]] = trial[done]

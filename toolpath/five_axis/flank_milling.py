@@ -4,18 +4,20 @@ Notation
     xi, eta : the unit square over the wall; xi along it, more level, eta up
     P, n    : place of the wall and its normal, out of the material
     R, r    : radius of the flank, and of the tool's corner
-    A       : P + (R + o) n, a place of the tool's axis, o what it stands off
+    A       : P + (R + o) n, a place of the tool axis, o its extra distance from the wall
 
 The axis of a pose goes from A at the lower border of a band, at xi, to A at its upper border, at xi + s. On a
-developable wall there is an s with which both normals are alike: there runs a ruling, and the flank lies on the wall
-all along it. On any other ruled wall normals turn along a ruling by an angle w, and a straight flank misses the wall by
-about R w² / 8, in the middle or at the ends: half as high it leaves a quarter. So what is too high is divided into
-bands; but the flank goes on above its band, so that only walls that bend away from it are the better for that.
+developable wall some s makes both normals alike: there runs a ruling, and the flank lies on the wall all along it. On
+any other ruled wall normals turn along a ruling by an angle w. A straight flank misses that wall by about R w² / 8, in
+the middle or at the ends; half the height leaves a quarter. So a wall that leaves too much is divided into bands. The
+flank extends above its band, so bands help only on walls that bend away from it.
 
-s is looked for along the whole wall at once: of a few at every station the chain is taken that misses least, less a
-price on turning (dynamic programming), three times, each time finer, and the steps of the search are smoothed out. What
-the flank truly leaves, and where it goes into the wall, is not what one pose shows but what all of them sweep: that is
-measured, and where it is too deep the tool stands off by as much.
+The search for s runs along the whole wall at once. Dynamic programming takes the chain of trial values that misses
+least, with a price on turning. It runs three times, each time finer, and the steps of the search are smoothed out. The
+swept flank decides what stays and where it enters the wall, not one pose. That is measured, and where the flank is too
+deep the tool stands off by as much.
+
+Arrays are float64; places are in mm, normals and axes dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -33,36 +35,41 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.lines import true_runs
 from toolpath.passes.isoparametric_passes import Laid
 from toolpath.poses import Blocked
 from toolpath.stock.residual_map import leaning_depths
 
-STATIONS = 65  # along a wall, at which s is looked for
-ALONG, UP = 257, 33  # places of the wall that feet are looked for among, each way
-HEIGHTS = np.linspace(0.0, 1.0, 9)  # of a band, at which a pose is held against the wall
+STATIONS = 65  # along a wall, at which s is searched
+ALONG, UP = 257, 33  # places of the wall among which foot points are searched, each way
+HEIGHTS = np.linspace(0.0, 1.0, 9)  # shares of a band at which a pose is compared with the wall
 SIDEWAYS = np.arange(-8, 9)  # trials at each station, a step apart
-FIRST_REACH = 1.0  # of the height of a band: so far to the side its top is looked for
-FINER, TIMES = 4.0, 3  # from one search to the next, and how many
-EVENED = 16.0  # how much of the trials' steps is smoothed out of s: waves of 5 stations to 3 %, of 20 to 87 %
-# of what may be left: the price of 1 mm that the top of a band is moved by turning from station to station, and by
-# leaning off the steepest way
+FIRST_REACH = 1.0  # heights of a band: how far to the side its upper end is searched
+FINER, TIMES = 4.0, 3  # refinement from one search to the next, and number of searches
+EVENED = 16.0  # strength of the smoothing of s: waves of 5 stations shrink to 3 %, of 20 to 87 %
+# Price, in allowed residuals, of 1 mm that the top of a band moves by turning from station to station, and by
+# tilting off the steepest direction
 TURNING, LEANING = 0.02, 0.002
-LOOKED, ROWS = 193, 25  # places at which what is swept is measured, along and up
+LOOKED, ROWS = 193, 25  # places at which the swept flank is measured, along and up
 CORRECTIONS = 5
-AIMED = 0.5  # of the depth allowed: what a correction leaves
-FAR_OFF = 8.0  # times what may be left: deeper than that no standing off will mend
-MOST_BANDS = 4
-LEFT_SHARE = 0.95  # of a band must keep to what may be left
-ENDS = 1e-3  # of the length: what the way on beyond an end is taken from
-DENSE, MOST_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
+AIMED = 0.5  # share of the allowed depth that a correction leaves
+FAR_OFF = 8.0  # allowed residuals: no standing off mends a deeper gouge
+MAX_BANDS = 4
+LEFT_SHARE = 0.95  # share of a band that must keep the allowed residual
+ENDS = 1e-3  # share of the length from which a wall is continued beyond its end
+DENSE, MAX_DENSE = 0.25, 0.5  # of the radius, and mm: tip and end of the flutes between poses before they are thinned
 FINER_POSES = 4  # trials, each with more poses
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What is asked of flank passes, mm: what may be left, how deep they may be, and what thinning out may add."""
+class FlankTolerances:
+    """Tolerances of flank passes, mm.
+
+    left  : residual that may stay
+    depth : how deep the flank may enter the wall
+    chord : error that thinning out may add
+    """
 
     left: float
     depth: float
@@ -70,7 +77,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Wall:
+class FlankWall:
     """A wall over the unit square.
 
     iso : faces laid over it, passes along xi
@@ -85,9 +92,11 @@ class Wall:
         return bool(ends[1, 2] >= ends[0, 2])
 
     def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Places (n, 3) mm and unit normals (n, 3) at xi and eta, both (n,).
+        """Places of the wall and their unit normals, both (n, 3) float64, mm and dimensionless, access frame.
 
-        Beyond its ends (xi < 0 or > 1) a wall goes on straight, with the normal of its end.
+        Beyond its ends (xi < 0 or > 1) a wall continues straight, with the normal of its end.
+
+        xi, eta : (n,) float64, dimensionless
         """
         eta = eta if self._upwards else 1.0 - eta
         inside = np.clip(xi, 0.0, 1.0)
@@ -102,29 +111,40 @@ class Wall:
 
     @cached_property
     def length(self) -> float:
-        """mm, along the middle."""
+        """Length along the middle, mm."""
         return self._between(np.linspace(0.0, 1.0, STATIONS), np.full(STATIONS, 0.5))
 
     @cached_property
     def height(self) -> float:
-        """mm, up the middle."""
+        """Height up the middle, mm."""
         return self._between(np.full(STATIONS, 0.5), np.linspace(0.0, 1.0, STATIONS))
 
     def lattice(self, along: int, up: int) -> tuple[F64, F64, F64]:
-        """Places and normals (up, along, 3), and the eta (up,) of the rows."""
+        """Places and unit normals on a lattice, both (up, along, 3) float64, access frame, and the eta (up,) of its
+        rows.
+
+        Raises
+        ------
+        GeometryError
+            Code 'bad_pass': the wall has a place without a normal.
+        """
         at = np.linspace(0.0, 1.0, up)
         xi, eta = np.meshgrid(np.linspace(0.0, 1.0, along), at)
         place, normal = self.contact(xi.ravel(), eta.ravel())
         if not (np.isfinite(place).all() and np.isfinite(normal).all()):
-            raise GeometryError("a wall has a place without a normal", code="bad_pass",
+            raise GeometryError("the wall has a place without a normal", code="bad_pass",
                                 remedy="machine it by another strategy")
         return place.reshape(up, along, 3), normal.reshape(up, along, 3), at
 
     def off(self, points: F64) -> F64:
-        """(n,) mm: how far points (n, 3) near the wall stand off it.
+        """Distance of points near the wall from it, along its normal, (n,) float64, mm.
 
-        Along the normal at the nearest of a lattice of places: right to half the curvature of the wall times the square
-        of half their distance.
+        points : (n, 3) float64, mm, access frame
+
+        Notes
+        -----
+        Along the normal at the nearest place of a lattice. The error is at most half the curvature of the wall times
+        the square of half the spacing of these places.
         """
         near = self._tree.query(points)[1]
         place, normal = self._feet
@@ -147,17 +167,15 @@ class Wall:
 class Band:
     """A pass of the flank over part of the height of a wall.
 
-    wall       : Wall
-    tool       : ToolBody
     allowance  : mm, to leave on the wall
     low, high  : eta of its borders; the flank begins at the lower one
-    xi         : (n,) stations along it
-    shift      : (n,) what is added to xi at the upper border
-    off        : (n,) mm, what the axis stands off the wall more than R
-    left, deep : mm, the most that stays on 95 % of the band, and the most the wall is cut into
+    xi         : (n,) float64, stations along it
+    shift      : (n,) float64, s, added to xi at the upper border
+    off        : (n,) float64, mm, distance of the axis from the wall beyond R
+    left, deep : mm, residual that 95 % of the band keep to, and greatest depth in the wall
     """
 
-    wall: Wall
+    wall: FlankWall
     tool: ToolBody
     allowance: float
     low: float
@@ -169,7 +187,8 @@ class Band:
     deep: float = np.inf
 
     def poses(self, count: int) -> tuple[F64, F64]:
-        """Tips (count, 3) mm and axes (count, 3), unit, from one end of the wall to the other."""
+        """Tips, mm, and unit axes, both (count, 3) float64, access frame, evenly from one end of the wall to the
+        other."""
         xi = np.linspace(0.0, 1.0, count)
         shift = PchipInterpolator(self.xi, self.shift)(xi)
         stands = self.tool.radius + self.allowance + np.interp(xi, self.xi, self.off)
@@ -179,15 +198,16 @@ class Band:
         return begin - self.tool.corner_radius * axis, axis
 
     def pieces(self, blocked: Blocked, chord: float, served: NDArray[np.bool_] | None = None) -> list[Piece]:
-        """The pass where the tool is free.
+        """The parts of the pass where the tool is free.
 
-        Where the end of the tool is in the way it is raised along its axis, evenly, and what is under it is left.
+        Where the end of the tool would hit something, it is raised evenly along its axis, and the material under it
+        stays.
 
         blocked : whether the tool enters something
-        chord   : mm, what leaving out poses may move tip and upper end of the flank by
-        served  : (m,) where along the wall the pass is wanted, evenly from end to end; None: everywhere
+        chord   : mm, error at tip and upper end of the flank that leaving out poses may add
+        served  : (m,) bool, where along the wall the pass is needed, evenly from end to end; None: everywhere
         """
-        spacing, high = min(DENSE * self.tool.radius, MOST_DENSE), self.tool.flute_length
+        spacing, high = min(DENSE * self.tool.radius, MAX_DENSE), self.tool.flute_length
         count = int(np.ceil(max(self.wall.length / spacing, 2.0))) + 1
         for _ in range(FINER_POSES):
             tip, axis = self.poses(count)
@@ -205,32 +225,32 @@ class Band:
         gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
         out = []
         for i, j in true_runs(~met):
-            if gone[j - 1] - gone[i] >= LEAST_PIECE * self.tool.radius:
+            if gone[j - 1] - gone[i] >= MIN_PIECE * self.tool.radius:
                 rows = i + thinned_poses(tip[i:j], axis[i:j], height + self.tool.corner_radius, chord)
                 out.append(Piece(tip[rows], axis[rows], away[rows], height + self.tool.corner_radius))
         return out
 
 
-def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: float = 1.0,
+def bands(wall: FlankWall, tool: ToolBody, wanted: FlankTolerances, low: float = 0.0, high: float = 1.0,
           allowance: float = 0.0) -> list[Band]:
-    """The passes of the flank over a wall, from the highest down: as few bands as leave little enough.
+    """The passes of the flank over a wall, from the highest down, in as few bands as keep the tolerances.
 
-    low, high : eta between which the wall is wanted
+    low, high : eta between which the wall is finished
     allowance : mm, to leave on it
 
     Raises
     ------
     GeometryError
-        Code 'bad_pass': not even ``MOST_BANDS`` do, or the flutes are too short for the bands.
+        Code 'bad_pass': ``MAX_BANDS`` bands leave too much, or the flutes are too short for the bands.
     """
     room = tool.flute_length - tool.corner_radius
     if room <= 0.0 or wall.length <= 0.0:
-        raise GeometryError(f"{tool.id}: it has no flank, its flutes end where its corner does" if room <= 0.0 else
-                            "a wall without length", code="bad_pass", subjects=(tool.id,), measured=room, limit=0.0,
-                            remedy="machine it in levels")
+        raise GeometryError(f"{tool.id}: the tool has no flank: its flutes are no longer than its corner radius"
+                            if room <= 0.0 else "the wall has no length", code="bad_pass", subjects=(tool.id,),
+                            measured=room, limit=0.0, remedy="machine it by waterlines")
     least = int(np.ceil((high - low) * wall.height / room))
-    told, xi = np.inf, np.linspace(0.0, 1.0, STATIONS)
-    for count in range(max(least, 1), MOST_BANDS + 1):
+    miss, xi = np.inf, np.linspace(0.0, 1.0, STATIONS)
+    for count in range(max(least, 1), MAX_BANDS + 1):
         borders = np.linspace(low, high, count + 1)
         made: list[Band] = []
         for a, b in zip(borders[:-1], borders[1:], strict=True):
@@ -240,16 +260,23 @@ def bands(wall: Wall, tool: ToolBody, wanted: Wanted, low: float = 0.0, high: fl
                 break
         else:
             return made[::-1]
-        told = max(made[-1].left, made[-1].deep)
-    raise GeometryError(f"{tool.id}: its flank misses the wall by {told:.4f} mm in {MOST_BANDS} bands; allowed is "
-                        f"{wanted.left:.4f} mm" if np.isfinite(told) else
-                        f"{tool.id}: a wall {wall.height:.1f} mm high takes more than {MOST_BANDS} bands of its flutes",
-                        code="bad_pass", subjects=(tool.id,), measured=told, limit=wanted.left,
-                        remedy="machine it in levels")
+        miss = max(made[-1].left, made[-1].deep)
+    raise GeometryError(f"{tool.id}: its flank misses the wall by {miss:.4f} mm in {MAX_BANDS} bands; allowed is "
+                        f"{wanted.left:.4f} mm" if np.isfinite(miss) else
+                        f"{tool.id}: a wall {wall.height:.1f} mm high takes more than {MAX_BANDS} bands of its flutes",
+                        code="bad_pass", subjects=(tool.id,), measured=miss, limit=wanted.left,
+                        remedy="machine it by waterlines")
 
 
-def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], stands: F64 | float) -> tuple[F64, F64]:
-    """Where the tool's axis passes a band's lower and upper border, (n, 3) mm each; stands : mm off the wall."""
+def axis_ends(wall: FlankWall, xi: F64, shift: F64, borders: tuple[float, float],
+              stands: F64 | float) -> tuple[F64, F64]:
+    """Places where the tool axis crosses the lower and the upper border of a band, both (n, 3) float64, mm, access
+    frame.
+
+    xi, shift : (n,) float64, dimensionless, stations and shift of the upper end
+    borders   : eta of the lower and of the upper border
+    stands    : mm, distance of the axis from the wall, a float or (n,) float64
+    """
     ends = []
     for at, eta in zip((xi, xi + shift), borders, strict=True):
         place, normal = wall.contact(at, np.full(len(at), eta))
@@ -257,8 +284,8 @@ def axis_ends(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], sta
     return ends[0], ends[1]
 
 
-def _fitted(band: Band, wanted: Wanted) -> Band:
-    """A band with its shift, standing off as far as what it sweeps wants."""
+def _fitted(band: Band, wanted: FlankTolerances) -> Band:
+    """A band with its shift, standing off as far as its swept flank needs."""
     wall, tool, low, high = band.wall, band.tool, band.low, band.high
     band = replace(band, shift=_paired(wall, band.xi, (low, high), tool.radius, wanted.left))
     place, normal, eta = wall.lattice(LOOKED, ROWS)
@@ -278,8 +305,8 @@ def _fitted(band: Band, wanted: Wanted) -> Band:
     return band
 
 
-def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
-    """(n,) what is added to xi at the upper border, so that the axis misses the wall least.
+def _paired(wall: FlankWall, xi: F64, borders: tuple[float, float], radius: float, left: float) -> F64:
+    """(n,) shift of xi at the upper border at which the axis misses the wall least.
 
     Where many miss as little, as on a plane, the steepest is taken.
     """
@@ -306,7 +333,7 @@ def _paired(wall: Wall, xi: F64, borders: tuple[float, float], radius: float, le
     return np.clip(_evened(shift), -xi - beyond, 1.0 - xi + beyond)
 
 
-def _steepest(wall: Wall, xi: F64, borders: tuple[float, float]) -> F64:
+def _steepest(wall: FlankWall, xi: F64, borders: tuple[float, float]) -> F64:
     """(n, 3) unit: the steepest way up the wall, half way between the borders."""
     normal = wall.contact(xi, np.full(len(xi), 0.5 * (borders[0] + borders[1])))[1]
     up = np.array([0.0, 0.0, 1.0]) - normal[:, 2:] * normal
@@ -314,11 +341,11 @@ def _steepest(wall: Wall, xi: F64, borders: tuple[float, float]) -> F64:
 
 
 def _evened(shift: F64) -> F64:
-    """s (n,) without the steps it was looked for in.
+    """Shift s (n,) without the steps of the search.
 
-    Least sum of squares of what it is moved by and EVENED times those of its second differences. About the best s the
-    miss grows with the square of what s is off, so a step of the last search, moved by less than itself, costs
-    nothing that counts; what it costs is measured anyway.
+    Least sum of the squared change and EVENED times the squared second differences. Near the best s the miss grows with
+    the square of the error of s. So moving s by less than a step of the last search costs little; the sweep measures
+    it.
     """
     bend = np.diff(np.eye(len(shift)), 2, axis=0)
     whole = np.eye(len(shift)) + EVENED * bend.T @ bend
@@ -328,9 +355,11 @@ def _evened(shift: F64) -> F64:
     return np.asarray(solveh_banded(bands_of, shift))
 
 
-def _missed(wall: Wall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> tuple[F64, F64]:
-    """(n,) mm: between how far the axis stands off the wall at the nearest and at the farthest of its places; and the
-    axis, (n, 3), unit."""
+def _missed(wall: FlankWall, xi: F64, shift: F64, borders: tuple[float, float], radius: float) -> tuple[F64, F64]:
+    """Miss of each pose, (n,) mm, and its axis, (n, 3), unit.
+
+    The miss is the difference between the farthest and the nearest distance of the axis from the wall.
+    """
     begin, end = axis_ends(wall, xi, shift, borders, radius)
     axis = end - begin
     places = begin[:, None] + HEIGHTS[:, None] * axis[:, None]

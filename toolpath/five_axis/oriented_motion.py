@@ -1,9 +1,11 @@
-"""Passes of a leaning tool as motions: what of them is free of stock, their feeds, their ways in and out.
+"""Passes of a tilted tool as motions: where they are free of stock, their feeds, their ways in and out.
 
-A pass is one step of work: the tool comes down along its own axis beside the beginning, goes to it, along the pass, off
-it, and up along its axis again; where it turns to the next one it is outside of everything. On and off a wall that its
-flank cuts it goes on an arc where there is room (``toolpath.linking.lead_arcs``). What it would meet of part, fixtures and stock is
-asked pose by pose.
+A pass is one step of work. The tool comes down along its own axis beside the beginning, moves to it, along the pass,
+off it, and up along its axis again. It turns to the next pass outside of everything. On and off a wall that its flank
+cuts it moves on an arc where there is room (``toolpath.linking.lead_arcs``). Each pose is checked against part,
+fixtures and stock.
+
+Arrays are float64. Tips are in mm, axes dimensionless unit vectors from tip to spindle, both in the access frame.
 """
 
 from __future__ import annotations
@@ -18,68 +20,76 @@ from scipy.ndimage import binary_dilation
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece, raised_poses, thinned_poses
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece, raised_poses, thinned_poses
 from toolpath.lines import dense, true_runs
 from toolpath.linking.lead_arcs import arc_onto, radii
-from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.poses import Blocked, places_along
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.stock.tool_shell import shells
 from toolpath.stock.wall_skin import Skins
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.assembly import Clearances, Disc
 
-TURN_S = 4.0  # what it takes to go outside of everything, turn there and come back
-LEAD = 0.5  # of the radius, off the surface, where the tool comes down and goes up; at most
-MOST_LEAD = 1.5  # mm
-THICK = 0.12  # of the diameter: what a leaning tool may take off at once
-LOOK = 0.25  # of the radius, between poses that are held against stock and part on the ways in and out
-LEAST_UP = 0.1  # of an axis, upwards: what lies flatter does not get above everything along itself
-LEAST_WAY = 1e-3  # mm, across the axis, that says where a pass comes from
-SQUARE = 0.7  # of a way off the wall, square to the pass: where it is less the pass does not go along the wall
+TURN_S = 4.0  # s to move outside of everything, turn there and come back
+LEAD = 0.5  # radii off the surface, at most, where the tool comes down and goes up
+MAX_LEAD = 1.5  # mm
+THICK = 0.12  # diameters: depth of stock that a tilted tool may take at once
+LOOK = 0.25  # radii between poses that are checked against stock and part on the ways in and out
+MIN_UP = 0.1  # upward part of an axis: a flatter tool does not get above everything along its axis
+MIN_WAY = 1e-3  # mm across the axis that give the direction of a pass
+SQUARE = 0.7  # part of the direction off the wall square to the pass: with less the pass does not follow the wall
 IN_FRONT = 0.5  # mm above the start of a cut where the approach slows down
 UP_Z = np.array([0.0, 0.0, 1.0])
-ROUND_END = 0.5  # of the corner, from the rim in: there its end is steeper than 30 degrees and cuts sideways
-STEEPER = 1e-6  # mm, of a step: no steeper than the ramp, for all that is known
-DIP = 0.5  # of the skin, what a pass may go down steeper than the ramp
-SKIMMED = 0.75  # of the skin, under what goes down steeper than that all the same: it adds up along a way
-LAYER, MOST_LAYERS = 0.9, 24  # of what its end may take, between layers of a pass on it; how many
-WIDENED = 1.5  # of the radius: what a layer of a pass is long, at least, where it goes on before and behind
+ROUND_END = 0.5  # of the corner, from the rim in: there the end is steeper than 30 degrees and cuts sideways
+STEEPER = 1e-6  # mm of a step: rounding of the ramp angle
+DIP = 0.5  # share of the skin that a pass may descend steeper than the ramp
+SKIMMED = 0.75  # share of the skin that may stand under a steeper descent: it adds up along a way
+LAYER, MAX_LAYERS = 0.9, 24  # layer height as a share of the depth that the end may take; number of layers
+WIDENED = 1.5  # radii: least length of a layer that is extended before and behind
 CELLS = 1.5  # lattice steps in from the flank, where nodes in the wall are no longer met
-LOADED = "there is more stock in its way than a leaning tool may take off"
-STEADY = 0.8  # feeds of neighbouring blocks go in steps of that
-LEAST_FEED = 0.1  # mm/min
-LEAST_PACE = 0.01  # of the feed: a tip that goes slower beside its flank all but stands
+LOADED = "more stock stands in the way than a tilted tool may remove at once"
+STEADY = 0.8  # ratio between feeds of neighbouring blocks
+MIN_FEED = 0.1  # mm/min
+MIN_PACE = 0.01  # share of the feed: a slower tip beside its flank almost stands
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What a leaning tool must not meet, access frame.
+    """Obstacles of a tilted tool, access frame.
 
-    enters  : whether it enters part or fixtures
-    turning : what the machine can do
-    stock   : StockMap as it stands; passes are taken off it, one after the other
+    enters  : whether the tool enters part or fixtures
+    turning : RotaryAxes of the machine
+    stock   : StockMap as it stands; passes lower it one after the other
     discs   : shank and holder with their clearance
     clear   : Clearances
-    skins   : what stands on the samples of the zone, taken off likewise; None where nobody measured it
+    skins   : thin material on the samples of the zone, lowered likewise; None where it is not measured
     """
 
     enters: Blocked
-    turning: Turning
+    turning: RotaryAxes
     stock: StockMap
     discs: tuple[Disc, ...]
     clear: Clearances
     skins: Skins | None = None
 
     def blocked(self, tips: F64, axes: F64, tool: ToolBody) -> NDArray[np.bool_]:
-        """(n,) bool: poses in which it meets part, fixtures or table, or that the machine cannot take."""
+        """Whether poses meet part, fixtures or table, or cannot be taken by the machine, (n,) bool.
+
+        tips, axes : (n, 3) float64, mm and unit, access frame
+        """
         low = lowest(tips, axes, tool, self.discs, self.turning.up)
-        lies = np.minimum(axes @ self.turning.up, axes[:, 2]) < LEAST_UP
+        lies = np.minimum(axes @ self.turning.up, axes[:, 2]) < MIN_UP
         return self.enters(tips, axes) | lies | ~self.turning.stands(axes) | (low < self.turning.table)
 
     def met(self, tips: F64, axes: F64, tool: ToolBody, thick: float, under: float | None = None) -> NDArray[np.bool_]:
-        """(n,) bool: poses at which stock is in neck, shank or holder, or thicker than ``thick`` mm at the flank or
-        ``under`` mm under the end, as ``loaded`` has it, or neck, shank or holder may be in a skin on a wall."""
+        """Whether stock stands in the tool at poses, (n,) bool, as ``loaded`` counts it, or neck, shank or holder may
+        be in a skin.
+
+        tips, axes : (n, 3) float64, mm and unit, access frame
+        thick      : mm, depth of stock that the flank may take
+        under      : mm, stock that may stand under the end; None as in ``loaded``
+        """
         out = loaded(self.stock, tips, axes, tool, self.discs, self.clear, thick, under)
         free = np.flatnonzero(~out)
         if self.skins is not None and len(free):
@@ -87,17 +97,20 @@ class Surroundings:
         return out
 
     def copied(self) -> Surroundings:
-        """The same with stock of its own."""
+        """A copy with its own stock."""
         return replace(self, stock=self.stock.copied(), skins=None if self.skins is None else self.skins.copied())
 
     def become(self, other: Surroundings) -> None:
-        """Take over the stock of a copy."""
+        """Takes over the stock of a copy."""
         self.stock.become(other.stock)
         if self.skins is not None and other.skins is not None:
             self.skins.become(other.skins)
 
     def cut(self, tips: F64, axes: F64, tool: ToolBody) -> None:
-        """Take a pass off stock and skins."""
+        """Removes a pass from stock and skins.
+
+        tips, axes : (n, 3) float64, mm and unit, access frame
+        """
         self.stock.cut_leaning(tips, axes, tool)
         if self.skins is not None:
             self.skins.cut_leaning(tips, axes, tool)
@@ -105,10 +118,10 @@ class Surroundings:
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What passes of a leaning tool would be.
+    """Passes of a tilted tool.
 
-    runs    : the trajectories of each pass, in the order they are walked
-    refused : why there are no others, in words
+    runs    : the trajectories of each pass, in the order of machining
+    refused : reasons for passes that are missing
     """
 
     runs: tuple[tuple[Trajectory, ...], ...]
@@ -117,11 +130,11 @@ class Runs:
 
 def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, settings: PlanSettings,
             around: Surroundings, divided: float = math.inf) -> Runs:
-    """Passes as far as they can be walked one after the other, each off the stock that those before it leave.
+    """Passes as far as they can be cut one after the other, each in the stock that the earlier ones leave.
 
     found   : name of the face and pass, for each
-    around  : Surroundings; its stock is taken off
-    divided : mm; what is longer and cannot be walked as a whole is walked in halves; such passes are layered already
+    around  : Surroundings; its stock is lowered
+    divided : mm; a longer pass that cannot be cut as a whole is cut in halves; such passes are layered already
     """
     runs: list[tuple[Trajectory, ...]] = []
     refused: list[str] = []
@@ -142,7 +155,7 @@ def in_turn(found: Sequence[tuple[str, Piece]], tool: ToolBody, cut: CutData, se
 
 def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings, around: Surroundings,
             divided: float) -> tuple[list[tuple[Trajectory, ...]], list[str]]:
-    """What of a pass is walked, taken off the stock, and why the rest is not, in words."""
+    """The parts of a pass that are cut, removed from the stock, and the reasons for the rest."""
     todo = free_parts(piece, tool, settings, around, skims=math.isfinite(divided))
     runs, refused = [], [] if todo else [LOADED]
     while todo:
@@ -157,15 +170,16 @@ def _walked(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings, 
             continue
         runs.append(made)
         for t in made:
-            if t.motion is Motion.CUT and t.axes is not None:
+            if t.motion is TrajectoryKind.CUT and t.axes is not None:
                 around.cut(t.points, t.axes, tool)
     return runs, refused
 
 
 def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64) -> F64:
-    """(n,) float64, mm: how low a tool reaches along ``up`` (3,), with shank and holder grown by their clearance.
+    """Lowest point of a tool along ``up``, with shank and holder grown by their clearance, (n,) float64, mm.
 
-    tips, axes : (n, 3) float64, mm and unit, leaning less than 90 degrees off ``up``
+    tips, axes : (n, 3) float64, mm and unit, access frame, tilted less than 90 degrees off ``up``
+    up         : (3,) float64, unit
     """
     rise = axes @ up
     lean = np.sqrt(np.maximum(1.0 - rise * rise, 0.0))
@@ -177,15 +191,18 @@ def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64)
 
 def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], clear: Clearances,
            thick: float, under: float | None = None) -> NDArray[np.bool_]:
-    """(n,) bool: poses at which stock stands in neck, shank or holder, or deeper in the cutting part than ``thick`` mm.
+    """Whether stock stands in neck, shank or holder at poses, or deeper in the cutting part than ``thick`` mm, (n,)
+    bool.
 
-    Under the end of the tool ``under`` mm may stand; where None, as much, and no more than the skin a way down takes.
+    tips, axes : (n, 3) float64, mm and unit, access frame
+    thick      : mm, depth of stock in the flank
+    under      : mm, stock under the end of the tool; None: as much as ``thick``, but no more than a skin
 
-    tips, axes : (n, 3) float64, mm and unit
-
-    Bodies are places on their shells (``toolpath.stock.tool_shell``); stock is what the nearest node shows, half a cell aside.
-    Less than 1.5 steps deep the cutting part is not asked: nodes in the wall are there. Where that is more than twice
-    ``thick`` the lattice is too coarse to tell, and every pose counts as loaded.
+    Notes
+    -----
+    Bodies are places on their shells (``toolpath.stock.tool_shell``). Stock is the height at the nearest node, half a
+    cell aside. Stock less than 1.5 steps deep in the cutting part does not count, since nodes in the wall lie there.
+    Where that is more than twice ``thick`` the lattice is too coarse, and every pose counts as loaded.
     """
     step = stock.lattice.step
     deep = max(thick, CELLS * step)
@@ -199,28 +216,29 @@ def loaded(stock: StockMap, tips: F64, axes: F64, tool: ToolBody, discs: Sequenc
 
 
 def lowered(piece: Piece, tool: ToolBody, around: Surroundings) -> list[Piece]:
-    """A pass on the end of a tool, preceded by itself raised, layer by layer from the highest down, where more stands
-    over it than the end takes off at once.
+    """A pass on the end of a tool, preceded by raised copies of itself where more stands over it than the end takes at
+    once.
 
-    Where not even ``MOST_LAYERS`` are enough it is left out of all of them, and of the pass itself by ``free_parts``.
-    What a pose is free of, part and fixtures, it stays free of when raised along its axis.
+    The highest layer comes first. Where ``MAX_LAYERS`` are not enough a place is left out of all of them, and
+    ``free_parts`` leaves it out of the pass itself. A pose that is free of part and fixtures stays free when raised
+    along its axis.
     """
     return [layer for _, layer in layers_over(piece, tool, around)]
 
 
 def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
                 share: float = LAYER, widened: bool = False) -> list[tuple[int, Piece]]:
-    """The same with how many layers each is raised by, 0 for the pass itself, which is last.
+    """The layers of ``lowered`` with the number of layers each is raised by; 0 for the pass itself, which is last.
 
-    share   : of what its end may take, a layer
-    widened : a layer that would be too short to be walked goes on before and behind; else it is left out. No more is
-              left under the pass than lets it go downhill (``free_parts``)
+    share   : layer height as a share of the depth that the end may take
+    widened : a layer too short to be cut is extended before and behind; else it is left out. The layers then leave so
+              little under the pass that it may go downhill (``free_parts``)
     """
     thick, under = THICK * tool.diameter, SKIMMED * SKIN * tool.diameter if widened else None
     layer = share * max(min(thick, SKIN * tool.diameter), CELLS * around.stock.lattice.step)
     dense = piece.at(places_along(piece.tips, piece.axes, piece.reach, LOOK * tool.radius))
     need, todo = np.zeros(len(dense.tips), np.int64), np.arange(len(dense.tips))
-    for k in range(MOST_LAYERS + 1):
+    for k in range(MAX_LAYERS + 1):
         there = dense.raised(k * layer)
         todo = todo[around.met(there.tips[todo], there.axes[todo], tool, thick, under)]
         need[todo] = k + 1
@@ -237,22 +255,23 @@ def layers_over(piece: Piece, tool: ToolBody, around: Surroundings,
         more = max(WIDENED * tool.radius - (high - low), 0.0) if widened else 0.0
         # to begin again in the middle of it costs more than to go on
         through = free & (gone >= low - more) & (gone <= high + more)
-        out += [(k, part.raised(k * layer)) for part in dense.parts(through, at, LEAST_PIECE * tool.radius)]
+        out += [(k, part.raised(k * layer)) for part in dense.parts(through, at, MIN_PIECE * tool.radius)]
     return [*out, (0, piece)]
 
 
 def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surroundings,
                skims: bool = False) -> list[Piece]:
-    """What of a pass has no more stock beside it than the flank may take off, and none in neck, shank and holder.
+    """The parts of a pass with no more stock beside the tool than its flank may take, and none in neck, shank and
+    holder.
 
-    Over what stands on the floor a flank is raised along its axis. Where it goes down steeper than the ramp, as behind
-    what it was raised over, it would dig with the end of the tool: that part is walked the other way, uphill; of a pass
-    on the end it is left out.
+    Over obstacles on the floor a flank is raised along its axis. Where it goes down steeper than the ramp, as behind an
+    obstacle, the end of the tool would dig. A flank cuts that part in the other direction, uphill; a pass on the end
+    leaves it out.
 
-    skims : a pass on the end goes downhill where no more than most of a skin is under it, as an upright one does: axes
-            that turn less than the surface go down on one side of each wave of it
+    skims : a pass on the end may go downhill over no more than most of a skin, as an upright one does: axes that turn
+            less than the surface go down on one side of each wave of it
     """
-    thick, least = THICK * tool.diameter, LEAST_PIECE * tool.radius
+    thick, least = THICK * tool.diameter, MIN_PIECE * tool.radius
 
     def loaded_at(tips: F64, axes: F64) -> NDArray[np.bool_]:
         return around.met(tips, axes, tool, thick) | settings.found.bars(tool, tips)
@@ -277,17 +296,18 @@ def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Sur
             for p in parts if p is not None]
 
 
-def _begun_level(piece: Piece, slope: float, least: float) -> Piece | None:
-    """A part without what of either end goes down along the axis steeper than ``slope``; None if under ``least`` mm.
+def _begun_level(piece: Piece, slope: float, min_length: float) -> Piece | None:
+    """A part without its ends that go down along the axis steeper than ``slope``; None if shorter than ``min_length``
+    mm.
 
-    There is fresh stock at an end: over the brink of a valley the tool would dig into it however short the way is.
+    Fresh stock stands at an end: over the brink of a valley the tool would dig into it, however short the descent.
     """
     steep = _steps_down(piece, slope)[1]
     level = np.flatnonzero(~steep)
     if not len(level):
         return None
     kept = piece.at(np.arange(level[0], level[-1] + 2, dtype=np.float64))
-    return kept if kept.length >= least else None
+    return kept if kept.length >= min_length else None
 
 
 def _steps_down(piece: Piece, slope: float) -> tuple[F64, NDArray[np.bool_]]:
@@ -297,26 +317,27 @@ def _steps_down(piece: Piece, slope: float) -> tuple[F64, NDArray[np.bool_]]:
     return down, down > slope * np.linalg.norm(way + down[:, None] * axis, axis=1) + STEEPER
 
 
-def _descends(piece: Piece, slope: float, most: float) -> NDArray[np.bool_]:
-    """(n,) bool: poses on a way down along the axis that is steeper than ``slope`` and takes more than ``most`` mm."""
+def _descends(piece: Piece, slope: float, allowed: float) -> NDArray[np.bool_]:
+    """Whether poses lie on a descent along the axis steeper than ``slope`` that removes more than ``allowed`` mm, (n,)
+    bool."""
     down, steep = _steps_down(piece, slope)
     out = np.zeros(len(piece.tips), np.bool_)
     for i, j in true_runs(steep):
-        out[i:j + 1] |= down[i:j].sum() > most
+        out[i:j + 1] |= down[i:j].sum() > allowed
     return out
 
 
 def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
               around: Surroundings) -> tuple[Trajectory, ...] | str:
-    """A pass with its ways in and out, or why there is none, in words."""
+    """A pass with its ways in and out, or the reason why there is none."""
     thick, chord = THICK * tool.diameter, 0.25 * settings.chordal_tolerance
     walked = around.turning.along(piece.tips, piece.axes)
     if walked is None:
-        return "the rotary axes do not get along it"
+        return "the rotary axes cannot follow the pass"
     tips, axes, least = walked
     feeds = paced(tips, axes, piece.reach, cut.feed, least)
     if feeds is None:
-        return "the tip would all but stand while the flank goes round it, or an axis turns"
+        return "the tip would almost stand still while the flank or a rotary axis turns"
     dense = Piece(tips, axes, axes, piece.reach).at(places_along(tips, axes, piece.reach, LOOK * tool.radius))
     if around.met(dense.tips, dense.axes, tool, thick).any():
         return LOADED
@@ -325,46 +346,47 @@ def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings
     ways = [_way_in(piece, tool, settings, around, _leads(piece, tool, thick, chord)),
             _way_in(back, tool, settings, around, straight_up if piece.on_end else _leads(back, tool, thick, chord))]
     if ways[0] is None or ways[1] is None:
-        return "the tool does not get there along its own axis"
+        return "the tool cannot reach the pass along its own axis"
     (top, first, near), (out_top, last, off) = ways[0], ways[1]
     last = last[::-1]
     out: list[Trajectory] = []
 
-    def go(motion: Motion, points: F64, feed: float, axis: F64) -> None:
+    def go(motion: TrajectoryKind, points: F64, feed: float, axis: F64) -> None:
         if float(np.linalg.norm(points[-1] - points[0])) > 1e-6:
             out.append(Trajectory(motion, np.ascontiguousarray(points), feed, np.tile(axis, (len(points), 1))))
 
     a, b = axes[0], axes[-1]
-    go(Motion.APPROACH, np.array([top, first[0] + near * a]), cut.link_feed, a)
-    go(Motion.APPROACH, np.array([first[0] + near * a, first[0]]), cut.plunge_feed, a)
-    go(Motion.CONNECT, first, cut.feed, a)
+    go(TrajectoryKind.APPROACH, np.array([top, first[0] + near * a]), cut.link_feed, a)
+    go(TrajectoryKind.APPROACH, np.array([first[0] + near * a, first[0]]), cut.plunge_feed, a)
+    go(TrajectoryKind.CONNECT, first, cut.feed, a)
     for i, j in _steady(feeds):
-        out.append(Trajectory(Motion.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
-    go(Motion.CONNECT, last, cut.feed, b)
-    go(Motion.LIFT, np.array([last[-1], last[-1] + off * b]), cut.feed, b)
-    go(Motion.LIFT, np.array([last[-1] + off * b, out_top]), cut.link_feed, b)
+        out.append(Trajectory(TrajectoryKind.CUT, tips[i:j + 1], float(feeds[i:j].min()), axes[i:j + 1]))
+    go(TrajectoryKind.CONNECT, last, cut.feed, b)
+    go(TrajectoryKind.LIFT, np.array([last[-1], last[-1] + off * b]), cut.feed, b)
+    go(TrajectoryKind.LIFT, np.array([last[-1] + off * b, out_top]), cut.link_feed, b)
     return tuple(out)
 
 
-def paced(tips: F64, axes: F64, reach: float, feed: float, least: F64) -> F64 | None:
-    """(n - 1,) mm/min of the tip, so that no place of the flank goes faster than ``feed`` and the machine keeps up.
+def paced(tips: F64, axes: F64, reach: float, feed: float, min_minutes: F64) -> F64 | None:
+    """Feeds of the tip, (n - 1,) float64, mm/min: no place of the flank exceeds ``feed``, and the machine keeps up.
 
-    tips, axes : (n, 3) float64, mm and unit
-    reach      : mm from the tip, how far up the flank is at work
-    least      : (n - 1,) minutes each block takes the machine
+    tips, axes  : (n, 3) float64, mm and unit, access frame
+    reach       : mm from the tip, how far up the flank cuts
+    min_minutes : (n - 1,) float64, min, shortest time of each block on the machine
 
-    None where the tip would go slower than ``LEAST_PACE`` of the feed for the flank's sake, or in a block slower than
-    ``LEAST_FEED``: a tip that all but stands says nothing of how long an axis takes to turn. On a straight move of the
-    tip with an evenly turning axis no place between tip and ``reach`` goes farther than the farther of both ends.
+    Returns None where the tip would be slower than ``MIN_PACE`` of the feed for the sake of the flank, or slower than
+    ``MIN_FEED`` in a block: an almost standing tip does not define how long an axis takes to turn. On a straight move
+    of the tip with an evenly turning axis no place between tip and ``reach`` moves farther than the farther of both
+    ends.
     """
     gone = [np.linalg.norm(np.diff(tips + h * axes, axis=0), axis=1) for h in (0.0, reach)]
     minutes = np.maximum(gone[0], gone[1]) / feed
-    if gone[0].sum() < LEAST_PACE * feed * minutes.sum():
+    if gone[0].sum() < MIN_PACE * feed * minutes.sum():
         return None
-    minutes = np.maximum(minutes, least)
-    if (gone[0] < LEAST_FEED * minutes).any():
+    minutes = np.maximum(minutes, min_minutes)
+    if (gone[0] < MIN_FEED * minutes).any():
         return None
-    return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), LEAST_FEED)
+    return np.maximum(np.minimum(gone[0] / np.maximum(minutes, 1e-12), feed), MIN_FEED)
 
 
 def _steady(feeds: F64) -> list[tuple[int, int]]:
@@ -384,9 +406,9 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
     """A place (3,) above everything and a way (k, 3) from under it to the beginning of a piece, mm; None where none is
     free.
 
-    With it mm above the beginning of that way, down to where nothing stands near the tool. Beside the beginning where
-    there is room for that; else straight down: along a wall where the end of the tool is round enough not to dig up
-    what stands there, and on its end where there is no more than a skin under it.
+    The third value is the height, mm, above the beginning of that way down to which nothing stands near the tool. The
+    tool comes down beside the beginning where there is room. Else it comes straight down: along a wall where its end is
+    round enough not to dig, and on its end where there is no more than a skin under it.
     """
     axis, thick = piece.axes[0], THICK * tool.diameter
     for way, stock, under in leads:
@@ -396,7 +418,7 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
         if high <= 0.0:
             return None
         down = beside + np.linspace(high, 0.0, int(np.ceil(high / (LOOK * tool.radius))) + 5)[:, None] * axis
-        over = dense(way, min(LOOK * tool.radius, MOST_LEAD / 4.0))
+        over = dense(way, min(LOOK * tool.radius, MAX_LEAD / 4.0))
         axes = np.tile(axis, (max(len(down), len(over)), 1))
         if (around.blocked(down, axes[:len(down)], tool).any() or around.blocked(over, axes[:len(over)], tool).any()
                 or len(way) > 2 and (around.met(over, axes[:len(over)], tool, thick)
@@ -409,9 +431,9 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
 
 
 def _near(down: F64, axes: F64, tool: ToolBody, around: Surroundings) -> float:
-    """mm above the end of a way down, from where on something may stand in the cells at the rim of the tool.
+    """Height above the end of a way down, mm, from where on something may stand in the cells at the rim of the tool.
 
-    down, axes : (n, 3) float64, mm and unit, the last at the bottom
+    down, axes : (n, 3) float64, mm and unit, access frame, the last at the bottom
     """
     wide = 2.0 * CELLS * around.stock.lattice.step
     grown = replace(tool, diameter=tool.diameter + 2.0 * wide, corner_radius=tool.corner_radius + wide)
@@ -422,7 +444,7 @@ def _near(down: F64, axes: F64, tool: ToolBody, around: Surroundings) -> float:
 
 def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lead]:
     """Where the tool may come down at the beginning of a piece, the best first."""
-    room, skin, axis, tip = min(LEAD * tool.radius, MOST_LEAD), SKIN * tool.diameter, piece.axes[0], piece.tips[0]
+    room, skin, axis, tip = min(LEAD * tool.radius, MAX_LEAD), SKIN * tool.diameter, piece.axes[0], piece.tips[0]
 
     def straight(aside: F64) -> F64:
         return np.array([tip + aside, tip])
@@ -442,7 +464,7 @@ def _ahead(piece: Piece) -> F64 | None:
     axis, way = piece.axes[0], piece.tips[1:] - piece.tips[0]
     way = way - (way @ axis)[:, None] * axis
     size = np.linalg.norm(way, axis=1)
-    far = np.flatnonzero(size > LEAST_WAY)
+    far = np.flatnonzero(size > MIN_WAY)
     return way[far[0]] / size[far[0]] if len(far) else None
 
 
@@ -459,4 +481,4 @@ def _arcs_onto(piece: Piece, tool: ToolBody, aside: F64, chord: float) -> list[F
         return []
     length = float(np.linalg.norm(np.diff(piece.tips, axis=0), axis=1).sum())
     off /= np.linalg.norm(off)
-    return [arc_onto(piece.tips[0], ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MOST_LEAD]
+    return [arc_onto(piece.tips[0], ahead, off, r, chord) for r in radii(tool.diameter, length) if r <= MAX_LEAD]

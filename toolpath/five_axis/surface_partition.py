@@ -1,18 +1,18 @@
-"""A surface cut into pieces that a matched end goes over faster one by one (papers/001, section 5, mended).
+"""A surface split into pieces that a matched end covers faster one by one [Li1995].
 
-Passes are lines of one eta, and as far apart as their narrowest place allows: a place where the end cuts little costs
-the whole pass. So a surface is parted where that place is confined to a part, or where the best way of the feed turns:
-each piece is fed along one side of its own, with passes of its own.
+Passes are lines of one eta, and their narrowest place sets their distance. So one place where the end cuts little costs
+the whole pass. A surface is split where that place lies in one part, or where the best feed direction turns. Each piece
+is fed along one of its sides, with passes of its own.
 
 Notation
-    width  : of the strip, mm, by closed form: ``strip_width`` at the least tilt that is clear
-    reach  : (fine, fine) width / (mm by 1 of eta, square to the feed): how far in eta one pass serves at a place
-    passes : integral of 1 / (least reach along the line) over eta, and a half that the last one cuts beyond the border
+    width  : of the strip, mm, in closed form: ``strip_width`` at the least clear tilt
+    reach  : (fine, fine) width / (mm per 1 of eta, square to the feed): how far in eta one pass serves at a place
+    passes : integral of 1 / (least reach along the line) over eta, and a half that the last pass cuts beyond the border
 
-A piece costs the length of its lines, and at every line the way out over its end and the way round to the next.
-Over a lattice of the unit square all pieces are priced, either way fed, and of all ways to part it by straight cuts
-from side to side the cheapest is taken, none of which gains less than LEAST_GAIN of what it cuts. How near that comes
-to the passes that are laid: docs/theory/matching.md.
+A piece costs the length of its lines, and for each line the run-out over its end and the way round to the next. All
+pieces over a lattice of the unit square are priced in both feed directions. Of all splits by straight cuts from side
+to side the cheapest wins; each cut must gain at least MIN_GAIN. docs/theory/matching.md shows how near that comes to
+the real passes. Arrays are float64; xi and eta are parameters of the unit square, dimensionless.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ import numpy as np
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.five_axis.curvature_matching import clear_tilt, mean_direction, strip_width
-from toolpath.five_axis.matched_passes import MOST_RUN_OUT, TURNS, Wanted, longest_lag
+from toolpath.five_axis.matched_passes import MAX_RUN_OUT, TURNS, MatchTolerances, longest_lag
 from toolpath.kernels.parted import price_rows
 from toolpath.passes.isoparametric_passes import IsoSurface
 
 CELLS = 16  # each way, between which cuts lie
 FINE = 4  # places a cell, each way, at which strips are looked at
-LEAST_GAIN = 0.05  # of the way of what is cut: less is not told apart from the error of the closed form
+MIN_GAIN = 0.05  # share of the way that a cut must gain: less lies within the error of the closed form
 LAST = 0.5  # of a pass, which the last one of a piece cuts beyond its border
 
 Rectangle = tuple[int, int, int, int]
@@ -43,10 +43,10 @@ Priced = tuple[float, tuple[tuple[bool, Rectangle], ...]]
 
 @dataclass(frozen=True, eq=False)
 class Feed:
-    """What feeding one way does, at places in the middle of the lattice, rows along eta.
+    """One feed direction at places of the lattice, rows along eta.
 
-    reach  : (m, m) float64, of the unit square, that one pass serves square to itself
-    length : (m, m) float64, mm by 1 of the unit square, along the feed
+    reach  : (m, m) float64, share of the unit square that one pass serves square to itself
+    length : (m, m) float64, mm per 1 of the unit square, along the feed
     """
 
     reach: F64
@@ -54,14 +54,14 @@ class Feed:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """A piece of a surface and how it is fed.
+class SurfacePiece:
+    """A piece of a surface with its feed direction.
 
     iso       : the piece over the unit square, passes along xi
     low, high : (2,) float64, its corners, xi and eta of the surface it was cut from
-    passes    : float, foreseen, a half beyond the border counted
-    way       : float, mm, foreseen: lines, ways out over their ends, and round
-    spread    : float, unitless, 0 where the best feed is the same all over the piece, 1 where it cancels
+    passes    : float, count, expected passes, with a half beyond the border
+    way       : float, mm, expected way: lines, run-outs over their ends, and the way round
+    spread    : float, dimensionless, 0 where the best feed is the same all over the piece, 1 where it cancels
     """
 
     iso: IsoSurface
@@ -72,20 +72,20 @@ class Part:
     spread: float
 
 
-def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float | None = None,
-           cut: bool = True) -> list[Part]:
-    """The pieces of a surface, each fed the way that is shorter for it; one where parting does not pay.
+def parted(iso: IsoSurface, tool: ToolBody, wanted: MatchTolerances, *, round_way: float | None = None,
+           cut: bool = True) -> list[SurfacePiece]:
+    """The pieces of a surface, each fed in its shorter direction; one piece where a split does not pay.
 
     tool      : ToolBody, a flat or a bull nose
-    wanted    : its scallop, mm, and least tilt, rad, make the strips
-    round_way : mm of feed that going from the end of a pass to the next one is worth; the diameter when None
-    cut       : False for the whole surface in one, fed the better way
+    wanted    : MatchTolerances; scallop and least tilt define the strips
+    round_way : mm of feed that the way from the end of a pass to the next one is worth; None: the diameter
+    cut       : False for the whole surface in one piece, fed in the better direction
 
     Raises
     ------
     GeometryError
-        As ``IsoSurface.across``. A place where the end does not fit has no reach, and every piece with it no price:
-        passes over it are for ``Matched`` to refuse.
+        As ``IsoSurface.across``. A place where the end does not fit has no reach, and pieces with it have no price:
+        ``MatchedPasses`` refuses passes over it.
     """
     feeds = (feed_of(iso, tool, wanted), feed_of(turned(iso), tool, wanted))
     feeds = (feeds[0], Feed(feeds[1].reach.T, feeds[1].length.T))
@@ -98,31 +98,31 @@ def parted(iso: IsoSurface, tool: ToolBody, wanted: Wanted, *, round_way: float 
         passes, way = price(feeds, across, (a, b, c, d), ends, lag)
         inside = (slice(c * FINE, d * FINE), slice(a * FINE, b * FINE))
         piece = replace(iso, grid=iso.grid.part(*((low[::-1], high[::-1]) if iso.turned else (low, high))))
-        out.append(Part(turned(piece) if across else piece, low, high, passes, way,
+        out.append(SurfacePiece(turned(piece) if across else piece, low, high, passes, way,
                         mean_direction(angle[inside], weight[inside])[1]))
     return out
 
 
 def turned(iso: IsoSurface) -> IsoSurface:
-    """The same surface fed along the lines that were across."""
+    """The same surface with the feed across its former lines."""
     return replace(iso, turned=not iso.turned)
 
 
 def middles() -> tuple[F64, F64]:
-    """Xi and eta, both (p,) float64 from 0 to 1, of the places that are looked at, row by row of eta."""
+    """Xi and eta of the places looked at, both (p,) float64, dimensionless, from 0 to 1, row by row of eta."""
     at = (np.arange(CELLS * FINE) + 0.5) / (CELLS * FINE)
     xi, eta = np.meshgrid(at, at)
     return xi.ravel(), eta.ravel()
 
 
-def feed_of(iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Feed:
-    """What feeding a surface along its xi does, by closed form.
+def feed_of(iso: IsoSurface, tool: ToolBody, wanted: MatchTolerances) -> Feed:
+    """Reach and length of a surface fed along its xi, in closed form.
 
     Notes
     -----
-    The tangent of the nose lies along the greatest curvature where that is within what the tool turns, and the strip
-    is then cos(turn) as wide square to the feed; beyond, it lies so near to it as the turn lets it, and the curvatures
-    are those along and square to it (Euler). What the surface twists under it is left out.
+    The tangent of the nose lies along the greatest curvature where the allowed turn reaches it; the strip is then
+    cos(turn) as wide square to the feed. Beyond, it lies as near as the turn allows, and the curvatures along and
+    square to it follow from Euler's theorem [DoCarmo1976]. The twist of the surface under the nose is left out.
     """
     xi, eta = middles()
     uv = iso.parameters(xi, eta)
@@ -144,12 +144,14 @@ def feed_of(iso: IsoSurface, tool: ToolBody, wanted: Wanted) -> Feed:
 
 
 def best_feeds(iso: IsoSurface) -> tuple[F64, F64]:
-    """How the least curvature, along which the end is fed best, lies to the lines of a surface, and what that counts.
+    """Angle of the least curvature, which is the best feed direction, to the lines of a surface, and its weight
+    [DoCarmo1976].
 
     Returns
     -------
-    angle  : (m, m) float64, rad from the way along xi, on the surface
-    weight : (m, m) float64, area by what both curvatures differ: a place curved alike all round has no best feed
+    angle  : (m, m) float64, rad from the direction along xi, on the surface
+    weight : (m, m) float64, mm: area times the difference of both curvatures; a place curved alike all round has no
+             best feed
     """
     xi, eta = middles()
     along, over = iso.tangents(xi, eta)
@@ -171,29 +173,31 @@ def best_feeds(iso: IsoSurface) -> tuple[F64, F64]:
 
 
 def price(feeds: tuple[Feed, Feed], across: bool, piece: Rectangle, ends: float, lag: float) -> tuple[float, float]:
-    """Passes and way (mm) that a piece takes fed along its columns' xi, or along eta where ``across``.
+    """Passes and way, mm, of a piece fed along xi, or along eta where ``across``.
 
     feeds : along xi and along eta, both with rows along eta
     piece : in cells
-    ends  : mm, that each pass costs besides its line;  lag : mm, by which it goes on over its end
+    ends  : mm, cost of each pass besides its line
+    lag   : mm, by which a pass runs over its end
 
-    Infinite where a line is so short that passes could not go on as far (``matched.MOST_RUN_OUT``), or has no reach.
+    Infinite where a line is too short for the run-out (``MAX_RUN_OUT``), or has no reach.
     """
     a, b, c, d = (FINE * n for n in piece)
     reach, length = feeds[across].reach, feeds[across].length
     if across:
         reach, length, (a, b, c, d) = reach.T, length.T, (c, d, a, b)
     passes, way, mean, shortest = price_rows(reach, length, a, b, c, d, lag)
-    if (b - a < CELLS * FINE and lag > MOST_RUN_OUT * shortest) or not math.isfinite(passes):
+    if (b - a < CELLS * FINE and lag > MAX_RUN_OUT * shortest) or not math.isfinite(passes):
         return np.inf, np.inf
     return passes + LAST, way + passes * ends + LAST * (mean + ends)
 
 
 def cheapest(feeds: tuple[Feed, Feed], ends: float, lag: float, cut: bool = True) -> list[tuple[bool, Rectangle]]:
-    """How the square is best parted by cuts from side to side: whether across, and in which cells, each piece.
+    """The cheapest split of the square by cuts from side to side: for each piece whether it is fed across, and its
+    cells.
 
     feeds, ends, lag : as for ``price``
-    cut              : False where it is to stay whole
+    cut              : False where the square stays whole
     """
     @cache
     def best(a: int, b: int, c: int, d: int) -> Priced:
@@ -203,7 +207,7 @@ def cheapest(feeds: tuple[Feed, Feed], ends: float, lag: float, cut: bool = True
         cuts += [((a, b, c, m), (a, b, m, d)) for m in range(c + 1, d) if cut]
         for one, two in cuts:
             (x, p), (y, q) = best(*one), best(*two)
-            if x + y < min((1.0 - LEAST_GAIN) * cost, kept[0]):
+            if x + y < min((1.0 - MIN_GAIN) * cost, kept[0]):
                 kept = x + y, p + q
         return kept
 

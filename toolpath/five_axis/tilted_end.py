@@ -1,14 +1,16 @@
-"""A flat or bull-nose end on a surface: how far its nose stands over it, how far it must tilt, how wide it cuts.
+"""A flat or bull-nose end on a surface: how high its nose stands over it, its least tilt, and the width it cuts.
 
 Notation (with that of ``toolpath.five_axis.curvature_matching``)
-    t, s     : way of the feed and the way to its left, n x t, both on the surface
+    t, s     : direction of the feed and the direction to its left, n x t, both on the surface
     l        : tangent of the nose circle, cos(turn) s + sin(turn) t;  f = sin(turn) s - cos(turn) t
-    axis     : cos(eta) n - sin(eta) f: leaned forward by eta, and aside where ``turn`` is not 0
+    axis     : cos(eta) n - sin(eta) f: tilted forward by eta, and aside where ``turn`` is not 0
     t, angle : place on the nose circle, 0 at the contact, half a turn at the heel
 
-Every place of the nose draws a trace of its own, and what a sharp end sweeps is the set of these, so how high the
-nose stands over the surface at one instant says what stays beside the pass. Of a bull nose the circle of corner centres
-is looked at, over the surface offset by r. Nothing here is second order: heights are those over the true surface.
+Every place of the nose draws a trace of its own, and a sharp end sweeps the set of these traces. So the height of the
+nose over the surface at one instant gives the residual beside the pass. For a bull nose that is the circle of corner
+centres over the surface offset by r. Nothing here is second order: heights are those over the true surface.
+
+Arrays are float64. Places are in mm, directions and axes dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -24,19 +26,22 @@ from geometry.tool_body import ToolBody
 from toolpath.five_axis.curvature_matching import clear_tilt, nose_radii
 
 ANGLES = 65  # places on each half of the nose
-TRIED = 33  # the same, when a tilt is looked for: between two of them it may be a third deeper than at them
-BISECTIONS = 10  # of a tilt: to a 1000th of what it may be
+TRIED = 33  # the same in the search for a tilt: between two of them the nose may be a third deeper than at them
+BISECTIONS = 10  # of a tilt: to a 1000th of its range
 TOUCH = 1e-7  # mm: rounding of a place that touches
-ROOM = np.radians(3.0)  # a tilt is looked for up to so much beyond what is clear on a quadric
-MOST_ROOM = np.radians(40.0)
+ROOM = np.radians(3.0)  # the search for a tilt ends so far beyond the clear tilt of a quadric
+MAX_ROOM = np.radians(40.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class PassContacts:
     """Contacts of a pass.
 
-    uv     : (m, 2) parameters on the surface
-    point, normal, way, left : (m, 3) float64, mm and unit: contact, n, t and s
+    uv     : (m, 2) float64, parameters of the surface
+    point  : (m, 3) float64, mm, access frame
+    normal : (m, 3) float64, unit, n
+    way    : (m, 3) float64, unit, t
+    left   : (m, 3) float64, unit, s
     """
 
     uv: F64
@@ -45,13 +50,17 @@ class Contacts:
     way: F64
     left: F64
 
-    def every(self, step: int) -> Contacts:
-        """Each so manieth of them."""
-        return Contacts(*(a[::step] for a in (self.uv, self.point, self.normal, self.way, self.left)))
+    def every(self, step: int) -> PassContacts:
+        """Every ``step``-th of them."""
+        return PassContacts(*(a[::step] for a in (self.uv, self.point, self.normal, self.way, self.left)))
 
     @classmethod
-    def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> Contacts:
-        """Contacts at parameters (m, 2), fed along (m, 2), parameters by anything."""
+    def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> PassContacts:
+        """Contacts at parameters of a surface.
+
+        uv    : (m, 2) float64, parameters of the surface
+        along : (m, 2) float64, direction of the feed in the parameters, of any length
+        """
         d, normal = surface.derivatives(uv), surface.normals(uv)
         way = d.u * along[:, :1] + d.v * along[:, 1:]
         way = way / np.linalg.norm(way, axis=1)[:, None]
@@ -63,21 +72,29 @@ class Nose:
     """The nose of a tool over a surface.
 
     tool   : ToolBody, a flat or a bull nose
-    domain : (2, 2) least and greatest parameters; what stands under the nose beyond is for others to say
+    domain : (2, 2) float64, least and greatest parameters; what stands under the nose beyond them does not count
     """
 
     surface: NurbsSurface
     tool: ToolBody
     domain: F64
 
-    def axes(self, at: Contacts, tilt: F64, turn: F64) -> F64:
-        """Tool axes (m, 3), unit, for tilts and turns (m,) rad."""
+    def axes(self, at: PassContacts, tilt: F64, turn: F64) -> F64:
+        """Tool axes, (m, 3) float64, unit, access frame.
+
+        tilt, turn : (m,) float64, rad
+        """
         behind = np.sin(turn)[:, None] * at.left - np.cos(turn)[:, None] * at.way
         return np.asarray(np.cos(tilt)[:, None] * at.normal - np.sin(tilt)[:, None] * behind)
 
-    def heights(self, at: Contacts, tilt: F64, turn: F64, angles: int = ANGLES) -> tuple[F64, F64]:
-        """How high the nose stands, (2, m, angles) mm, on the left half and on the right one from the contact to the
-        heel, and the parameters of the feet, (2, m, angles, 2)."""
+    def heights(self, at: PassContacts, tilt: F64, turn: F64, angles: int = ANGLES) -> tuple[F64, F64]:
+        """Height of the nose over the surface, (2, m, angles) float64, mm, and its foot points, (2, m, angles, 2),
+        parameters.
+
+        The first index is the left and the right half, the last one runs from the contact to the heel.
+
+        tilt, turn : (m,) float64, rad
+        """
         big, r = nose_radii(self.tool)
         side, ahead = np.cos(turn)[:, None], np.sin(turn)[:, None]
         tangent, behind = side * at.left + ahead * at.way, ahead * at.left - side * at.way
@@ -90,15 +107,20 @@ class Nose:
         shape = (2, len(at.uv), angles)
         return high.reshape(shape) - r, feet.reshape(*shape, 2)
 
-    def least_tilt(self, at: Contacts, turn: F64, depth: float, least: float) -> F64:
-        """The least tilts (m,), rad, from ``least`` on, with no place of the nose deeper than ``depth`` mm in the
-        surface within the domain; nan where none is small enough."""
+    def least_tilt(self, at: PassContacts, turn: F64, depth: float, min_tilt: float) -> F64:
+        """Least tilts at which no place of the nose is deeper than ``depth`` mm in the surface, (m,) float64, rad.
+
+        turn     : (m,) float64, rad
+        min_tilt : rad, where the search begins
+
+        nan where no tilt is small enough. Only foot points within the domain count.
+        """
         k_1 = np.maximum(-self.surface.curvature(np.clip(at.uv, *self.surface.domain))[:, 0], 0.0)
-        clear = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MOST_ROOM), least)
-        low, high = np.full(len(at.uv), least), clear + ROOM
+        clear = np.maximum(np.nan_to_num(clear_tilt(k_1, self.tool), nan=np.pi / 2 - MAX_ROOM), min_tilt)
+        low, high = np.full(len(at.uv), min_tilt), clear + ROOM
         bad = self._enters(at, high, turn, depth)
         if bad.any():
-            high = np.where(bad, clear + MOST_ROOM, high)
+            high = np.where(bad, clear + MAX_ROOM, high)
             bad = self._enters(at, high, turn, depth)
         high = np.where(self._enters(at, low, turn, depth), high, low)
         for _ in range(BISECTIONS):
@@ -107,18 +129,20 @@ class Nose:
             low, high = np.where(enters, middle, low), np.where(enters, high, middle)
         return np.where(bad, np.nan, high)
 
-    def _enters(self, at: Contacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
+    def _enters(self, at: PassContacts, tilt: F64, turn: F64, depth: float) -> NDArray[np.bool_]:
         high, feet = self.heights(at, tilt, turn, TRIED)
         known = ((feet >= self.domain[0]) & (feet <= self.domain[1])).all(axis=3) | ~np.isfinite(high)
         return np.asarray((known & ~(high >= -depth - TOUCH)).any(axis=(0, 2)))
 
 
 def strip_edges(high: F64, feet: F64, height: float) -> F64:
-    """Where the nose begins to stand higher than ``height`` mm, going from the contact: feet (2, m, 2) of both halves.
+    """Places where the nose begins to stand higher than a height, going from the contact, (2, m, 2) float64,
+    parameters.
 
-    Where it does not on its front half: where it is widest.
+    Where it does not on its front half, the place where it is widest.
 
-    high, feet : as ``Nose.heights`` gives them
+    high, feet : (2, m, angles) and (2, m, angles, 2) float64, mm and parameters, as ``Nose.heights`` gives them
+    height     : mm
     """
     high, feet = high[:, :, :high.shape[2] // 2 + 1], feet[:, :, :high.shape[2] // 2 + 1]  # widest a quarter round
     over = high > height

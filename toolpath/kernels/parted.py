@@ -1,4 +1,4 @@
-"""What a rectangle of a surface costs, fed along its rows (``toolpath.five_axis.surface_partition``, whose words these are)."""
+"""Price of a rectangle of a surface fed along its rows; notation of ``toolpath.five_axis.surface_partition``."""
 
 from __future__ import annotations
 

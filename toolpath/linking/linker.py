@@ -1,18 +1,22 @@
-"""Passes joined to one safe motion: how the tool comes in, gets across and gets out.
+"""Links passes to one safe motion: ways in, ways between passes, ways out.
 
-Stock that stands higher over a pass than the flutes reach is first walked off above it, and in a gap that the tool only
-just fits layer by layer. Then, in this order of trying
-1. From the end of a pass straight on to the next one, where the level move between them is free and takes no
-   more stock than a layer; down to a deeper level in air, there or beside its start, or along the pass itself, never
+Stock that stands higher over a pass than the flutes reach is removed first, above the pass. In a gap that only just
+fits the tool, it is removed layer by layer. Then the linker tries these ways in, in this order.
+
+1. From the end of a pass straight on to the next one, where the level move between them is free and removes no more
+   than a layer. Down to a deeper level the tool goes in air, there or beside its start, or along the pass itself, never
    steeper than the ramp angle.
-2. Down in air over the start of the pass, or over a free place beside it that is in air or that the tool has come down
-   to before, and in from there.
-3. Down a ramp along the pass, round a closed one from where least stock is touched, to and fro on an open one; its
-   top is in air or just above where the tool has been, or a free place close beside it is.
-A pass with none of these is left out. One along a wall begins and ends on an arc (``toolpath.linking.lead_arcs``) where the tool is
-free on it and clear of stock at its far end, and is come to by ways 1 and 2 there. To where ways 2 and 3 begin the tool
-gets as ``toolpath.linking.rapid_travel`` says. Where the engaged angle has a limit (``toolpath.stock.engagement``) ways in keep it, and where
-a pass would not it is first walked in skims above that.
+2. Down in air over the start of the pass, or over a free place beside it that is in air or that the tool has reached
+   before, and in from there.
+3. Down a ramp along the pass, round a closed one from where least stock is touched, back and forth on an open one. Its
+   top is in air or just above an earlier cut, or a free place close beside it is.
+
+A pass with none of these is left out. A pass along a wall begins and ends on an arc (``toolpath.linking.lead_arcs``)
+where the tool is free on it and clear of stock at its far end; ways 1 and 2 lead to that end.
+``toolpath.linking.rapid_travel`` brings the tool to the beginning of ways 2 and 3. Where the engaged angle has a limit
+(``toolpath.stock.engagement``) ways in keep it, and a pass that would exceed it is skimmed first.
+
+Places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -36,35 +40,35 @@ from toolpath.linking.rapid_travel import Motions, Travel
 from toolpath.stock.cut_history import Depths, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED, skims, within
 from toolpath.stock.stock_map import SURE_RIM, StockMap
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-FLUTE_SHARE = 0.8  # of the flute length: stock may stand no higher over a pass
-LOOK_EVERY = 0.2  # of the radius: discs so far apart leave out 0.5 % of it between them
-MOST_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
-LOOK_RIM = -0.3  # stock lattice steps off the radius: where a ramp looks for what it comes down through
+FLUTE_SHARE = 0.8  # flute lengths: highest stock over a pass
+LOOK_EVERY = 0.2  # radii: discs so far apart leave out 0.5 % of it between them
+MAX_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
+LOOK_RIM = -0.3  # stock lattice steps off the radius, where a ramp looks for the stock that it comes down through
 TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
-MOST_OVER = 1.5  # layers: what stands over a pass, or a lane onto one, at most
-BEEN_NEAR = 0.5  # of the diameter: places so near that the tool has been to are looked at, to come down to a cut beside
-MOST_BEEN = 6  # of them
-BEGINNINGS = 4  # places round a closed pass at which an arc onto it is looked for
+MAX_OVER = 1.5  # layers: most stock over a pass, or over a lane onto one
+BEEN_NEAR = 0.5  # diameters: how near a place lies that the tool has reached before, to come down beside a cut
+MAX_BEEN = 6  # such places
+BEGINNINGS = 4  # places round a closed pass at which an arc onto it is tried
 COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
 @dataclass
 class Linker:
-    """Grows the trajectories of one step pass by pass and keeps the stock up to date.
+    """Builds the trajectories of one step pass by pass and keeps the stock up to date.
 
     field   : TipField of the tool
     stock   : StockMap, lowered as passes are added
     motions : Motions
     skipped : lines left out: no safe way in, or stock in the way of shank or holder
-    refused : how many of them found no safe way in
+    refused : count of those without a safe way in
     depths  : Depths of the tool, on the stock's lattice; those of earlier steps count
-    found   : what a proof found wrong with an earlier plan
-    pace    : Pace of passes that take stock off; None: all at one feed
-    engaged : rad, most of the front of the cutter that may be in stock
-    walls   : whether passes go along walls, and begin and end on arcs
+    found   : findings of a proof of an earlier plan
+    pace    : Pace of passes that remove stock; None: one feed
+    engaged : rad, largest engaged angle of the front of the cutter
+    walls   : passes follow walls, and begin and end on arcs
     """
 
     field: TipField
@@ -85,22 +89,22 @@ class Linker:
 
     @property
     def trajectories(self) -> list[Trajectory]:
-        """So far."""
+        """Trajectories so far."""
         return self.go.trajectories
 
     @property
     def at(self) -> F64 | None:
-        """(3,) mm, where the tool is; None before its first move."""
+        """Tip of the tool, (3,) float64, mm, access frame; None before its first move."""
         return self.go.at
 
     def add(self, line: Line, tolerance: float | None = None, *, eased: bool = False) -> bool:
-        """Append one line as a cutting pass; False where no safe way in was found.
+        """Append one line as a cutting pass; False where it has no safe way in.
 
-        Where stock stands higher over the line than the flutes reach, the line is first walked above it. Where it
-        stands in the way of shank or holder, and where the tool is barred, the line is left out; what is higher than
-        rapids go, or was walked as it stands, is not walked.
+        Where stock stands higher over the line than the flutes reach, the tool first cuts above the line. Parts of a
+        line are left out where stock stands in the way of shank or holder, and where the tool is barred. Parts above
+        the height of rapids, and parts that were cut before, are not walked.
 
-        eased : the line takes off what it comes to bit by bit on its way down, as a helix does, and needs no skims
+        eased : the line itself goes down gradually, as a helix does, and needs no skims
         """
         points = thinned(line.points, self.motions.tolerance if tolerance is None else tolerance)
         if len(points) < 2 or float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 1e-6:
@@ -115,8 +119,11 @@ class Linker:
         return len(self.skipped) == before
 
     def _under_rapids(self, line: Line) -> list[Line]:
-        """The pieces of a line below the height of rapids: higher up there is no stock, only what a tool is kept over,
-        as a table that rises over the clearance plane where the tool leans."""
+        """The parts of a line below the height of rapids.
+
+        Higher up there is no stock, only things that the tool avoids, such as a table that rises over the clearance
+        plane where the tool tilts.
+        """
         if line.points[:, 2].max() <= self.motions.rapid_floor:
             return [line]
         way = Line(dense(line.points, LOOK_EVERY * self.field.tool.radius), line.closed)
@@ -124,14 +131,14 @@ class Linker:
         return [Line(thinned(p.points, self.motions.tolerance), p.closed) for p in low if p.length > 1e-6]
 
     def _unwalked(self, line: Line) -> list[Line]:
-        """What of a line was not walked before as it stands, with a few moves of the rest on each side.
+        """The parts of a line that were not cut before, with a few moves of the rest on each side.
 
-        A line that is in the way in part is asked for again, round after round, until that is gone.
+        A line that is blocked in part comes back round after round until the obstacle is gone.
         """
         return still_to_walk(line, ~self.depths.were_cut(line.points))
 
     def _unbarred(self, line: Line) -> list[Line]:
-        """The pieces of a line along which nothing is in the way; the rest is skipped."""
+        """The parts of a line without obstacles; the rest is skipped."""
         room = LOOK_EVERY * self.field.tool.radius
         points = dense(line.points, room)
         barred = self.found.bars(self.field.tool, points)
@@ -144,7 +151,7 @@ class Linker:
         return [q for p in free for q in self._clear_of_bodies(p)]
 
     def _clear_of_bodies(self, line: Line) -> list[Line]:
-        """The pieces of a line along which shank and holder pass over the stock; the rest is skipped."""
+        """The parts of a line along which shank and holder pass over the stock; the rest is skipped."""
         if not self.field.discs:
             return [line]
         points = dense(line.points, LOOK_EVERY * self.field.tool.radius)
@@ -157,7 +164,7 @@ class Linker:
                 for p in pieces_where(Line(points, line.closed), ~met, -room, 0.0) if p.length > 2.0 * room]
 
     def _topped(self, line: Line) -> bool:
-        """Take off what stands higher over a line than the flutes reach, from the top down."""
+        """Remove what stands higher over a line than the flutes reach, from the top down."""
         tool = self.field.tool
         points = dense(line.points, LOOK_EVERY * tool.radius)
         over = self.stock.standing(points, tool)
@@ -166,33 +173,33 @@ class Linker:
             lifted = Line(points + np.array([0.0, 0.0, k * height]), line.closed)
             for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                # where the tool has been as deep, what the stock still shows is out of its reach
+                # where the tool has been as deep, it cannot reach the stock that the map still shows
                 if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
                     return False
         return True
 
     def _stepped(self, points: F64, closed: bool) -> None:
-        """Take off layer by layer what stands over a line in a gap that the tool has been in and only just fits.
+        """Remove layer by layer what stands over a line in a gap that the tool has been in and only just fits.
 
-        Elsewhere a pass begins in air, or goes down along itself, which takes what stands over it little by little.
+        Elsewhere a pass begins in air, or goes down along itself, which removes the stock over it gradually.
         """
         tool, step = self.field.tool, self.motions.step_down
         along = dense(points, LOOK_EVERY * tool.radius)
         over = self.stock.overlap(along, tool, LOOK_RIM)
-        if (over.max() <= MOST_OVER * step or not len(self._been(points[0]))
+        if (over.max() <= MAX_OVER * step or not len(self._been(points[0]))
                 or bool(self.stock.in_air(points[:1], tool)[0]) or next(self._air_beside(points), None) is not None):
             return
         for k in range(int(over.max() / step), 0, -1):
             lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
             for piece in pieces_where(lifted, over > k * step, tool.radius, 4.0 * tool.radius):
                 walk = thinned(piece.points, self.motions.tolerance)
-                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # what still stands is out of its reach
+                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # it cannot reach the stock that is left
                     continue
                 for rest in self._unwalked(Line(walk, piece.closed)):
                     self._one(rest.points, rest.closed, unless_over=True)
 
     def _pass(self, points: F64, closed: bool) -> bool:
-        """Walk a line, skimmed before where it would have too much of the cutter in stock; False where it is not."""
+        """Cut a line, skimmed first where it would have too much of the cutter in stock; False where it is left out."""
         self._stepped(points, closed)
         if self._one(points, closed, unless_over=True):
             return True
@@ -200,7 +207,7 @@ class Linker:
         for whole in (False, True) if self.engaged < UNBOUNDED else ():  # the whole, where only the way in is too much
             for skim in skims(self.stock, line, tool, self.engaged, self.found, whole=whole):
                 way = Line(thinned(skim.points, self.motions.tolerance), skim.closed)
-                if not all(self._one(rest.points, rest.closed, most=self.motions.front_feed)
+                if not all(self._one(rest.points, rest.closed, max_feed=self.motions.front_feed)
                            for rest in self._unwalked(way)):
                     return False
             if self._one(points, closed):
@@ -208,10 +215,11 @@ class Linker:
         return False
 
     def _one(self, points: F64, closed: bool, *, unless_over: bool = False, eased: bool = False,
-             most: float = math.inf) -> bool:
-        """Walk a line as it is; False where no way leads in, or where it is over the limit and not to be then.
+             max_feed: float = math.inf) -> bool:
+        """Cut a line as it is; False where no way leads in, or where ``unless_over`` is set and it exceeds the limit.
 
-        eased : it is a way down all along, with the whole front in stock; most : mm/min, its feed at most
+        eased    : it goes down all along, with the whole front in stock
+        max_feed : mm/min
         """
         if unless_over and not within(self.stock, points, self.field.tool, self.engaged, self.found):
             return False
@@ -231,27 +239,27 @@ class Linker:
         else:
             self.go.come_down(entry[0])
             if len(entry) > 1:
-                self.go.feed(Motion.APPROACH, entry, self.motions.feed)
+                self.go.feed(TrajectoryKind.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self.go.here() - cut[0]) > 1e-9:
-            self.go.feed(Motion.APPROACH, np.vstack([self.go.here(), cut[:1]]), self.motions.plunge_feed)
+            self.go.feed(TrajectoryKind.APPROACH, np.vstack([self.go.here(), cut[:1]]), self.motions.plunge_feed)
         if len(arc):
-            self._led(Motion.APPROACH, arc)
+            self._led(TrajectoryKind.APPROACH, arc)
             cut = points
         down = len(cut) - 1 if eased else max(len(cut) - len(points), 0)  # moves of the way down
-        most = min(most, self.motions.front_feed) if eased else most
-        head = min(most, self._descent(cut[:down + 1]))
-        if head < min(most, self.motions.feed):
-            self._paced(Motion.CUT, cut[:down + 1], head)
-            self._paced(Motion.CUT, cut[down:], most)
+        max_feed = min(max_feed, self.motions.front_feed) if eased else max_feed
+        head = min(max_feed, self._descent(cut[:down + 1]))
+        if head < min(max_feed, self.motions.feed):
+            self._paced(TrajectoryKind.CUT, cut[:down + 1], head)
+            self._paced(TrajectoryKind.CUT, cut[down:], max_feed)
         else:
-            self._paced(Motion.CUT, cut, most)
+            self._paced(TrajectoryKind.CUT, cut, max_feed)
         self.depths.cut(cut)
         self.passes += 1
         if self.walls and not eased:
             length = Line(points, closed).length
             off = self._arc(cut[-1], cut[-2] - cut[-1], length, onto=False)  # a ring may have been begun elsewhere
             if off is not None:
-                self._led(Motion.LIFT, off)
+                self._led(TrajectoryKind.LIFT, off)
         return True
 
     def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
@@ -266,8 +274,12 @@ class Linker:
         return np.empty((0, 3)), points
 
     def _arc(self, at: F64, way: F64, length: float, *, onto: bool) -> F64 | None:
-        """A level arc (k, 3), mm, onto a place (3,) that goes on along ``way``, of a pass so long, mm, or off it; None
-        where the tool is not free on any, is barred there, has too much stock on it, or went it before."""
+        """A level arc (k, 3), mm, onto a place (3,) of a pass that continues along ``way``, or off it.
+
+        length : mm, of the pass
+
+        None where the tool is not free on any arc, is barred there, has too much stock on it, or was there before.
+        """
         tool = self.field.tool
 
         def free(arc: F64) -> bool:
@@ -275,58 +287,61 @@ class Linker:
                 return False
             tips = dense(arc, 0.3 * self.field.lattice.step)
             return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
-                    and self._lane(tips, MOST_OVER * self.motions.step_down))
+                    and self._lane(tips, MAX_OVER * self.motions.step_down))
 
         for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
             walked = arc if onto else np.ascontiguousarray(arc[::-1])
-            if int(self.depths.were_cut(walked).sum()) <= MOST_AGAIN and free(arc):
+            if int(self.depths.were_cut(walked).sum()) <= MAX_AGAIN and free(arc):
                 return walked
         return None
 
     def _descent(self, points: F64) -> float:
-        """mm/min: the feed along a way down (n, 3), mm, at which it goes down no faster than straight down it may."""
+        """Feed along a way down (n, 3), mm, at which its vertical part keeps to the plunge feed, mm/min."""
         way = np.diff(points, axis=0)
         drop, length = -way[:, 2], np.linalg.norm(way, axis=1)
         steepest = float((drop[length > 0.0] / length[length > 0.0]).max(initial=0.0))
         return self.motions.plunge_feed / steepest if steepest > 0.0 else math.inf
 
-    def _paced(self, motion: Motion, points: F64, most: float = math.inf) -> None:
-        """Go along a way (n, 3), mm, in stretches as fast as what stands there lets the tool, where a pace is given.
+    def _paced(self, motion: TrajectoryKind, points: F64, max_feed: float = math.inf) -> None:
+        """Follow a way (n, 3), mm, in stretches at feeds that fit the stock there, where a pace is given.
 
-        Only where it takes stock off: a finish is not left to what the stock's lattice shows. Nor is a way down between
-        passes. In stock never faster than ``most`` mm/min.
+        This holds only where the way removes stock. A finish does not depend on what the stock's lattice shows, nor
+        does a way down between passes. In stock the feed never exceeds ``max_feed`` mm/min.
         """
         if len(points) < 2:
             return
-        slow = self.pace is None or motion is Motion.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
+        slow = self.pace is None or motion is TrajectoryKind.CONNECT and bool((np.diff(points[:, 2]) < -1e-9).any())
         if self.pace is None or slow:
-            self.go.feed(motion, points, min(self.motions.feed, most))
+            self.go.feed(motion, points, min(self.motions.feed, max_feed))
             return
         for air, part, feed in paced(points, self.stock, self.field.tool, self.pace):
-            self.go.feed(Motion.CONNECT if air else motion, part, feed if air else min(feed, most))
+            self.go.feed(TrajectoryKind.CONNECT if air else motion, part, feed if air else min(feed, max_feed))
 
     def _joined(self, way: F64) -> None:
-        """Go along a way (n, 3), mm, to the next pass: as far as it is in air as fast as links go.
+        """Follow a way (n, 3), mm, to the next pass at the feed of links as far as it is in air.
 
-        Its first stretch, and one before stock, may touch what the stock's lattice does not show.
+        Its first stretch, and one before stock, may touch stock that the lattice does not show.
         """
         for quick, part in self.go.parts(way, seen=True):
             if quick:
-                self.go.feed(Motion.CONNECT, part, self.motions.link_feed)
+                self.go.feed(TrajectoryKind.CONNECT, part, self.motions.link_feed)
             else:
-                self._paced(Motion.CONNECT, part)
+                self._paced(TrajectoryKind.CONNECT, part)
 
-    def _led(self, motion: Motion, arc: F64) -> None:
-        """Go along an arc (n, 3), mm, on or off a pass: beside the wall at the feed of the pass, else as links go."""
+    def _led(self, motion: TrajectoryKind, arc: F64) -> None:
+        """Follow an arc (n, 3), mm, on or off a pass: beside the wall at the feed of the pass, else at that of
+        links."""
         for quick, part in self.go.parts(arc, seen=False):
             self.go.feed(motion, part, self.motions.link_feed if quick else self.motions.feed)
         self.depths.cut(arc)
 
     def keep_down(self, ways: Iterable[F64]) -> bool:
-        """Go along the first of some ways (n, 3), mm, from where the tool is, that is free and in air; else lift.
+        """Follow the first of some ways that is free and in air, from where the tool is; else lift.
 
-        Only where that is sooner than by the clearance plane, and a way it has not gone before: a program that runs
-        the same moves again and takes nothing off is one that somebody has pasted twice.
+        A way counts only where it is sooner than the clearance plane and has not been used before: a program that
+        repeats the same moves without cutting looks as if it was pasted twice.
+
+        ways : (n, 3) float64, mm, access frame, each
 
         Returns whether there was one.
         """
@@ -338,11 +353,11 @@ class Linker:
             if length / self.motions.link_feed > self.go.by_plane(way[0], way[-1]):
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
-            if int(known.sum()) > MOST_AGAIN:
+            if int(known.sum()) > MAX_AGAIN:
                 continue
             free = (self.go.free_move(way[k, :2], way[k + 1, :2], float(way[k:k + 2, 2].max())) for k in steps)
             if self.go.nothing_stands(way) and all(free):
-                self.go.feed(Motion.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
+                self.go.feed(TrajectoryKind.CONNECT, way[np.r_[0, steps + 1]], self.motions.link_feed)
                 self.gone.cut(way)
                 return True
         self.go.lift()
@@ -385,14 +400,14 @@ class Linker:
         if aside is not None:
             return aside, points, True
         ramp = self._ramp(points, closed, over)
-        if ramp is None or int(self._known_down(ramp, points).sum()) > MOST_AGAIN:
-            return None  # what is known of a way down can be left out only where it is come to from above
+        if ramp is None or int(self._known_down(ramp, points).sum()) > MAX_AGAIN:
+            return None  # the known part of a way down can be left out only where the tool comes from above
         return entry, ramp, True
 
     def _down_aside(self, points: F64, z: float) -> F64 | None:
         """From here across at height z, mm, to beside the start of a pass, down there in air, and onto it.
 
-        A way down along the pass is as long as its slope is flat, and is walked twice. None where this is longer, or
+        A flat pass has a long way down along itself, which the tool follows twice. None where this way is longer, or
         where the tool is not free in air.
         """
         here, start, m = self.go.here(), points[0], self.motions
@@ -404,7 +419,7 @@ class Linker:
             if length / m.link_feed + float(np.linalg.norm(start - q)) / m.feed > sooner:
                 continue
             if (self.go.nothing_stands(way) and self.go.free_move(here[:2], q[:2], z)
-                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MOST_AGAIN):
+                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MAX_AGAIN):
                 return np.vstack([way[1:], start])
         return None
 
@@ -431,21 +446,21 @@ class Linker:
                     yield q
 
     def _been_beside(self, start: F64) -> Iterator[F64]:
-        """Places (3,) as high as a start of a cut, mm, that the tool has come down to, straight beside it."""
-        for x, y, _ in self._been(start)[:MOST_BEEN]:
+        """Places (3,), mm, as high as a start of a cut, that the tool has reached before, straight beside it."""
+        for x, y, _ in self._been(start)[:MAX_BEEN]:
             q = np.array([x, y, start[2]])
             if self._shallow(dense(np.vstack([q, start]), LOOK_EVERY * self.field.tool.radius)):
                 if self._leads_onto(q, start):
                     yield q
 
     def _been(self, start: F64) -> F64:
-        """Places (n, 3), mm, close to a start of a cut, that the tool has come down to, as deep or deeper."""
+        """Places (n, 3), mm, close to a start of a cut, that the tool has reached before, as deep or deeper."""
         been = self.depths.near(start[:2], BEEN_NEAR * self.field.tool.diameter)
         return been[been[:, 2] <= start[2]]
 
     def _shallow(self, points: F64) -> bool:
-        """Whether no more than a layer stands over tips (n, 3), mm, not even as a skin on the walls beside them."""
-        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MOST_OVER * self.motions.step_down
+        """Whether no more than a layer stands over tips (n, 3), mm, skins on the walls beside them included."""
+        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MAX_OVER * self.motions.step_down
 
     def _leads_onto(self, q: F64, start: F64) -> bool:
         """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
@@ -453,13 +468,14 @@ class Linker:
             return False
         t = np.linspace(0.0, 1.0, max(2, int(np.hypot(*(start - q)[:2]) / 0.2) + 1))[:, None]
         lane = q + t * (start - q)
-        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MOST_OVER * self.motions.step_down)
+        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MAX_OVER * self.motions.step_down)
 
-    def _lane(self, tips: F64, most: float) -> bool:
-        """Whether no more than ``most`` mm of stock is on a level lane of tips (n, 3), none above the flutes, and not
-        too much of the cutter in it."""
+    def _lane(self, tips: F64, allowed: float) -> bool:
+        """Whether a level lane of tips (n, 3), mm, has at most ``allowed`` mm of stock on it, none above the flutes,
+        and keeps the limit of the engaged angle.
+        """
         tool = self.field.tool
-        return (float(self.stock.overlap(tips, tool, least=0.0).max()) <= most
+        return (float(self.stock.overlap(tips, tool, lower_bound=0.0).max()) <= allowed
                 and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length
                 and within(self.stock, tips, tool, self.engaged, self.found))
 
@@ -479,7 +495,7 @@ class Linker:
         above = max(float(self.depths.above(head).max()), 0.0)
         been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
         beside = max(float(been - points[0, 2]), 0.0)
-        if seen - beside > MOST_OVER * self.motions.step_down:
+        if seen - beside > MAX_OVER * self.motions.step_down:
             beside = math.inf
         for most in (min(beside, above, seen), min(above, seen), seen, max(seen, self.motions.step_down), highest):
             over = most + 0.1
@@ -493,7 +509,7 @@ class Linker:
         return None
 
     def _beside(self, top: F64) -> F64 | None:
-        """Where to come down to the top of a ramp: there, or off the wall where no rim left there can be met.
+        """Where to come down to the top of a ramp: there, or off the wall where no rim can be left.
 
         Where this tool has cut as deep nothing can be left, however close the stock stands all round.
         """
@@ -517,7 +533,7 @@ class Linker:
         return ramp
 
     def _known_down(self, ramp: F64, points: F64) -> NDArray[np.bool_]:
-        """Which moves of a ramp's way down, without the pass (n, 3) after it, the tool has cut before."""
+        """Moves of the way down of a ramp, without the pass (n, 3) after it, that the tool has cut before."""
         return self.depths.were_cut(ramp[:len(ramp) - len(points) + 1])
 
 

@@ -1,7 +1,7 @@
-"""Ways down onto a pass: ramps along the pass itself, never steeper than the tool may go down.
+"""Ways down onto a pass: ramps along the pass itself, never steeper than the ramp angle of the tool.
 
-A closed pass is gone round, an open one to and fro along its beginning, losing height at an even rate until the pass is
-reached; where a pass leans itself, it has less of the angle left.
+A closed pass is followed round, an open one back and forth along its beginning. Height is lost at an even rate until
+the pass is reached. Where a pass is inclined itself, less of the angle is left. Places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -16,33 +16,37 @@ from toolpath.kernels.ramp import ease
 from toolpath.stock.stock_map import SKIN
 
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
-EASE_SHARE = 0.98  # of the same, for one move that catches up
+EASE_SHARE = 0.98  # of that ramp, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
-LEAST_RUN = 0.25  # of the radius, there and back on an open line: what a ramp must have to run along
-MOST_LEGS = 400
+MIN_RUN = 0.25  # radii, there and back on an open line: least length of a ramp
+MAX_LEGS = 400
 
 
 def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: float, care: float) -> F64 | None:
-    """A pass with a way down from ``over`` above it: round the loop, or to and fro along its beginning.
+    """A pass with a way down from ``over`` above it: round the loop, or back and forth along its beginning.
 
-    What a pass itself goes up or down the ramp has less to go down by. One that leans more than half of the ramp is
-    dug into going downhill, by all that is lost since the tool was there before. So no more than a skin is lost
-    between, and no more than the way that goes level or up works off: to and fro half of what there is.
-
-    points : (n, 3) float64, mm, the pass; closed : whether it ends where it begins
-    over   : mm, how far above its beginning the way begins
-    angle  : rad, steepest the tool may go down; care : share of that and of a skin that is used
+    points : (n, 3) float64, mm, access frame, the pass
+    closed : whether it ends where it begins
+    over   : mm, height of the start of the way above the start of the pass
+    angle  : rad, steepest descent of the tool
+    care   : share of that angle and of a skin that is used
 
     Returns
     -------
     (m, 3) float64, mm, or None
-        The way and after it the pass, whole; None where the pass is too short to go down along.
+        The way and after it the whole pass; None where the pass is too short for a ramp.
+
+    Notes
+    -----
+    Where the pass itself goes up or down, the ramp has less to descend by. Going downhill, a pass inclined by more than
+    half of the ramp is dug into by all the height lost since the tool was there before. So no more than a skin is lost
+    between, and no more than the level or rising way works off: back and forth that is half of it.
     """
     slope, skin = care * math.tan(angle) * RAMP_SHARE, care * SKIN * tool.diameter
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
     total = float(s[-1])
-    if total < LEAST_RUN * tool.radius * (2.0 if closed else 1.0):
-        return None  # to and fro on the spot is drilling
+    if total < MIN_RUN * tool.radius * (2.0 if closed else 1.0):
+        return None  # back and forth on the spot is drilling
     lean = _steepest(points if closed else head_of(points, 0.5 * over / slope))
     digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
     if closed and digs:
@@ -52,7 +56,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     need, most = over / rest, math.tan(angle) * EASE_SHARE - (0.0 if digs else lean)
     if closed:
         laps = math.ceil(need / total)
-        if laps > MOST_LEGS:
+        if laps > MAX_LEGS:
             return None
         walked = np.concatenate([points] + [points[1:]] * laps)
         t = np.concatenate([s] + [s[1:] + total * k for k in range(1, laps + 1)])
@@ -63,7 +67,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
         return np.ascontiguousarray(path[: last + 1])
     leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
     legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
-    if legs > MOST_LEGS:
+    if legs > MAX_LEGS:
         return None
     head, hs = _with_knot(points, s, leg)
     head, hs = head[hs <= leg + 1e-9], hs[hs <= leg + 1e-9]
@@ -77,18 +81,21 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
 
 
 def head_of(points: F64, length: float) -> F64:
-    """The beginning of a polyline (n, 3), mm, as long as ``length`` in plan, two points at least."""
+    """The beginning of a polyline, ``length`` mm long in plan, with at least two points, (m, 3) float64, mm.
+
+    points : (n, 3) float64, mm, access frame
+    """
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
     head, at = _with_knot(points, s, length)
     return head[:max(2, int(np.searchsorted(at, length, side="right")))]
 
 
-def _eased(points: F64, lift: F64, most: float) -> F64:
-    """Points raised by ``lift``, and by more where a move too short for its share of the descent would be steep.
+def _eased(points: F64, lift: F64, max_slope: float) -> F64:
+    """Points raised by ``lift``, and more where a short move would be too steep for its share of the descent.
 
-    most : mm per mm in plan, what of the lift one move may lose
+    max_slope : mm per mm in plan, lift that one move may lose
     """
-    ease(points, lift, most, ROUNDING)
+    ease(points, lift, max_slope, ROUNDING)
     return np.ascontiguousarray(points + np.column_stack([np.zeros((len(points), 2)), lift]))
 
 

@@ -1,8 +1,10 @@
-"""How a tool gets from pass to pass: up, across and down, and where in air as fast as links go.
+"""Ways from pass to pass: up, across and down, in air at the feed of links.
 
-It goes straight over what is between, or by the clearance plane where that is sooner. Rapids move Z alone between that
-plane and a height clear of the stock, or XY alone at the plane; below that height every move is a feed move, as no
-rapid keeps its clearance beside a wall.
+The tool moves straight over what stands between, or by the clearance plane where that is sooner. Rapids move Z alone
+between that plane and a height clear of the stock, or XY alone at the plane. Below that height every move is a feed
+move, since no rapid keeps its clearance beside a wall.
+
+Arrays are float64; places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -19,21 +21,21 @@ from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import GUARD
 from toolpath.lines import dense, stretch
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-IN_FRONT = 0.1  # of the diameter, and no more than ``MOST_IN_FRONT``, above the start of a cut: approaches slow down
-MOST_IN_FRONT = 0.5  # mm
-OVER = 0.1  # mm above what stands between, on the way across
-QUICK_SHARE = 0.06  # of the diameter: a feed for less than that is not worth a word
+IN_FRONT = 0.1  # diameters, ``MAX_IN_FRONT`` at most, above the start of a cut, where approaches slow down
+MAX_IN_FRONT = 0.5  # mm
+OVER = 0.1  # mm above obstacles on the way across
+QUICK_SHARE = 0.06  # diameters: a shorter stretch gets no feed of its own
 
 
 @dataclass
 class Motions:
     """Feeds and heights of a step, mm and mm/min.
 
-    plunge_feed : straight down, and how fast a way down along a pass goes down; front_feed : in cut at most, where the
-    whole front of the cutter is in stock that no limit of the engaged angle counts
+    plunge_feed : straight down, and vertical limit of a way down along a pass
+    front_feed  : limit in cut where the whole front of the cutter is in stock that no engaged angle limits
     """
 
     feed: float
@@ -47,14 +49,16 @@ class Motions:
     tolerance: float
     front_feed: float = math.inf
 
+
 @dataclass
 class Travel:
-    """A tool on its way through the stock of a step, which it takes off wherever it goes.
+    """A tool on its way through the stock of a step, which it removes wherever it feeds.
 
     field        : TipField of the tool
-    stock        : StockMap, lowered as the tool goes
+    stock        : StockMap, lowered as the tool moves
     motions      : Motions
-    trajectories : so far; at : (3,) mm, where the tool is, None before the first
+    trajectories : so far
+    at           : (3,) float64, mm, access frame, tip of the tool; None before the first move
     """
 
     field: TipField
@@ -64,39 +68,49 @@ class Travel:
     at: F64 | None = None
 
     def here(self) -> F64:
-        """(3,) mm, where the tool is; it has to be somewhere."""
+        """Tip of the tool, (3,) float64, mm, access frame, after its first move."""
         assert self.at is not None
         return self.at
 
-    def feed(self, motion: Motion, points: F64, feed: float) -> None:
-        """Go along points (n, 3), mm, from where the tool is, at a feed, mm/min, and take off what is met."""
+    def feed(self, motion: TrajectoryKind, points: F64, feed: float) -> None:
+        """Feed along a way from where the tool is, and remove the stock on it.
+
+        points : (n, 3) float64, mm, access frame
+        feed   : mm/min
+        """
         self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
 
     def rapid(self, points: F64) -> None:
-        """Go along points (n, 3), mm, as a rapid; nothing is taken off."""
-        self.trajectories.append(Trajectory(Motion.RAPID, np.ascontiguousarray(points), 0.0))
+        """Rapid along a way; nothing is removed.
+
+        points : (n, 3) float64, mm, access frame
+        """
+        self.trajectories.append(Trajectory(TrajectoryKind.RAPID, np.ascontiguousarray(points), 0.0))
         self.at = points[-1]
 
     def lift(self) -> None:
-        """Up to the clearance plane, as a rapid from where no stock is beside the tool."""
+        """Lift to the clearance plane, as a rapid from where no stock is beside the tool."""
         if self.at is None or self.at[2] >= self.motions.clearance - 1e-9:
             return
         x, y, z = self.at
         free = max(z, self.motions.rapid_floor)
         if free > z + 1e-9:
-            self.feed(Motion.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
+            self.feed(TrajectoryKind.LIFT, np.array([[x, y, z], [x, y, free]]), self.motions.link_feed)
         if self.motions.clearance > free + 1e-9:
             self.rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
     def come_down(self, start: F64) -> None:
-        """Get to a place (3,), mm, from above: straight over what is between, or by the clearance plane."""
+        """Reach a place from above: straight over what stands between, or by the clearance plane.
+
+        start : (3,) float64, mm, access frame
+        """
         x, y, z = start
         way = self._across(start)
         if way is not None:
-            self.feed(Motion.CONNECT, way, self.motions.link_feed)
-            self.feed(Motion.APPROACH, np.array([way[-1], start]), self._onto_feed(start))
+            self.feed(TrajectoryKind.CONNECT, way, self.motions.link_feed)
+            self.feed(TrajectoryKind.APPROACH, np.array([way[-1], start]), self._onto_feed(start))
             return
         top = self.motions.clearance
         if self.at is None:
@@ -111,15 +125,15 @@ class Travel:
             self.rapid(np.array([[x, y, top], [x, y, free]]))
         slow = min(z + self._in_front, free)
         if free > slow + 1e-9:
-            self.feed(Motion.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
+            self.feed(TrajectoryKind.APPROACH, np.array([[x, y, free], [x, y, slow]]), self.motions.link_feed)
         if slow > z + 1e-9:
-            self.feed(Motion.APPROACH, np.array([[x, y, slow], [x, y, z]]), self._onto_feed(start))
+            self.feed(TrajectoryKind.APPROACH, np.array([[x, y, slow], [x, y, z]]), self._onto_feed(start))
 
     def _across(self, start: F64) -> F64 | None:
-        """A way (n, 3) in air from where the tool is to just over a place to come down at, no higher than it has to be.
+        """A way (n, 3), mm, in air from the tool to just over a place to come down at, no higher than necessary.
 
-        Up over the stock and whatever else is between, straight across, and down: a feed way, taken where that is
-        sooner than by the clearance plane. None where it is not, or where the tool is not free on it.
+        It rises over the stock and other obstacles, crosses straight, and descends, at a feed. None where the clearance
+        plane is sooner, or where the tool is not free on it.
         """
         tool, m = self.field.tool, self.motions
         if self.at is None or self.at[2] >= m.rapid_floor:
@@ -135,8 +149,8 @@ class Travel:
         lane = np.column_stack([here[:2] + t * (start - here)[:2], np.full(n, level)])
         level = max(level, float(self.field.tips(lane[:, :2]).max()))
         lane[:, 2] = level
-        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM, least=0.0),
-                            self.stock.under_end(lane, tool, least=0.0))
+        stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM, lower_bound=0.0),
+                            self.stock.under_end(lane, tool, lower_bound=0.0))
         level += float(stands.max()) + OVER
         if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane or level >= m.rapid_floor:
             return None
@@ -147,51 +161,69 @@ class Travel:
         return np.ascontiguousarray(way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]])
 
     def by_plane(self, here: F64, to: F64) -> float:
-        """Minutes from a place to another, (3,) mm, up to the clearance plane, across and down."""
+        """Minutes from a place to another by the clearance plane: up, across and down.
+
+        here, to : (3,) float64, mm, access frame
+        """
         m, run = self.motions, float(np.hypot(*(to - here)[:2]))
         return float((2.0 * m.rapid_floor - here[2] - to[2]) / m.link_feed
                      + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
 
     def _onto_feed(self, start: F64) -> float:
-        """mm/min: the last of the way down to a place (3,), mm, that of the cut where nothing stands in its way."""
+        """Feed of the last part of the way down to a place (3,), mm: that of the cut where no stock stands there,
+        mm/min."""
         at, tool = start[None, :], self.field.tool
-        stands = max(float(self.stock.overlap(at, tool, SURE_RIM, least=0.0)[0]),
-                     float(self.stock.under_end(at, tool, least=0.0)[0]))
+        stands = max(float(self.stock.overlap(at, tool, SURE_RIM, lower_bound=0.0)[0]),
+                     float(self.stock.under_end(at, tool, lower_bound=0.0)[0]))
         return self.motions.plunge_feed if stands > AIR_TOLERANCE else self.motions.feed
 
     @property
     def _in_front(self) -> float:
-        return min(IN_FRONT * self.field.tool.diameter, MOST_IN_FRONT)
+        return min(IN_FRONT * self.field.tool.diameter, MAX_IN_FRONT)
 
     def free_move(self, a: F64, b: F64, z: float) -> bool:
-        """Whether the tool is free, as ``free`` has it, straight from a to b, (2,) mm, at height z, mm."""
+        """Whether the tool is ``free`` straight from a to b at height z, mm.
+
+        a, b : (2,) float64, mm, access frame
+        """
         n = max(2, int(np.hypot(*(b - a)) / (0.3 * self.field.lattice.step)) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
         return self.free(np.column_stack([a + t * (b - a), np.full(n, z)]))
 
     def free(self, tips: F64) -> bool:
-        """Whether the tool meets no part and fixture, and its bodies no stock, at tips (n, 3), mm, close together."""
+        """Whether the tool meets no part and fixture, and its bodies no stock.
+
+        tips : (n, 3) float64, mm, access frame, close together
+        """
         tips = tips + [0.0, 0.0, LEVEL_TOLERANCE]
         if bool((self.field.blocked_by_cutter(tips) | self.field.blocked_by_body(tips)).any()):
             return False
         return not bool(self.stock.meets_bodies(tips, self.field.discs).any())
 
     def limit(self, tip: F64) -> float:
-        """mm: how low the tip may go at a place (3,), mm, for the part and what stands fixed."""
+        """Lowest height of the tip at a place, mm, given part and fixtures.
+
+        tip : (3,) float64, mm, access frame
+        """
         return float(self.field.tips(tip[None, :2])[0])
 
     def nothing_stands(self, way: F64) -> bool:
-        """Whether no stock that the lattice shows is met along a way (n, 3), mm."""
+        """Whether a way meets no stock that the lattice shows.
+
+        way : (n, 3) float64, mm, access frame
+        """
         points = dense(way, 0.5 * self.stock.lattice.step)
-        return float(self.stock.overlap(points, self.field.tool, least=0.0).max()) <= AIR_TOLERANCE
+        return float(self.stock.overlap(points, self.field.tool, lower_bound=0.0).max()) <= AIR_TOLERANCE
 
     def parts(self, way: F64, *, seen: bool) -> Iterator[tuple[bool, F64]]:
-        """A way (n, 3), mm, in stretches, and whether each may be gone as fast as links go.
+        """A way in stretches, (m, 3) float64, mm, each with whether it may be taken at the feed of links.
 
-        A stretch may where no stock is at it that is wider than a step of the lattice, wherever it stands between the
-        nodes. A shorter one than a share of the diameter is not worth a word.
+        A stretch may where no stock wider than a step of the lattice touches it, wherever that stands between the
+        nodes. A stretch shorter than a share of the diameter does not count.
 
-        seen : also where the lattice shows none, some way behind the beginning and before the first that it shows
+        way  : (n, 3) float64, mm, access frame
+        seen : also where the lattice shows no stock, from some distance behind the beginning to some before the first
+               stock
         """
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
         if s[-1] <= 1e-9:
@@ -199,11 +231,11 @@ class Travel:
         tool, step = self.field.tool, self.stock.lattice.step
         at = np.linspace(0.0, s[-1], math.ceil(2.0 * s[-1] / step) + 1)
         points = np.column_stack([np.interp(at, s, way[:, c]) for c in range(3)])
-        stands = self.stock.overlap(points, tool, SURE_RIM, least=0.0) > AIR_TOLERANCE
+        stands = self.stock.overlap(points, tool, SURE_RIM, lower_bound=0.0) > AIR_TOLERANCE
         quick = ~maximum_filter1d(stands, 3, mode="nearest")
         if seen:
             guard = max(GUARD * tool.diameter, 2.0 * step)
-            met = np.flatnonzero(self.stock.overlap(points, tool, least=0.0) > AIR_TOLERANCE)
+            met = np.flatnonzero(self.stock.overlap(points, tool, lower_bound=0.0) > AIR_TOLERANCE)
             last = float(at[met[0]] if len(met) else s[-1]) - guard
             if s[-1] > 4.0 * guard and last > 2.0 * guard:
                 quick |= (at >= guard) & (at <= last)

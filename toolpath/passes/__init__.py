@@ -1,4 +1,4 @@
 """Cutting passes on one zone: contours, cutter locations, side step, forward step, pass order.
 
-No link, feed or stock is known here.
+No link, feed or stock appears here.
 """

@@ -1,8 +1,10 @@
-"""Contours of the free region of a tool at one height, as the waterlines that walls are finished with.
+"""Contours of the free region of a tool at one height, such as the waterlines that finish walls.
 
-``contours`` gives the exact boundary of F(z) inside an active area: places where the tool touches.
-``rings`` gives lines at a distance from it, for taking stock off: they come from a distance transform on
-the lattice, so their distance is right to one lattice step, and every move is tested against the exact cutter.
+``contours`` gives the exact boundary of F(z) inside an active area: places where the tool touches. ``rings`` gives
+lines at a distance from it, for roughing. They come from a distance transform on the lattice, so their distance is
+exact to one lattice step, and every move is tested against the exact cutter.
+
+Arrays are float64 unless they are masks; places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -28,12 +30,15 @@ from toolpath.kernels.contour import (
 from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
-LEAST_APART = 0.6  # lattice steps between crossings that follow one another; less only where a corner is cut
+MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
 BISECTIONS = 9  # a crossing is placed to step / 2**9
 
 
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
-    """A (ny, nx) mask grown by ``cells`` lattice steps in each direction, a square round every node."""
+    """A mask grown by ``cells`` lattice steps in each direction, a square round every node, (ny, nx) bool.
+
+    mask : (ny, nx) bool, on the lattice
+    """
     size = 2 * int(np.ceil(cells)) + 1
     if size <= 1 or not mask.any():
         return mask
@@ -68,13 +73,16 @@ def contours(field: TipField, z: float, active: NDArray[np.bool_], tolerance: fl
 
 def contour_pieces(field: TipField, z: float, active: NDArray[np.bool_], wanted: NDArray[np.bool_], extend: float,
                    join: float, tolerance: float, dip: float = 0.0) -> list[Line]:
-    """The pieces of ``contours`` in wanted cells, made longer and joined as ``pieces_where`` does.
+    """The pieces of ``contours`` in wanted cells, extended and joined as in ``pieces_where``.
 
-    wanted : (ny, nx) bool on ``field.lattice``, inside the area ``active``
-    extend, join, dip : mm; dip : how far below z the lines come to lie
+    active       : (ny, nx) bool on ``field.lattice``, area of the lines
+    wanted       : (ny, nx) bool on ``field.lattice``, inside ``active``
+    z, tolerance : mm, tip height and largest distance from the true boundary
+    extend, join : mm
+    dip          : mm, how far below z the lines lie
 
-    Most of what an area has in it is cut away again, so only what may stay is found exactly. Where more stays than was
-    foreseen, all of it is found so.
+    Most of an area is cut away again, so only what may stay is found exactly. Where more stays than expected, all of it
+    is found exactly.
     """
     lat = field.lattice
 
@@ -110,7 +118,7 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
     exact = np.ones(len(ids), np.bool_)
     if wanted is not None:
         middle = _middles(ids, blocked.shape[1]) * lat.step + [x0, y0]
-        more = 2 + math.ceil(overrun / (LEAST_APART * lat.step))
+        more = 2 + math.ceil(overrun / (MIN_APART * lat.step))
         exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
         xy[~exact] = middle[~exact]
     placed = np.empty((int(exact.sum()), 2))
@@ -150,7 +158,7 @@ def _middles(ids: NDArray[np.int64], nx: int) -> F64:
 
 def _along_chains(marked: NDArray[np.bool_], starts: NDArray[np.int64], closed: NDArray[np.bool_],
                   more: int) -> NDArray[np.bool_]:
-    """(n,) bool: what is ``marked`` and ``more`` neighbours on each side, chain by chain."""
+    """(n,) bool: marked places and ``more`` neighbours on each side, chain by chain."""
     out = np.zeros_like(marked)
     for k in range(len(starts) - 1):
         part = marked[starts[k]:starts[k + 1]]
@@ -163,16 +171,16 @@ def _along_chains(marked: NDArray[np.bool_], starts: NDArray[np.int64], closed: 
 def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, spacing: float) -> list[list[Line]]:
     """Lines of tip positions at equal distances inside the boundary of the free region at height z.
 
-    active  : (ny, nx) bool, cells of the lattice that lines are wanted in
-    first   : mm, distance of the lines nearest to the boundary, right to one lattice step
+    active  : (ny, nx) bool, cells of the lattice that get lines
+    first   : mm, distance of the lines nearest to the boundary, exact to one lattice step
     spacing : mm between one list and the next
 
     Returns
     -------
     list of lists of Line
-        A list a distance, in the order stock is taken: the farthest from what blocks first. At a height where
-        nothing blocks, distances count from the border of ``active``, and the lines along it come first.
-        A move that the exact cutter does not allow is left out, which opens the line there.
+        One list a distance, in the order of stock removal: the farthest from obstacles first. At a height without
+        obstacles, distances count from the border of ``active``, and the lines along it come first. A move that the
+        exact cutter does not allow is left out, which opens the line there.
     """
     if not active.any():
         return []
@@ -196,10 +204,11 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, sp
 
 def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArray[np.bool_],
              corner: tuple[float, float]) -> list[Line]:
-    """The free pieces of the lines on which ``far`` passes ``distance``, as tips at height z, mm.
+    """The free pieces of the lines on which ``far`` crosses ``distance``, as tips at height z, mm [Lorensen1987].
 
-    far, inside : (ny, nx) float64 mm and bool, contiguous, on the step of the lattice; lines end where inside does
-    corner      : x and y of the first node, mm
+    far    : (ny, nx) float64, mm, contiguous, on the step of the lattice
+    inside : (ny, nx) bool; lines end where it does
+    corner : x and y of the first node, mm
     """
     ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
     xy = np.empty((len(ids), 2))
@@ -217,7 +226,10 @@ def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArr
 
 
 def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
-    """(n-1,) bool: each straight level move of a line of tips (n, 3) stays free, tested every third of a step."""
+    """Whether each straight level move of a line stays free, (n - 1,) bool, tested every third of a step.
+
+    points : (n, 3) float64, mm, access frame, tips
+    """
     ok = np.ones(max(len(points) - 1, 0), np.bool_)
     if len(points) > 1:
         chords_free(field.tree.arrays, field.noncut, field.coarse_row, np.ascontiguousarray(points[:, :2]),
@@ -227,7 +239,10 @@ def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
 
 
 def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
-    """The pieces of a level line of tips (n, 3), mm, whose points and moves are free."""
+    """The pieces of a level line whose points and moves are free.
+
+    points : (n, 3) float64, mm, access frame, tips
+    """
     ok = moves_free(field, points)
     at = points.copy()
     at[:, 2] += LEVEL_TOLERANCE
@@ -239,10 +254,11 @@ def free_pieces(field: TipField, points: F64, closed: bool) -> list[Line]:
 
 
 def serving(lines: Sequence[Line], tips: F64, reach: float, spacing: float, overrun: float, link: float) -> list[Line]:
-    """Lines as far as they come within ``reach`` mm of some tips, and ``overrun`` mm more.
+    """The parts of lines within ``reach`` mm of some tips, extended by ``overrun`` mm.
 
-    tips    : (n, 2) float64, mm, looked at in plan, or (n, 3)
-    spacing : mm between places along a line that are looked at; link : mm, gaps up to that are walked through
+    tips    : (n, 2) float64, mm, compared in plan, or (n, 3), access frame
+    spacing : mm between compared places along a line
+    link    : mm, shorter gaps are closed
     """
     tree, k = cKDTree(tips), tips.shape[1]
     out: list[Line] = []

@@ -3,8 +3,10 @@
 Notation
     P, n    : contact and unit normal out of the material; u the tool axis, tip to spindle
     R, r, a : radius and corner radius of the tool, a = R - r
-    tip     : P + r n + a f - r u, f the unit way of n across the axis (a = 0 for a ball): the circle of corner centres
-              touches the offset of the surface at r, and f points from there to the axis
+    tip     : P + r n + a f - r u, f the unit direction of n across the axis (a = 0 for a ball): the circle of corner
+              centres touches the offset of the surface at r, and f points from there to the axis
+
+Arrays are float64. Places are in mm, normals and axes dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -18,22 +20,22 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import thinned, true_runs
 from toolpath.passes.dragged_path import STEEPEST, Limit
-from toolpath.passes.forward_step import Profile
+from toolpath.passes.forward_step import PassProfile
 
-FLAT = 1e-6  # of a normal across the axis: what is less is a level place, which a flat end touches anywhere
-LOOK, FINE = 0.25, 0.02  # mm between looks at what stands in the way, and where something does
-OFFS = (0.25, 0.5, 1.0)  # of the way a tip may stand off
-ROUNDS = 6  # a move under the limit is halved so often, and then left out
-FREE = 1e-4  # mm, by which the part may stand over a tip and count as the surface itself
+FLAT = 1e-6  # part of a normal across the axis: with less the place is level, and a flat end touches it anywhere
+LOOK, FINE = 0.25, 0.02  # mm between checks for obstacles, and between checks at one
+OFFS = (0.25, 0.5, 1.0)  # shares of the distance that a tip may stand off
+ROUNDS = 6  # halvings of a move under the limit before it is left out
+FREE = 1e-4  # mm by which the part may stand over a tip and count as the surface itself
 
 
 def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, side: F64 | None = None) -> F64:
-    """Tips of a tool that touches places of a surface (3.34 of papers/000, for a ball, a bull nose and a flat).
+    """Tips of a ball, bull nose or flat that touches places of a surface [Sarkar2015, eq. 3.34].
 
-    contact, normal : (n, 3) float64, mm and unit
+    contact, normal : (n, 3) float64, mm and unit, access frame
     axis            : (n, 3) or (3,) float64, unit; +Z where None
-    side            : (n, 3) float64, unit, across the axis: from the contact to the axis of a tool that stands on a
-                      level place, which does not say where (``sides``)
+    side            : (n, 3) float64, unit, across the axis: from the contact to the axis of a tool on a level place,
+                      where the normal does not define it (``sides``)
 
     Returns (n, 3) float64, mm; nan where a bull nose or a flat stands on a level place and ``side`` is None.
     """
@@ -49,21 +51,21 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, sid
     return np.asarray(out)
 
 
-def sides(profile: Profile, way: F64, axis: F64 | None = None) -> F64:
-    """From the contact to the axis of a bull nose or a flat, for places (n,) mm of a pass that lie level.
+def sides(profile: PassProfile, way: F64, axis: F64 | None = None) -> F64:
+    """Directions from the contact to the axis of a bull nose or a flat, at level places of a pass, (n, 3) float64,
+    unit.
 
-    There any place under the flat of its end will do. It stays on the side it has at the nearest place of the pass that
-    does not lie level; on the left of a pass that is level all along.
+    At a level place any point under the flat end may touch. The tool keeps the side of the nearest place of the pass
+    that is not level; on a pass that is level throughout it is on the left.
 
-    axis : (n, 3) float64, unit, at those places; +Z where None
-
-    Returns (n, 3) float64, unit, square to the axis.
+    way  : (n,) float64, mm, distances along the pass
+    axis : (n, 3) float64, unit, access frame, at those places; +Z where None
     """
     u = np.broadcast_to(np.array([0.0, 0.0, 1.0]) if axis is None else axis, (len(way), 3))
     contact, normal = contacts(profile, way)
     across = normal - (normal * u).sum(axis=1)[:, None] * u
     known = np.flatnonzero(np.linalg.norm(across, axis=1) > FLAT)
-    if axis is None:  # the same answer whatever places are asked for
+    if axis is None:  # the result must not depend on the other places
         known = np.flatnonzero(np.linalg.norm(profile.normal[:, :2], axis=1) > FLAT)
         across, at = profile.normal * [1.0, 1.0, 0.0], profile.ways
     else:
@@ -81,22 +83,28 @@ def sides(profile: Profile, way: F64, axis: F64 | None = None) -> F64:
     return np.asarray(np.where(size[:, None] > 1e-12, out / np.maximum(size, 1e-300)[:, None], other))
 
 
-def nearest_of(grown: F64, asked: F64) -> NDArray[np.int64]:
-    """(n,) which of numbers that grow (k,) is nearest to each of some (n,)."""
-    k = np.clip(np.searchsorted(grown, asked), 1, max(len(grown) - 1, 1))
-    k = np.minimum(k, len(grown) - 1)
+def nearest_of(ascending: F64, values: F64) -> NDArray[np.int64]:
+    """Which of ascending numbers is nearest to each value, (n,) int64, index.
+
+    ascending : (k,) float64, dimensionless or any unit
+    values    : (n,) float64, in the same unit
+    """
+    k = np.clip(np.searchsorted(ascending, values), 1, max(len(ascending) - 1, 1))
+    k = np.minimum(k, len(ascending) - 1)
     low = np.maximum(k - 1, 0)
-    return np.where(asked - grown[low] <= grown[k] - asked, low, k)
+    return np.where(values - ascending[low] <= ascending[k] - values, low, k)
 
 
 def chorded(ways: F64, at: Callable[[F64], F64], tolerance: float) -> F64:
-    """Ways with others between them, until what ``at`` says half way and at quarters is near the chords.
+    """Distances along a pass with more between them, until the places half way and at quarters lie near the chords.
 
-    ways : (n,) float64, mm; at : ways -> places (n, 3) mm; tolerance : mm
+    ways      : (n,) float64, mm
+    at        : places (n, 3) float64, mm, access frame, at distances along the pass
+    tolerance : mm
 
-    A tip that keeps to chords of its own way puts the tool no farther than that from where it is to be; a ball does not
-    need it, whose steps are measured on what it sweeps. What jumps (from one side of a level crest to the other) is
-    gone over straight.
+    A tip that keeps to chords of its path puts the tool no farther than that from its place. A ball does not need it,
+    since its steps are measured on its swept volume. The chord crosses jumps, from one side of a level crest to the
+    other.
     """
     for _ in range(ROUNDS):
         a, b = at(ways[:-1]), at(ways[1:])
@@ -110,23 +118,23 @@ def chorded(ways: F64, at: Callable[[F64], F64], tolerance: float) -> F64:
     return ways
 
 
-def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
-           off: float = 0.0, most: float | None = None) -> tuple[list[F64], bool]:
-    """The tips of a pass, upright, moved off the surface or raised where the part stands over them.
+def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolerance: float,
+           off: float = 0.0, max_rise: float | None = None) -> tuple[list[F64], bool]:
+    """The tips of an upright pass, moved off the surface or raised where the part stands over them.
 
-    profile   : Profile of the pass; ends (n,) float64, mm, the ways at which it is located
+    profile   : PassProfile of the pass
+    ends      : (n,) float64, mm, distances along the pass of its locations
     limit     : lowest tip heights over places in plan (``toolpath.passes.dragged_path``)
-    tolerance : mm, of the raised way
-    off       : mm, up to which a tip may stand off along the normal first: facets of a wall may stand over its surface,
-                and beside a wall the limit is its top
-    most      : mm, up to which a tip is raised, the radius of the tool where None; 0 on walls, where a raised tip cuts
-                nothing that the pass is there for
+    tolerance : mm, of the raised path
+    off       : mm, distance along the normal that a tip may stand off first: facets of a wall may stand over its
+                surface, and beside a wall the limit is its top
+    max_rise  : mm, that a tip may be raised, the radius of the tool where None; 0 on walls, where a raised tip cuts
+                nothing of its pass
 
     Returns
     -------
-    Pieces (k, 3) float64, mm, and whether the part stood in the way anywhere: then the way follows the limit there, and
-    what it leaves at those contacts is for others. Where the limit is higher than ``most``, or jumps, the pass is
-    broken.
+    Pieces (k, 3) float64, mm, access frame, and whether the part stood in the way anywhere. There the path follows the
+    limit, and other passes take what it leaves. Where the limit is higher than ``max_rise``, or jumps, the pass breaks.
     """
     if tool.radius > tool.corner_radius:
         ends = chorded(ends, lambda w: _tips(profile, w, tool), 0.5 * tolerance)
@@ -138,7 +146,7 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
         return [made[np.isin(way, ends)]], False
     more = [np.linspace(a, b, int(np.ceil((b - a) / FINE)) + 1)
             for a, b, both in zip(way[:-1], way[1:], over[:-1] & over[1:], strict=True) if both]
-    # what is not raised keeps its own places
+    # a tip that is not raised keeps its own place
     way = np.unique(np.concatenate([way[np.isin(way, ends) | over], *more]))
     made, rise = _raised(profile, way, tool, limit, off)
     for _ in range(ROUNDS):
@@ -150,13 +158,13 @@ def lifted(profile: Profile, ends: F64, tool: ToolBody, limit: Limit, tolerance:
         order = np.argsort(np.concatenate([way, between]), kind="stable")
         way, rise = np.concatenate([way, between])[order], np.concatenate([rise, up])[order]
         made = np.concatenate([made, tip])[order]
-    whole = (rise <= (tool.radius if most is None else most)) & np.isfinite(rise)
+    whole = (rise <= (tool.radius if max_rise is None else max_rise)) & np.isfinite(rise)
     steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
     runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, 0.5 * tolerance))
     return [thinned(made[i:j + 1], 0.5 * tolerance) for i, j in runs], True
 
 
-def _raised(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
+def _raised(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), raised to the limit, and by how much (n,); mm."""
     made, high = _against(profile, way, tool, limit, off)
     rise = np.where(high > made[:, 2] + FREE, high - made[:, 2], 0.0)
@@ -172,7 +180,7 @@ def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.b
     return out
 
 
-def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
+def _against(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
     """Tips (n, 3) at ways (n,), off the surface where that frees them, and what the part allows there (n,); mm."""
     contact, normal = contacts(profile, way)
     side = sides(profile, way) if tool.radius > tool.corner_radius else None
@@ -189,13 +197,16 @@ def _against(profile: Profile, way: F64, tool: ToolBody, limit: Limit, off: floa
     return made, high
 
 
-def _tips(profile: Profile, way: F64, tool: ToolBody) -> F64:
+def _tips(profile: PassProfile, way: F64, tool: ToolBody) -> F64:
     """Tips (n, 3) mm of an upright tool at ways (n,) mm."""
     return tips(*contacts(profile, way), tool, None, sides(profile, way))
 
 
-def contacts(profile: Profile, way: F64) -> tuple[F64, F64]:
-    """Contacts (n, 3) mm and unit normals (n, 3) of a pass at ways (n,) mm."""
+def contacts(profile: PassProfile, way: F64) -> tuple[F64, F64]:
+    """Contacts, mm, and unit normals of a pass, both (n, 3) float64, access frame.
+
+    way : (n,) float64, mm, distances along the pass
+    """
     contact = profile.centres(way, 0.0)
     normal = profile.centres(way, 1.0) - contact
     return contact, normal

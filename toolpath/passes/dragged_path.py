@@ -1,10 +1,9 @@
 """The tip path of a tool that is dragged over a part along a line in plan.
 
-The line is sampled evenly; a piece is cut in four while the tip limit at its quarters leaves its chord by more than
-the tolerance: two kinks can cancel in the middle, not there and at both quarters. So the step forward is bounded by
-the chord on the true path and by nothing else. Where the limit jumps (the edge of a wall) cutting ends at
-``SMALLEST`` and the path is broken: no move may join the two sides. All points lie on the tip limit, so they are
-free.
+The line is sampled evenly. A piece is cut in four while the tip limit at its quarters leaves its chord by more than the
+tolerance. Two kinks can cancel in the middle, but not there and at both quarters. So only the chord on the true path
+bounds the forward step. Where the limit jumps (the edge of a wall) cutting ends at ``SMALLEST`` and the path breaks: no
+move may join the two sides. All points lie on the tip limit, so they are free. Places are in mm, access frame.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
     """Tip path along a way.
 
     limit     : Limit
-    way       : (m, 2) float64, mm, polyline in plan
+    way       : (m, 2) float64, mm, access frame, polyline in plan
     step      : mm, longest piece
     tolerance : mm, largest distance in height between the limit and the path
 
@@ -60,7 +59,7 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
             rise = z[todo + 1] - z[todo]
             off = np.abs(high - (z[todo, None] + rise[:, None] * _QUARTERS)).max(axis=1)
             cut = ~((off <= tolerance) & (np.abs(rise) <= STEEPEST * run))
-        # nothing below, or no place for the tool, from end to end is one break and not worth cutting
+        # a stretch with nothing below, or no place for the tool, is one break and needs no finer pieces
         cut &= np.isfinite(z[todo]) | np.isfinite(z[todo + 1]) | np.isfinite(high).any(axis=1)
         where = todo[cut]
         at = np.insert(at, np.repeat(where + 1, 3), inner[cut].ravel())
@@ -72,9 +71,11 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
 
 
 def pieces(limit: Limit, way: F64, step: float, tolerance: float) -> list[F64]:
-    """``follow`` in unbroken pieces (n, 3), mm, each thinned, within the tolerance in all.
+    """``follow`` in unbroken pieces, each (n, 3) float64, mm, thinned, within the tolerance in all.
 
-    Half of it goes to thinning; of the path's half a part is kept for a kink between two places that were looked at.
+    way : (m, 2) float64, mm, access frame, polyline in plan
+
+    Half of the tolerance goes to thinning. Of the other half a part is reserved for a kink between two sampled places.
     """
     points, broken = follow(limit, way, step, KINK * 0.5 * tolerance)
     return [thinned(points[i:j + 1], 0.5 * tolerance) for i, j in true_runs(~broken)]

@@ -1,4 +1,4 @@
-"""The direction of feed that takes the least way over a surface."""
+"""The direction of feed with the shortest way over a surface."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath.passes.pass_family import Dragged, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath
 from toolpath.passes.side_step import lay_out
 
 COARSER = 3.0  # passes of the search lie about this many times farther apart than those of the plan
 CANDIDATES = tuple(math.radians(a) for a in range(0, 180, 30))
-FEWEST = 60  # samples a search is worth
+FEWEST = 60  # samples that make a search worthwhile
 
 
 @dataclass(frozen=True)
@@ -26,18 +26,18 @@ class Candidate:
     way: float
 
 
-def searched(dragged: Dragged, target: Target, promise: Promise,
+def searched(dragged: Dragged, target: FinishTarget, promise: Promise,
              angles: Sequence[float] = CANDIDATES) -> list[Candidate]:
-    """Coarse layouts in several directions, the least way first.
+    """Coarse layouts in several directions, the shortest first.
 
-    What is left grows with the square of the distance, so the search promises ``COARSER`` squared times the scallop:
-    the order of directions stays, and it takes a small part of the time. Of equal ways the first angle stands first.
+    Scallops grow with the square of the side step, so the search allows ``COARSER`` squared times the scallop. That
+    keeps the order of directions at a small part of the time. Among equal ways the first angle wins.
     """
     if len(target.points) < FEWEST:
         return [Candidate(angles[0], 0, 0, 0.0)]
     thin = COARSER**2
     keep = np.random.default_rng(0).permutation(len(target.points))[:max(FEWEST, int(len(target.points) / thin))]
-    few = Target(target.points[keep], target.normals[keep], target.tips[keep], COARSER * target.spacing)
+    few = FinishTarget(target.points[keep], target.normals[keep], target.tips[keep], COARSER * target.spacing)
     easy = replace(promise, scallop=thin * promise.scallop, chord=thin * promise.chord)
     found = []
     for angle in angles:
@@ -48,6 +48,6 @@ def searched(dragged: Dragged, target: Target, promise: Promise,
     return sorted(found, key=lambda c: c.way)
 
 
-def best_direction(dragged: Dragged, target: Target, promise: Promise) -> float:
-    """Angle of the feed from x with the least way, rad."""
+def best_direction(dragged: Dragged, target: FinishTarget, promise: Promise) -> float:
+    """Angle of the feed from x with the shortest way, rad."""
     return searched(dragged, target, promise)[0].angle

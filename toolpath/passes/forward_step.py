@@ -1,15 +1,17 @@
-"""Forward steps of a ball on the true profile of a pass (papers/000, section 3.4, by the errata's scheme).
+"""Forward steps of a ball on the true profile of a pass [Sarkar2015, section 3.4], by the errata's scheme.
 
-Between two tool locations the ball sweeps a capsule round the way of its centre. How far a place of the pass is from
-that capsule is the chordal error there, overcut of the nose and stock left alike:
+Between two tool locations the ball sweeps a capsule round the way of its centre. The distance of a place of the pass
+from that capsule is the chordal error there, overcut of the nose and stock left alike:
 
     dev(P) = dist(P, segment C1 C2) - r,    C = P + r n
 
-That does not see a pass that bends sideways: by d the capsule leaves the contact only by d² / 2 r, while the ridge to
-the next pass, of height h, grows by d sqrt(h / 2 r) for each of the two that does. So ways aside count with twice that
-where a scallop is given: the ridge grows by the tolerance at most. A step is as long as the greater of the two, the
-chordal error, allows. The circular-arc rule takes the curvature at the start of a step for that of the whole step, so
-past an inflection, or where a profile tightens, it leaves more than the tolerance.
+That does not see a pass that bends sideways. By d the capsule leaves the contact only by d² / 2 r, while the ridge to
+the next pass, of height h, grows by d sqrt(h / 2 r) for each of the two that does. So sideways deviations count with
+twice that where a scallop is given: the ridge grows by the tolerance at most. The greater of the two errors sets the
+length of a step. The circular-arc rule applies the curvature at the start of a step to the whole step. So past an
+inflection, or where a profile tightens, it leaves more than the tolerance.
+
+Arrays are float64. Places are in mm, normals dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -26,22 +28,24 @@ from geometry.mesh import F64
 from toolpath.kernels import forward as kernels
 
 LONGEST = 40.0  # mm
-MOST_STEPS = 1_000_000
-FIRST = 256  # intervals a pass is looked at in at first
-SHARE = 2e-4  # of the tolerance: what the cubics of a profile may be off
-MOST_PLACES = 1 << 18
-FINEST = 0.02  # mm between places of a profile: what still jumps is an edge
+MAX_STEPS = 1_000_000
+FIRST = 256  # intervals of a pass at first
+SHARE = 2e-4  # of the tolerance: error of the cubics of a profile
+MAX_PLACES = 1 << 18
+FINEST = 0.02  # mm between places of a profile: a jump that remains is an edge
 
 Curve = Callable[[F64], tuple[F64, F64]]
 """Contacts (n, 3) mm and unit normals out of the material (n, 3) at parameters (n,) in 0 to 1."""
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class PassProfile:
     """A pass over the surface by its length.
 
-    at      : (k + 1,) float64, parameters at even ways; width : mm between them
-    contact : (k + 1, 3) float64, mm; normal : (k + 1, 3) unit
+    at      : (k + 1,) float64, parameters of the pass at even distances along it
+    width   : mm between them
+    contact : (k + 1, 3) float64, mm, access frame
+    normal  : (k + 1, 3) float64, unit
     """
 
     at: F64
@@ -50,10 +54,11 @@ class Profile:
     normal: F64
 
     @classmethod
-    def of(cls, curve: Curve, tolerance: float, radius: float) -> Profile:
-        """A pass over 0 to 1 with places so close that cubics through them are off by 2e-4 of a tolerance.
+    def of(cls, curve: Curve, tolerance: float, radius: float) -> PassProfile:
+        """A pass over 0 to 1 with places so close that cubics through them err by 2e-4 of a tolerance.
 
-        tolerance : mm; radius : mm, of the ball, whose centres are to be as right as the contacts
+        tolerance : mm
+        radius    : mm, of the ball, whose centres are to be as exact as the contacts
 
         Raises
         ------
@@ -62,13 +67,13 @@ class Profile:
 
         Notes
         -----
-        Where faces join with normals an angle d apart, no places are close enough: the centre jumps, along the surface.
-        Off it the ball is by r d² / 2 only; with places 0.02 mm apart that may be half the tolerance.
+        Where faces join with normals an angle d apart, no places are close enough: the centre jumps along the surface.
+        Off the surface the ball errs by r d² / 2 only; with places 0.02 mm apart that may be half the tolerance.
         """
         t = np.linspace(0.0, 1.0, FIRST + 1)
         way = _way(curve(t)[0])
         if not way[-1] > 0.0:
-            raise GeometryError("a pass has no length, or no places", code="bad_pass", measured=float(way[-1]),
+            raise GeometryError("a pass has no length or no places", code="bad_pass", measured=float(way[-1]),
                                 limit=0.0, remedy="leave it out")
         count = FIRST // 4
         ways = np.linspace(0.0, way[-1], count + 1)
@@ -79,8 +84,8 @@ class Profile:
             between = _even(way, np.linspace(0.0, 1.0, FIRST + 1), middle)
             more, lean = curve(between)
             if not (np.isfinite(contact).all() and np.isfinite(normal).all() and np.isfinite(lean).all()):
-                raise GeometryError("a pass goes over a place without a normal", code="bad_pass",
-                                    remedy="keep it off poles and tips")
+                raise GeometryError("a pass crosses a place without a normal", code="bad_pass",
+                                    remedy="keep passes off poles and tips")
             guess = CubicSpline(ways, np.column_stack([contact, normal]))(middle)
             off, turn = (np.linalg.norm(guess[:, k:k + 3] - true, axis=1) for k, true in ((0, more), (3, lean)))
             ways, t = _merged(ways, middle), _merged(t, between)
@@ -88,35 +93,42 @@ class Profile:
             width = float(ways[-1]) / (len(ways) - 1)
             if np.maximum(off, radius * turn).max() <= SHARE * tolerance:
                 return cls(t, width, contact, normal)
-            if width < FINEST or len(t) > MOST_PLACES:
+            if width < FINEST or len(t) > MAX_PLACES:
                 off = np.maximum(off, 0.5 * radius * turn * turn)
                 if off.max() <= 0.5 * tolerance:
                     return cls(t, width, contact, normal)
                 at = ", ".join(f"{x:.3f}" for x in more[int(off.argmax())])
-                raise GeometryError(f"a pass turns over sharply at ({at})", code="bad_pass", subjects=(f"({at})",),
+                raise GeometryError(f"a pass crosses a sharp edge at ({at})", code="bad_pass", subjects=(f"({at})",),
                                     measured=float(off.max()), limit=0.5 * tolerance,
-                                    remedy="end it there: an edge lies across it")
+                                    remedy="end the pass at the edge")
 
     @property
     def length(self) -> float:
-        """mm."""
+        """Length, mm."""
         return self.width * (len(self.at) - 1)
 
     @property
     def ways(self) -> F64:
-        """(k + 1,) float64, mm, of the places."""
+        """Distances along the pass of its places, (k + 1,) float64, mm."""
         return np.asarray(self.width * np.arange(len(self.at)))
 
     def pieces(self) -> F64:
-        """(k, 6, 4) float64: contact and normal as cubics of the way into each interval."""
+        """Contact, mm, and normal as cubics of the distance into each interval, (k, 6, 4) float64."""
         return np.ascontiguousarray(self._spline.c.transpose(1, 2, 0))
 
     def parameters(self, way: F64) -> F64:
-        """(n,) float64, the parameters at ways (n,) mm."""
+        """Parameters of the pass, (n,) float64, dimensionless.
+
+        way : (n,) float64, mm, distances along the pass
+        """
         return np.asarray(np.clip(CubicSpline(self.ways, self.at)(way), self.at[0], self.at[-1]))
 
     def centres(self, way: F64, radius: float) -> F64:
-        """(n, 3) float64, mm: centres of a ball of a radius (mm) that touches the pass at ways (n,) mm."""
+        """Centres of a ball that touches the pass, (n, 3) float64, mm, access frame.
+
+        way    : (n,) float64, mm, distances along the pass
+        radius : mm
+        """
         spline = self._spline(way)
         normal = spline[:, 3:] / np.linalg.norm(spline[:, 3:], axis=1)[:, None]
         return np.asarray(spline[:, :3] + radius * normal)
@@ -148,11 +160,13 @@ def _merged(a: F64, b: F64) -> F64:
     return out
 
 
-def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.0, longest: float = LONGEST) -> F64:
-    """Ways along a pass at which a ball is to be located.
+def steps(profile: PassProfile, radius: float, tolerance: float, scallop: float = 0.0, longest: float = LONGEST) -> F64:
+    """Distances along a pass at which a ball is located, as far apart as the tolerance allows [Sarkar2015, section
+    3.4].
 
-    radius, tolerance : mm; longest : mm, of a step
-    scallop : mm, between passes, which may grow by the tolerance; 0 where only the pass itself counts
+    radius, tolerance, longest : mm; ``longest`` limits a step
+    scallop                    : mm, between passes, which may grow by the tolerance; 0 where only the pass itself
+                                 counts
 
     Returns
     -------
@@ -162,11 +176,11 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
     Raises
     ------
     GeometryError
-        Code 'too_many_steps': the tolerance asks for over a million, or for steps that are none.
+        Code 'too_many_steps': the tolerance needs over a million steps, or steps of no length.
     """
     pieces, aside = profile.pieces(), _aside(radius, scallop)
     room = 1024
-    while room <= MOST_STEPS:
+    while room <= MAX_STEPS:
         ends = np.empty(room)
         count = int(kernels.forward(pieces, profile.width, profile.length, radius, aside, tolerance, longest,
                                     ends))
@@ -175,26 +189,30 @@ def steps(profile: Profile, radius: float, tolerance: float, scallop: float = 0.
         if count < -1:
             break
         room *= 8
-    raise GeometryError(f"a pass of {profile.length:g} mm asks for over {MOST_STEPS} steps", code="too_many_steps",
-                        measured=profile.length, limit=MOST_STEPS, remedy="allow a larger chord tolerance")
+    raise GeometryError(f"a pass of {profile.length:g} mm needs over {MAX_STEPS} steps", code="too_many_steps",
+                        measured=profile.length, limit=MAX_STEPS, remedy="allow a larger chord tolerance")
 
 
 def _aside(radius: float, scallop: float) -> float:
     return float(np.sqrt(2.0 * scallop / radius))
 
 
-def errors(profile: Profile, ends: F64, radius: float, scallop: float = 0.0) -> F64:
-    """(n - 1,) float64, mm: the greatest chordal error of each step between ways (n,) mm."""
+def errors(profile: PassProfile, ends: F64, radius: float, scallop: float = 0.0) -> F64:
+    """Greatest chordal error of each step, (n - 1,) float64, mm [Sarkar2015, section 3.4].
+
+    ends : (n,) float64, mm, distances along the pass of the locations
+    """
     pieces, seen, out = profile.pieces(), np.empty(kernels.PLACES + 1), np.empty(6)
     return np.array([kernels.greatest(pieces, profile.width, a, b, radius, _aside(radius, scallop), seen, out)
                      for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)])
 
 
-def arc_rule(profile: Profile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
-    """Ways by the rule of a circular arc, (n,) float64 mm: the curvature at the start of a step taken for all of it.
+def arc_rule(profile: PassProfile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
+    """Distances along a pass by the rule of a circular arc, (n,) float64, mm [Sarkar2015, section 3.4].
 
-    Convex of radius R: cos phi = 1 - e / (R + r), concave 1 - e / (R - r); the step is the chord 2 R sin phi. For
-    comparison: it does not keep the tolerance where the curvature changes.
+    The curvature at the start of a step stands for all of it. Convex of radius R: cos phi = 1 - e / (R + r), concave
+    1 - e / (R - r); the step is the chord 2 R sin phi. For comparison only: where the curvature changes this rule
+    exceeds the tolerance.
     """
     s = profile.ways
     spline = CubicSpline(s, profile.contact)

@@ -1,18 +1,21 @@
-"""Passes of a ball along the lines of a re-parameterised surface (papers/000, section 3, mended by its errata).
+"""Passes of a ball along the lines of a re-parameterised surface [Sarkar2015, section 3], corrected by its errata.
 
 Notation
     xi, eta   : the unit square; a pass is a line of one eta, xi along it
     C         : S(u(xi, eta), v(xi, eta)), the contact; n its normal, out of the material
     k         : normal curvature across the pass, positive where the part is concave
-    r, h, g   : radius of the ball, what may be left standing, side step as an arc on the surface
+    r, h, g   : radius of the ball, allowed residual, side step as an arc on the surface
 
-The side step 3.7 to 3.11 in one closed form, which is level at k = 0: with R = 1 / |k|
+The side step, equations 3.7 to 3.11, in one closed form that is level at k = 0: with R = 1 / |k|
 
     1 - cos phi = (2 r h - h²) / (2 (R + h) (R + r)) convex, (R - h) (R - r) concave;   g = 2 R phi
     g = (4 / |k|) asin(|k| sqrt((2 r h - h²) / (4 (1 - h k) (1 - r k))))
 
-It is right across straight neighbours alike all along; how far apart two passes may truly be is bracketed on what the
+It holds across straight neighbours that are alike throughout. The true distance of two passes is bracketed by what the
 ball leaves between them.
+
+Arrays are float64. Places are in mm, normals dimensionless unit vectors, in the access frame; xi and eta are
+dimensionless.
 """
 
 from __future__ import annotations
@@ -31,26 +34,29 @@ from geometry.surfaces.nurbs import NurbsSurface
 from toolpath.kernels.beside import left_beside
 from toolpath.passes.forward_step import Curve
 
-LEVEL = 1e-9  # 1/mm: what is less curved is level
-TIGHT = 0.999  # of the curvature of the ball: what is more concave does not take it
-ALONG = 65  # places along a pass at which its distance to the next is looked at
-MOST_LINES = 513
+LEVEL = 1e-9  # 1/mm: a surface with less curvature is level
+TIGHT = 0.999  # of the curvature of the ball: it does not fit a more concave surface
+ALONG = 65  # places along a pass at which its distance to the next is measured
+MAX_LINES = 513
 FEET = 8  # steps of Newton from a place of the square to parameters near it
 CENTRES = 513  # of the ball along a pass
 ROWS = np.array([0.12, 0.24, 0.36, 0.44, 0.5, 0.56, 0.64, 0.76, 0.88])  # between two passes
 FULL, AIM, TRIALS = 0.97, 0.985, 8
 NODES = 49  # each way, through which several faces are splined
-APART = 1e-3  # of the unit square, between places a curvature is asked with
-STEEP = 0.5  # of a normal lies level: what leans more is not cut by a flank
+APART = 1e-3  # of the unit square, between places that give a curvature
+STEEP = 0.5  # least level part of a normal of a surface that a flank cuts
 
 
 def side_step(curvature: F64, radius: float, scallop: float) -> F64:
-    """Largest arc across two neighbouring passes: 3.7 to 3.11.
+    """Largest arc across two neighbouring passes of a ball that keeps a scallop [Sarkar2015, eq. 3.7 to 3.11]
+    [Lin1996].
 
-    curvature : (n,) float64, 1/mm, across the pass, positive concave; radius, scallop : mm
+    curvature : (n,) float64, 1/mm, across the pass, positive concave
+    radius    : mm, of the ball
+    scallop   : mm, along the normal
 
-    Returns (n,) float64, mm; nan where the surface is so hollow that the ball does not fit, and the whole of what is
-    round the ball where it fits so closely that nothing as high as the scallop can stay.
+    Returns (n,) float64, mm; nan where the surface is too hollow for the ball. Where the ball fits so closely that
+    nothing as high as the scallop can stay, it is the whole circle round the ball.
     """
     k = np.asarray(curvature, dtype=np.float64)
     size = np.maximum(np.abs(k), LEVEL)
@@ -70,22 +76,29 @@ class IsoSurface:
     turned: bool = False
 
     def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Places (p, 3) mm and unit normals (p, 3) at xi and eta, both (p,)."""
+        """Places, mm, and unit normals, both (p, 3) float64, access frame.
+
+        xi, eta : (p,) float64, dimensionless
+        """
         return self.surface.points_and_normals(self._inside(self._uv(xi, eta)))
 
     def curve(self, eta: float, low: float = 0.0, high: float = 1.0) -> Curve:
-        """The pass at eta from one xi to another, as ``toolpath.passes.forward_step`` takes it."""
+        """The pass at eta from one xi to another, in the form of ``toolpath.passes.forward_step``."""
         return lambda t: self.contact(low + (high - low) * t, np.full(len(t), eta))
 
     def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """How the surface lies across a pass at xi and eta, both (p,).
+        """Width and curvature of the surface across a pass [DoCarmo1976].
+
+        xi, eta : (p,) float64, dimensionless
 
         Returns
         -------
-        width : (p,) float64, mm by 1 of eta, square to the pass on the surface
+        width : (p,) float64, mm per 1 of eta, square to the pass on the surface
         curvature : (p,) float64, 1/mm, across the pass, positive concave
 
-        The way square to the direction (u', v') is (-(F u' + G v'), E u' + F v').
+        Notes
+        -----
+        The direction square to (u', v') is (-(F u' + G v'), E u' + F v').
         """
         uv = self._inside(self._uv(xi, eta))
         along, over = self.tangents(xi, eta)
@@ -98,15 +111,25 @@ class IsoSurface:
         return np.abs(inner) / np.sqrt(size), curvature
 
     def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Derivatives of (u, v) along xi and along eta at xi and eta, both (p,): (p, 2) each."""
+        """Derivatives of (u, v) along xi and along eta, both (p, 2) float64, parameters of the surface.
+
+        xi, eta : (p,) float64, dimensionless
+        """
         return self.grid.tangents(eta, xi)[::-1] if self.turned else self.grid.tangents(xi, eta)
 
     def parameters(self, xi: F64, eta: F64) -> F64:
-        """Parameters (p, 2) of the surface at xi and eta, both (p,); beyond its border the square goes on straight."""
+        """Parameters of the surface, (p, 2) float64; beyond its border the square continues straight.
+
+        xi, eta : (p,) float64, dimensionless
+        """
         return self._inside(self._uv(xi, eta))
 
     def square(self, uv: F64, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Where over the unit square, or beyond it, parameters (p, 2) lie, searched from xi and eta, both (p,)."""
+        """Place over the unit square, or beyond it, of parameters of the surface, both (p,) float64, dimensionless.
+
+        uv      : (p, 2) float64, parameters of the surface
+        xi, eta : (p,) float64, dimensionless, where Newton's iteration begins
+        """
         for _ in range(FEET):
             off = uv - self._uv(xi, eta)
             (a, b), (c, d) = (way.T for way in self.tangents(np.clip(xi, 0.0, 1.0), np.clip(eta, 0.0, 1.0)))
@@ -139,14 +162,17 @@ class JoinedSurface:
 
     @classmethod
     def of(cls, faces: Joined, grid: GridMap) -> JoinedSurface:
-        """Faces over a piece of their plane that ``grid`` lays into the unit square."""
+        """Faces over a piece of their plane that ``grid`` maps to the unit square."""
         at = np.linspace(0.0, 1.0, NODES)
         xi, eta = np.meshgrid(at, at)
         place = faces.places(grid(xi.ravel(), eta.ravel())).reshape(NODES, NODES, 3)
         return cls(faces, tuple(RectBivariateSpline(at, at, place[:, :, c]) for c in range(3)))
 
     def contact(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """As for ``IsoSurface``."""
+        """As ``IsoSurface.contact``: places, mm, and unit normals, both (p, 3) float64, access frame.
+
+        xi, eta : (p,) float64, dimensionless
+        """
         a, b = (xi, eta) if self.turned else (eta, xi)
         return self.faces.feet(np.column_stack([spline.ev(a, b) for spline in self.splines]))
 
@@ -155,7 +181,15 @@ class JoinedSurface:
         return lambda t: self.contact(low + (high - low) * t, np.full(len(t), eta))
 
     def across(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """As for ``IsoSurface``, from places a little apart: the curvature jumps where faces join."""
+        """As ``IsoSurface.across``, from places a little apart: the curvature jumps where faces join.
+
+        xi, eta : (p,) float64, dimensionless
+
+        Returns
+        -------
+        width : (p,) float64, mm per 1 of eta
+        curvature : (p,) float64, 1/mm, positive concave
+        """
         def apart(dx: float, dy: float) -> tuple[F64, F64]:
             low = self.contact(np.clip(xi - dx, 0.0, 1.0), np.clip(eta - dy, 0.0, 1.0))
             high = self.contact(np.clip(xi + dx, 0.0, 1.0), np.clip(eta + dy, 0.0, 1.0))
@@ -176,13 +210,13 @@ Laid = IsoSurface | JoinedSurface
 class _Table:
     """Contacts and normals as splines over the unit square, fine enough for what a scallop is measured with.
 
-    Asked on lattices only, which costs a twentieth of asking the surface. Half way between its places contacts are off
-    by 1e-3 of the scallop at most and centres of the ball by 1e-2 of it, or the lattice has 513 by 513.
+    It is evaluated on lattices only, at a twentieth of the cost of the surface. Half way between its places contacts
+    err by 1e-3 of the scallop at most and centres of the ball by 1e-2 of it, or the lattice has 513 by 513.
     """
 
     def __init__(self, iso: Laid, radius: float, scallop: float) -> None:
         count, off = 33, np.inf
-        while off > 1e-3 * scallop and count <= MOST_LINES:
+        while off > 1e-3 * scallop and count <= MAX_LINES:
             at = np.linspace(0.0, 1.0, count)
             xi, eta = np.meshgrid(at, at)
             point, normal = iso.contact(xi.ravel(), eta.ravel())
@@ -207,9 +241,10 @@ class _Table:
 
 @dataclass(frozen=True)
 class Flank:
-    """The side of an upright tool above its corner, which cuts what leans little.
+    """The side of an upright tool above its corner, which cuts steep surfaces.
 
-    radius : mm, of the tool; height : mm, how far above the corner's centre it may cut
+    radius : mm, of the tool
+    height : mm, how far above the corner's centre it may cut
     """
 
     radius: float
@@ -217,10 +252,12 @@ class Flank:
 
 
 def lay_out(iso: Laid, radius: float, scallop: float, flank: Flank | None = None) -> F64:
-    """The passes, (k,) float64, eta from 0 to 1: both borders, and as few between them as the scallop allows.
+    """The passes of a surface, as few as the scallop allows [Sarkar2015].
 
     radius, scallop : mm
-    flank           : of an upright tool whose corner ``radius`` is; None where only the ball counts
+    flank           : of an upright tool whose corner has ``radius``; None where only the ball counts
+
+    Returns (k,) float64, dimensionless, eta of the passes from 0 to 1, both borders included.
 
     Raises
     ------
@@ -246,7 +283,7 @@ def _first_guess(iso: Laid, eta: float, radius: float, scallop: float) -> float:
 
 
 class _Pass:
-    """A pass as centres of the corner, close together, to ask what is left beside it."""
+    """A pass as centres of the corner, close together, to measure the residual beside it."""
 
     def __init__(self, table: _Table, eta: float, radius: float, flank: Flank | None) -> None:
         point, normal = table(np.linspace(0.0, 1.0, CENTRES), np.array([eta]))
@@ -258,8 +295,10 @@ class _Pass:
             self.axes = self.centres + (flank.radius - radius) * level / size[:, None]
 
     def left(self, points: F64, normals: F64) -> F64:
-        """How far along the normals of places (m, ALONG, 3), mm, the tool begins, (m, ALONG); a little over r where it
-        is not. The second index goes along the pass."""
+        """Distance along the normals of places (m, ALONG, 3), mm, to the tool, (m, ALONG); a little over r without it.
+
+        The second index runs along the pass.
+        """
         out = np.empty(points.shape[:2])
         wide, high = (0.0, 0.0) if self.flank is None else (self.flank.radius, self.flank.height)
         left_beside(points, normals, self.centres, self.axes, self.radius, wide, high, STEEP, out)
@@ -267,10 +306,10 @@ class _Pass:
 
 
 def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
-    """The most that is left between two passes, mm."""
+    """Largest residual between two passes, mm."""
     points, normals = table(np.linspace(0.0, 1.0, ALONG), low + ROWS * (high - low))
     one, two = a.left(points, normals), b.left(points, normals)
-    # what is left grows with the square of the way from a pass: between two rows both roots are straight
+    # the residual grows with the square of the distance from a pass: between two rows both roots are straight
     p, q = np.sqrt(np.maximum(one, 0.0)), np.sqrt(np.maximum(two, 0.0))
     fall = (p[:-1] <= q[:-1]) & (p[1:] >= q[1:])
     share = (q[:-1] - p[:-1]) / np.maximum((q[:-1] - p[:-1]) - (q[1:] - p[1:]), 1e-300)
@@ -280,7 +319,7 @@ def _worst(table: _Table, a: _Pass, b: _Pass, low: float, high: float) -> float:
 
 def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
           scallop: float) -> tuple[float, _Pass]:
-    """The next pass: as far as what is left between the two allows, or the border."""
+    """The next pass: as far as the residual between the two allows, or the border."""
     low, high, step = 0.0, math.inf, min(guess, 1.0 - at)
     kept = None
     for _ in range(TRIALS):
@@ -296,6 +335,6 @@ def _next(table: _Table, before: _Pass, at: float, guess: float, radius: float,
         if not low < wanted < high:
             wanted = 0.5 * (low + high) if high < math.inf else 1.5 * step
         step = min(wanted, 1.0 - at)
-    if kept is None:  # not even a narrow step keeps it: what is left there is for others
+    if kept is None:  # not even a narrow step keeps it: other passes take the rest
         kept = (at + step, _Pass(table, at + step, radius, before.flank))
     return (1.0 if kept[0] > 1.0 - 1e-9 else kept[0]), kept[1]

@@ -1,9 +1,10 @@
-"""Passes that lie side by side over a target, and what two neighbours leave between them.
+"""Passes side by side over a target, and the material that two neighbours leave between them.
 
-Passes are told apart by their place t across. Which samples two neighbours A and B answer for is read off the tips that
-touch them: those with a tip between A and B. There the lower of the two swept envelopes is measured along the normal,
-in every strip across the passes at the sample it leaves highest, and from there on the ridge between the two is
-walked to, because samples miss its crest.
+A pass is identified by its place t across. Two neighbours A and B answer for the samples whose touching tips lie
+between A and B. There the lower of the two swept envelopes is measured along the normal, in every strip across the
+passes at the sample it leaves highest. From there the crest between the two is searched, since samples miss it.
+
+Arrays are float64. Places are in mm, normals dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ CREST = 1e-6  # mm: two envelopes this near each other have met
 class Dragged:
     """A cutter that is dragged over a part.
 
-    cutter    : Cutter, for what it leaves
+    cutter    : Cutter, for the material it leaves
     limit     : Limit, lowest tip over a place, of the whole assembly
-    ground    : TriangleTree of what is finished
+    ground    : TriangleTree of the finished surface
     allowance : mm, material to be left on it
     """
 
@@ -51,12 +52,13 @@ class Dragged:
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
-    """Samples to be finished, and what is left is measured at.
+class FinishTarget:
+    """Samples to be finished, at which the residual is measured.
 
-    points, normals : (n, 3) float64, mm and unit, out of the material; n_z > 0 where passes are dragged
-    tips            : (n, 3) float64, mm, an admissible tip that touches each
-    spacing         : mm, about, between neighbours
+    points  : (n, 3) float64, mm, access frame
+    normals : (n, 3) float64, unit, out of the material; n_z > 0 where passes are dragged
+    tips    : (n, 3) float64, mm, an admissible tip that touches each
+    spacing : mm, approximate distance between neighbours
     """
 
     points: F64
@@ -64,24 +66,27 @@ class Target:
     tips: F64
     spacing: float
 
-    def subset(self, which: I64) -> Target:
-        """The samples ``which`` alone."""
-        return Target(self.points[which], self.normals[which], self.tips[which], self.spacing)
+    def subset(self, which: I64) -> FinishTarget:
+        """Some of the samples.
 
-    def joined(self, more: Target) -> Target:
-        """These samples and then others, apart as these."""
-        return Target(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
+        which : (m,) int64, index
+        """
+        return FinishTarget(self.points[which], self.normals[which], self.tips[which], self.spacing)
+
+    def joined(self, more: FinishTarget) -> FinishTarget:
+        """These samples followed by others, with the same spacing."""
+        return FinishTarget(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
                       np.vstack([self.tips, more.tips]), self.spacing)
 
 
 @dataclass(frozen=True)
 class Promise:
-    """What passes have to keep, mm.
+    """Tolerances that passes keep, mm.
 
-    scallop   : largest distance along the normal that is left
+    scallop   : largest residual along the normal
     chord     : tolerance of the tip path
     overrun   : by how much passes run past the last tip they serve
-    link      : way that one more piece costs, for weighing pieces against closer passes
+    link      : way that one more piece costs, to weigh pieces against closer passes
     """
 
     scallop: float
@@ -105,7 +110,7 @@ class Pass:
 
     @property
     def length(self) -> float:
-        """Way in all, mm."""
+        """Length of all lines, mm."""
         return sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in self.lines)
 
 
@@ -118,9 +123,10 @@ class Family(ABC):
     across : (n, 2) float64, unit, the way t grows at each sample
     """
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, t: F64, strips: I64, across: F64) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise, t: F64, strips: I64,
+                 across: F64) -> None:
         self.dragged, self.target, self.promise = dragged, target, promise
-        # what a pass through its own tip leaves too high, no pass mends: it may not set the step of all
+        # a sample that a pass through its own tip leaves too high may not set the step of all passes
         lift = dragged.limit(np.ascontiguousarray(target.tips[:, :2])) - target.tips[:, 2]
         order = np.flatnonzero(lift * target.normals[:, 2] <= 0.5 * promise.scallop)
         order = order[np.argsort(t[order], kind="stable")]
@@ -131,11 +137,14 @@ class Family(ABC):
 
     @abstractmethod
     def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
-        """The pass at t, over the tips within ``window`` mm of it (those of the samples ``only`` where given)."""
+        """The pass at t, over the tips within ``window`` mm of it.
+
+        only : (n,) bool, samples whose tips count; None: all
+        """
 
     @property
     def guess(self) -> float:
-        """A step to begin with, mm: what leaves the scallop on a level plane, just about."""
+        """A first step, mm, which leaves about the scallop on a level plane."""
         cutter = self.dragged.cutter
         r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
         h = min(self.promise.scallop, r)
@@ -143,10 +152,12 @@ class Family(ABC):
 
     @property
     def step(self) -> float:
-        """Longest piece of a way before it is looked at, mm.
+        """Longest piece of a path between two samples of the tip limit, mm.
 
-        What stands out by c, the path's share of the chord, lifts the least circle of the cutter, radius r, over
-        2 sqrt(2 r c): as far apart are the quarters of a piece.
+        Notes
+        -----
+        An obstacle that stands out by c, the path's share of the chord, lifts the smallest circle of the cutter, radius
+        r, over 2 sqrt(2 r c). The quarters of a piece lie that far apart.
         """
         cutter = self.dragged.cutter
         r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
@@ -161,7 +172,10 @@ class Family(ABC):
         return slice(i, j)
 
     def left(self, here: slice | I64, *passes: Envelope) -> tuple[F64, I64]:
-        """What passes leave in each strip across: (k,) mm and the k strips, of the samples ``here``."""
+        """Residual of passes in each strip across: (k,) float64, mm, and the k strips, int64.
+
+        here : slice or (m,) int64, index of the samples
+        """
         points, normals, strips = self.points[here], self.normals[here], self.strips[here]
         if not len(points):
             return np.zeros(0), np.zeros(0, np.int64)
@@ -176,7 +190,7 @@ class Family(ABC):
         return worst - self.dragged.allowance, strips[last]
 
     def _over(self, envelope: Envelope, here: slice | I64) -> F64:
-        """Envelope over the samples ``here``, mm; kept, for every trial of a step asks the pass before it again."""
+        """Envelope over the samples ``here``, mm; kept, since every trial of a step needs the pass before it again."""
         seen = self._seen.get(envelope)
         if seen is None:
             seen = self._seen[envelope] = np.full(len(self.points), np.nan)
@@ -186,10 +200,10 @@ class Family(ABC):
         return np.asarray(seen[which])
 
     def _crest(self, points: F64, normals: F64, across: F64, a: Envelope, b: Envelope) -> F64:
-        """Height of the crest between two passes over the surface beside each point (n,), mm; -inf where none is near.
+        """Height of the crest between two passes over the surface beside each point, (n,) mm; -inf where none is near.
 
-        Across the passes the one envelope rises and the other falls; they are equal in one place, which is looked for
-        no farther from the sample than samples are apart.
+        Across the passes one envelope rises and the other falls; they are equal in one place. The search for it goes no
+        farther from the sample than the spacing of samples.
         """
         most = np.full(len(points), 1.5 * self.spacing)
 
@@ -234,7 +248,7 @@ class Swath(Family):
     angle : rad, of the feed from x
     """
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise, angle: float) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise, angle: float) -> None:
         # the ends of a quarter turn are exact, so that passes along an axis stay on a line of the program
         c, s = round(math.cos(angle), 15), round(math.sin(angle), 15)
         self.angle, self.feed, self.side = angle, np.array([c, s]), np.array([-s, c])
@@ -244,11 +258,17 @@ class Swath(Family):
         self.s = self.tips[:, :2] @ self.feed
 
     def subset(self, which: I64) -> Swath:
-        """The same with the samples ``which`` of the target alone."""
+        """The same with some of the samples of the target.
+
+        which : (m,) int64, index
+        """
         return Swath(self.dragged, self.target.subset(which), self.promise, self.angle)
 
     def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
-        """As in ``Family``."""
+        """As in ``Family``.
+
+        only : (n,) bool, samples whose tips count; None: all
+        """
         i, j = np.searchsorted(self.t, [t - window, t + window]).tolist()
         mine = np.arange(i, j) if only is None else i + np.flatnonzero(only[i:j])
         mine = mine[np.argsort(self.s[mine], kind="stable")]
@@ -286,6 +306,6 @@ def _clipped(path: F64, along: F64, lo: float, hi: float) -> F64:
     return np.vstack([ends[:1], inside, ends[1:]])
 
 
-def strip_width(dragged: Dragged, target: Target) -> float:
-    """Width of the strips in which what is left is looked at, mm."""
+def strip_width(dragged: Dragged, target: FinishTarget) -> float:
+    """Width of the strips in which the residual is measured, mm."""
     return max(1.5 * target.spacing, 0.1 * dragged.cutter.radius)

@@ -1,4 +1,4 @@
-"""Lines in the order a tool meets them."""
+"""The order in which a tool cuts lines."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from toolpath.lines import Line
 
 
 def nearest_order(lines: list[Line], at: F64 | None, either: bool) -> list[Line]:
-    """Lines in the order a tool meets them going each time to the nearest start.
+    """Lines in order of machining: each time the one with the nearest start.
 
-    at     : (2,) or (3,) float64, mm, where the tool is; None lets the first line begin
-    either : open lines may be walked both ways; closed ones begin at their nearest point in any case
+    at     : (2,) or (3,) float64, mm, access frame, where the tool is; None lets the first line begin
+    either : open lines may be cut in both directions; closed ones begin at their nearest point in any case
     """
     left = list(lines)
     out: list[Line] = []

@@ -1,9 +1,9 @@
 """Places between the outermost samples of an area and the border up to which the tool touches it.
 
-Samples stand up to a spacing inside the border of what a tool reaches, and passes that keep their promise at the
-samples may leave more beyond them: beside a pass the scallop grows with the square of the distance. So an area is
-given places of its own out there, which passes have to serve as well: on a fine lattice round the outermost samples
-the tool is asked where it touches, and the border of that is kept.
+Samples end up to a spacing inside the border of what a tool reaches. Passes that keep their tolerance at the samples
+may leave more beyond them, since the scallop grows with the square of the distance from a pass. So an area gets places
+of its own there, which passes have to serve as well. A fine lattice round the outermost samples finds where the tool
+touches, and the border of that is kept. Places are in mm, access frame.
 """
 
 from __future__ import annotations
@@ -16,32 +16,32 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.drop import drop_contacts
-from toolpath.passes.pass_family import I64, Target
+from toolpath.passes.pass_family import I64, FinishTarget
 from zones.reach.tip_field import TipField, touchable
 
 NEAR = 2.5  # spacings: neighbours of a sample are so near, about twenty of them
 OPEN = np.radians(135.0)  # a sample with no neighbour over this angle is at the border
-FAR = 1.5  # spacings: the border is looked for so far out
+FAR = 1.5  # spacings: how far out the border is searched
 SERVED = 0.4  # spacings: places nearer to a sample than this are left to it
 OWN = 0.1  # mm per mm a place may be off the plane through its sample and still be of the same surface
 FINEST, COARSEST = 0.125, 0.25  # spacings: nodes of the lattice are so far apart
 THIN = 0.5  # spacings between the places kept, about
 
 
-def beyond(field: TipField, target: Target, lift: float, apart: float = 0.0,
-           faces: Collection[int] | None = None) -> Target:
+def beyond(field: TipField, target: FinishTarget, lift: float, apart: float = 0.0,
+           faces: Collection[int] | None = None) -> FinishTarget:
     """Places farther out than the outermost samples, up to where the tool as a whole no longer touches the surface.
 
     field  : TipField of the tool
-    target : Target, n_z > 0
+    target : FinishTarget, n_z > 0
     lift   : mm, distance along the normal within which a touch counts
-    apart  : mm, how well the border should be known; between FINEST and COARSEST of the spacing is taken
+    apart  : mm, required precision of the border; between FINEST and COARSEST of the spacing is taken
     faces  : B-rep faces of the area, on which alone places lie; all where None
 
     Returns
     -------
-    Target
-        About ``THIN`` spacings apart; none where the area ends at an edge or a wall.
+    FinishTarget
+        About ``THIN`` spacings apart; empty where the area ends at an edge or a wall.
     """
     none = target.subset(np.zeros(0, np.int64))
     if not len(target.points):
@@ -69,7 +69,7 @@ def beyond(field: TipField, target: Target, lift: float, apart: float = 0.0,
     kept = kept[cKDTree(rim).query(places[kept, :2])[0] <= FAR * s]
     _, first = np.unique(np.floor(places[kept, :2] / (THIN * s)).astype(np.int64), axis=0, return_index=True)
     kept = kept[np.sort(first)]
-    return Target(places[kept], normals[kept], tips[kept], s)
+    return FinishTarget(places[kept], normals[kept], tips[kept], s)
 
 
 def _rim(points: F64, near: float) -> I64:

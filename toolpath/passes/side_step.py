@@ -1,11 +1,11 @@
-"""Distance between neighbouring passes, bracketed on what they truly leave.
+"""Distance between neighbouring passes, bracketed by the material they really leave.
 
-What is left between two passes grows with their distance, about with its square, so the widest step that keeps the
-promise is bracketed by a few trials, each a tip path on the true limit (``toolpath.passes.pass_family`` measures). Going on
-greedily takes the fewest passes of a family: two neighbours answer for what is between them and for nothing else.
+The residual between two passes grows with about the square of their distance. So a few trials bracket the widest step
+that keeps the tolerance, each a tip path on the true limit (``toolpath.passes.pass_family`` measures). The greedy order
+takes the fewest passes of a family, since two neighbours answer only for what lies between them.
 
-Where one narrow spot would set the step for a whole pass (thesis, section 5.2.v) the step may be wider and the spot
-gets a piece of a pass of its own, if that is less way in all.
+Where one narrow spot would set the step for a whole pass the step may be wider [Jain2016, section 5.2]. The spot then
+gets a piece of a pass of its own, if that makes the way shorter.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from toolpath.cutter.swept_envelope import Envelope
 from toolpath.passes.pass_family import FLOOR, I64, Family, Pass, strip_width
 
 TRIALS = 7
-FULL = 0.97  # of what may be left: a step that leaves this much is wide enough
+FULL = 0.97  # share of the allowed residual at which a step is wide enough
 AIM = 0.985
 GROWTH = 1.6  # most a trial is wider than the one before
 DEEPEST = 5  # times a narrow spot is halved
@@ -30,7 +30,7 @@ SHARES = (0.9, 0.75, 0.5)  # of the strips that a wider step may satisfy
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A pass that was tried, with what is left between it and the one before in each strip."""
+    """A pass that was tried, with the residual between it and the one before in each strip."""
 
     step: float
     made: Pass
@@ -43,19 +43,20 @@ class _Trial:
         return float(self.left.max(initial=0.0))
 
     def without(self, strips: I64) -> _Trial:
-        """The same, those strips not looked at."""
+        """The same without those strips."""
         return replace(self, left=np.where(np.isin(self.strips, strips), 0.0, self.left))
 
 
 def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
-    """The passes of a family, across it in order; pieces for narrow spots after the two passes they lie between.
+    """The passes of a family, in order across it; pieces for narrow spots follow the two passes they lie between
+    [Jain2016].
 
-    subdivide : let a narrow spot have pieces of passes where that is less way
+    subdivide : a narrow spot may get pieces of passes where that makes the way shorter
 
     Returns
     -------
     list of Pass
-        What is left between them is within the promise wherever ``FLOOR`` allows it.
+        The residual between them keeps the tolerance wherever ``FLOOR`` allows it.
     """
     if not len(family.t):
         return []
@@ -78,7 +79,7 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
             return _trial(family, at, step, base, guess)
 
         best = widest(attempt, family.promise.scallop, min(start, last - at), least, last - at)
-        if best.worst > family.promise.scallop:  # strips that not even the closest pass keeps are left to others
+        if best.worst > family.promise.scallop:  # other passes take the strips that even the closest pass leaves
             lost = best.strips[best.left > family.promise.scallop]
 
             def without(step: float, attempt: Callable[[float], _Trial] = attempt, lost: I64 = lost) -> _Trial:
@@ -107,46 +108,48 @@ def _kept(family: Family, here: slice, envelope: Envelope) -> bool:
     return float(family.left(here, envelope)[0].max(initial=0.0)) <= family.promise.scallop
 
 
-def widest(attempt: Callable[[float], _Trial], most_left: float, start: float, least: float, most: float) -> _Trial:
-    """The widest step that keeps a promise, by bracketing.
+def widest(attempt: Callable[[float], _Trial], max_left: float, start: float, min_step: float,
+           max_step: float) -> _Trial:
+    """The widest step that keeps a tolerance, by bracketing [Jain2016].
 
-    attempt    : the pass at a step, with what it leaves
-    most_left  : mm
-    start      : mm, the first step tried; least, most : mm, limits of the step
+    attempt            : the pass at a step, with its residual
+    max_left           : mm, largest residual
+    start              : mm, the first step tried
+    min_step, max_step : mm, limits of the step
 
     Returns
     -------
     _Trial
-        At ``least`` where not even that keeps it.
+        At ``min_step`` where even that exceeds the tolerance.
     """
     good: _Trial | None = None
     bad = math.inf
-    x = min(max(start, least), most)
+    x = min(max(start, min_step), max_step)
     for _ in range(TRIALS):
         trial = attempt(x)
-        ratio = math.sqrt(AIM * most_left / max(trial.worst, 1e-12))
-        if trial.worst <= most_left:
+        ratio = math.sqrt(AIM * max_left / max(trial.worst, 1e-12))
+        if trial.worst <= max_left:
             if good is None or trial.step > good.step:
                 good = trial
-            if trial.worst >= FULL * most_left or x >= most:
+            if trial.worst >= FULL * max_left or x >= max_step:
                 break
-            following = min(x * min(ratio, GROWTH) if x > 0.0 else FLOOR, most)
+            following = min(x * min(ratio, GROWTH) if x > 0.0 else FLOOR, max_step)
             x = following if following < bad else 0.5 * (x + bad)
         else:
             bad = min(bad, x)
-            if x <= least:
+            if x <= min_step:
                 break
-            low = least if good is None else good.step
+            low = min_step if good is None else good.step
             following = x * max(ratio, 0.25)
             x = following if low < following < bad else 0.5 * (low + bad)
         if good is not None and bad - good.step < 0.015 * bad:
             break
-    return good if good is not None else attempt(least)
+    return good if good is not None else attempt(min_step)
 
 
 def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at: float, before: Envelope,
-           most: float) -> tuple[_Trial, list[Pass]]:
-    """A wider step with pieces at the spots too narrow for it, where that is less way a step; else ``best``, none."""
+           max_step: float) -> tuple[_Trial, list[Pass]]:
+    """A wider step with pieces at its narrow spots, where that shortens the way for each mm; else ``best``."""
     promise = family.promise
     chosen: tuple[_Trial, list[Pass]] = best, []
     cost = (best.made.length + promise.link) / max(best.step, 1e-9)
@@ -154,7 +157,7 @@ def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at:
         return chosen
     for share in SHARES:
         usual = float(np.quantile(best.left, share, method="lower"))
-        step = min(best.step * min(math.sqrt(AIM * promise.scallop / max(usual, 1e-12)), 2.0), most)
+        step = min(best.step * min(math.sqrt(AIM * promise.scallop / max(usual, 1e-12)), 2.0), max_step)
         if not (best.worst <= promise.scallop and step >= 1.03 * best.step):
             continue
         trial = attempt(step)
@@ -171,9 +174,9 @@ def _wider(family: Family, attempt: Callable[[float], _Trial], best: _Trial, at:
 
 def _narrow(family: Family, a: float, over_a: Envelope, b: float, over_b: Envelope, left: F64, strips: I64,
             deeper: int) -> tuple[list[Pass], bool]:
-    """Pieces half way between two passes in the strips where too much is left, and between those again.
+    """Pieces half way between two passes in the strips with too much left, and between those again.
 
-    Also returns whether all strips are kept then.
+    Also returns whether all strips keep the tolerance then.
     """
     failing = strips[left > family.promise.scallop]
     if not len(failing):

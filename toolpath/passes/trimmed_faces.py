@@ -16,9 +16,9 @@ from geometry.parameterization.square_patches import Squared, squared
 from geometry.surfaces.nurbs import NurbsSurface
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, JoinedSurface, Laid, lay_out
 
-LATTICE = 9  # places each way at which the rise of both families of passes is looked at
-LEVEL_GAIN = 0.5  # of the rise along the longer sides: what less there must be along the shorter to go there instead
-Asked = tuple[float, float, Flank | None]
+LATTICE = 9  # places each way at which the rise of both families of passes is measured
+LEVEL_GAIN = 0.5  # of the rise along the longer sides: passes along the shorter sides must rise less
+LayoutKey = tuple[float, float, Flank | None]
 Passes = tuple[Laid, F64]
 
 
@@ -30,7 +30,7 @@ class TrimmedFace:
     surface : NurbsSurface, mm, access frame, its normal out of the material
     loops   : (k, 2) float64 each, parameters of the surface, closed, the outer one first
     area    : mm²
-    flat    : it is a plane, for which there are other passes
+    flat    : it is a plane, which has other passes
     """
 
     face: int
@@ -38,11 +38,11 @@ class TrimmedFace:
     loops: tuple[F64, ...]
     area: float
     flat: bool = False
-    _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
+    _laid: dict[LayoutKey, list[Passes]] = fresh(default_factory=dict, repr=False)
 
     @cached_property
     def pieces(self) -> list[Squared]:
-        """The pieces of it over the unit square; a GeometryError where one folds whatever is tried."""
+        """Its pieces over the unit square; a GeometryError where one folds in every trial."""
         d = self.surface.derivatives(self.loops[0])
         scale = float(np.linalg.norm(d.u, axis=1).mean()), float(np.linalg.norm(d.v, axis=1).mean())
         return squared(self.loops, scale)
@@ -54,19 +54,20 @@ class TrimmedFace:
 
     @property
     def name(self) -> str:
-        """As it is told: F12."""
+        """Its name in reports: F12."""
         return f"F{self.face}"
 
     @property
     def alone(self) -> tuple[TrimmedFace, ...]:
-        """What is to be tried instead where it cannot be laid: nothing."""
+        """Substitutes where the face cannot be laid out: none."""
         return ()
 
     def passes(self, radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
         """Each piece with the eta of its passes.
 
-        radius, scallop : mm, of the tool's corner, and what may be left
-        flank           : of the upright tool, on walls: passes go the more level way; None for the longer sides
+        radius, scallop : mm, of the tool's corner, and the allowed residual
+        flank           : of the upright tool, on walls, where passes run along the more level sides; None: the longer
+                          sides
         """
         key = radius, scallop, flank
         if key not in self._laid:
@@ -75,23 +76,24 @@ class TrimmedFace:
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothFaces:
-    """Faces that join smoothly, to be gone over as one.
+class TangentFaces:
+    """Faces that join smoothly and get common passes.
 
-    alone : the faces, each as it would be gone over on its own
-    mesh  : TriangleMesh of the part, access frame; uv (m, 3, 2) float64, parameters on the surfaces of the corners of
-            the facets of these faces, whatever elsewhere
+    alone : the faces, each for passes of its own
+    mesh  : TriangleMesh of the part, access frame
+    uv    : (m, 3, 2) float64, parameters on the surfaces of the corners of the facets of these faces, undefined
+            elsewhere
     """
 
     alone: tuple[TrimmedFace, ...]
     mesh: TriangleMesh
     uv: F64
     flat: ClassVar[bool] = False
-    _laid: dict[Asked, list[Passes]] = fresh(default_factory=dict, repr=False)
+    _laid: dict[LayoutKey, list[Passes]] = fresh(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:
-        """As they are told: F12 F13."""
+        """Their names in reports: F12 F13."""
         return " ".join(face.name for face in self.alone)
 
     @property
@@ -101,7 +103,7 @@ class SmoothFaces:
 
     @cached_property
     def pieces(self) -> list[JoinedSurface]:
-        """The pieces of them over the unit square; a GeometryError where they are no sheet, or fold."""
+        """Their pieces over the unit square; a GeometryError where they are no sheet, or fold."""
         joined = Joined.of(self.mesh, self.uv, {face.face: face.surface for face in self.alone})
         return [JoinedSurface.of(joined, p.map) for p in squared((joined.border,), (1.0, 1.0))]
 
@@ -118,7 +120,7 @@ class SmoothFaces:
         return self._laid[key]
 
 
-Faces = TrimmedFace | SmoothFaces
+Faces = TrimmedFace | TangentFaces
 
 
 def _passes(pieces: Sequence[Laid], radius: float, scallop: float, flank: Flank | None) -> list[Passes]:
@@ -127,7 +129,7 @@ def _passes(pieces: Sequence[Laid], radius: float, scallop: float, flank: Flank 
 
 
 def leveller(iso: Laid) -> Laid:
-    """A surface with passes along the longer sides, or along the others where they are far more level."""
+    """A surface with passes along the longer sides, or along the others where those are far more level."""
     other = replace(iso, turned=True)
     return other if _rise(other) < LEVEL_GAIN * _rise(iso) else iso
 

@@ -1,7 +1,8 @@
-"""From zones to workingsteps: layers, then the finish of every zone, tool by tool, measured as it goes.
+"""From zones to workingsteps: layers, then the finish of every zone, tool by tool, measured along the way.
 
-Where stock was in the way of a finish (``toolpath.planning.zone_finishing``) that is gone since, the zone gets another workingstep for
-what it lacks: after the other zones of its tool, and, where more than the scallop is left, after the last tool.
+Stock may block a finish (``toolpath.planning.zone_finishing``) and be gone later. The zone then gets another
+workingstep for what is missing: after the other zones of its tool, and, where more than the scallop is left, after the
+last tool.
 """
 
 from __future__ import annotations
@@ -18,10 +19,18 @@ from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.passes.contours import dilated
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.pass_order import nearest_order
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_checkpoint import NOTHING, FinishNow, Keeper, LayersNow, PlanNow, ToolNow, Ways
+from toolpath.plan_checkpoint import (
+    NOTHING,
+    CheckpointKeeper,
+    FinishSnapshot,
+    LayersSnapshot,
+    PackedLines,
+    PlanSnapshot,
+    ToolSnapshot,
+)
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
 from toolpath.planning.zone_finishing import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
@@ -36,9 +45,9 @@ from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
-AGAIN_SHARE = 0.95  # of the progress, before zones are gone over again
-# A ring is right to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
-THIN = 2.0  # scallops: what stands no farther off a wall is what a finish leaves
+AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
+THIN = 2.0  # scallops: thickness on a wall that a finish leaves
+# A ring is exact to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
 LATTICE_CARE = 1.5
 
 Progress = Callable[[float], None]
@@ -46,28 +55,28 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Workingsteps in machining order and what became of each zone."""
+    """Workingsteps in machining order and the outcome of each zone."""
 
     steps: tuple[Workingstep, ...]
     zones: tuple[ZonePlan, ...]
 
 
-def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mapping[str, TipField],
+def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: Keeper = NOTHING) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: CheckpointKeeper = NOTHING) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
-    checks   : what each zone is measured at and will be judged on, in the order of the zones
+    checks   : samples at which each zone is measured and judged, in the order of the zones
     fields   : TipField by tool id
     cut_data : CutData by tool id
     stock    : StockMap, lowered as the plan grows
     progress : called with the share done, 0 to 1
     first_step : number of the first workingstep
-    trimmed  : exact faces by zone id, in the frame of the zones; zones that have none get no iso-parametric passes
-    keeper   : told after each act; where it knows a plan of the very same inputs that was under way, that is gone on
-               with, and ends as one that was never cut off
+    trimmed  : exact faces by zone id, in the frame of the zones; other zones get no iso-parametric passes
+    keeper   : called after each act; where it keeps an unfinished plan of the same inputs, that is continued with the
+               same result as without the interruption
 
     Returns
     -------
@@ -77,10 +86,10 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
 
-    def begin(now: PlanNow | None = None) -> _Work:
+    def begin(snapshot: PlanSnapshot | None = None) -> _Work:
         jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
                          trimmed or {}, under) for tid in order]
-        return _Work(jobs, stock, settings, now)
+        return _Work(jobs, stock, settings, snapshot)
 
     work = keeper.taken(begin) or begin()
     begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
@@ -88,7 +97,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
         if k >= begun:
             work.steps.extend(act(len(work.steps) + first_step))
             work.acts = k + 1
-            keeper.done(work.now)
+            keeper.done(work.snapshot)
         done += finished
         if progress is not None and finished:
             progress(AGAIN_SHARE * done / all_zones)
@@ -98,35 +107,36 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[Target], fields: Mappin
 
 
 Act = Callable[[int], list[Workingstep]]
-"""Something whole of a plan: given the number of the first workingstep it makes, these."""
+"""An act of a plan: makes its workingsteps, given the number of the first."""
 
 
 class _Work:
-    """A plan under way: acts done, the workingsteps they made, what each tool has done.
+    """A plan in progress: acts done, the workingsteps they made, the state of each tool.
 
-    now : how far one like this came, to go on from there
+    snapshot : state of an interrupted plan of the same inputs, to continue from
     """
 
     def __init__(self, jobs: Sequence[_ToolJob], stock: StockMap, settings: PlanSettings,
-                 now: PlanNow | None = None) -> None:
+                 snapshot: PlanSnapshot | None = None) -> None:
         self.jobs, self.stock, self.settings = jobs, stock, settings
         self.acts, self.steps = 0, list[Workingstep]()
-        if now is not None:
-            self.acts, self.steps = now.acts, list(now.steps)
+        if snapshot is not None:
+            self.acts, self.steps = snapshot.acts, list(snapshot.steps)
             made = {s.id: s for s in self.steps}
-            for job, there in zip(jobs, now.tools, strict=True):
-                job.go_on(there, made)
-            stock.go_on(now.stock)  # last, for it is not made anew where the rest does not fit
+            for job, tool in zip(jobs, snapshot.tools, strict=True):
+                job.restore(tool, made)
+            stock.restore(snapshot.stock)  # last: the stock stays unchanged where the rest does not fit
 
-    def now(self) -> PlanNow:
-        """How far it is."""
-        return PlanNow(self.acts, tuple(self.steps), self.stock.now(), tuple(job.now() for job in self.jobs))
+    def snapshot(self) -> PlanSnapshot:
+        """State of the plan."""
+        return PlanSnapshot(self.acts, tuple(self.steps), self.stock.snapshot(),
+                            tuple(job.snapshot() for job in self.jobs))
 
     def to_do(self) -> Iterator[tuple[int, Act]]:
         """All acts in their order, done or not, and how many zones of a band are finished with each."""
         settings = self.settings
         for plane in [*settings.planes, -math.inf]:
-            # a tool takes stock off for those after it too, so it is left out only where none of these has work here
+            # a tool also roughs for those after it, so it is left out only where none of these has work here
             last = max((k for k, job in enumerate(self.jobs) if job.has_work(plane)), default=-1)
             for k, job in enumerate(self.jobs):
                 if k <= last and settings.roughing:
@@ -138,7 +148,7 @@ class _Work:
                     yield 1, partial(job.finish, zone, plane)
                 for zone in job.zones:
                     yield 0, partial(job.again, zone, PASS_SHARE * settings.scallop_height)
-        for job in self.jobs:  # stock that took another tool to get away: worth changing back for what would stay else
+        for job in self.jobs:  # another tool removed the stock in the way: worth a tool change for the rest
             for zone in job.zones:
                 yield 0, partial(job.again, zone, settings.scallop_height)
 
@@ -149,9 +159,9 @@ def _nothing(number: int) -> list[Workingstep]:
 
 
 class _ToolJob:
-    """What one tool does: its layers and the finish of its zones, band by band from the top."""
+    """Work of one tool: its layers and the finish of its zones, band by band from the top."""
 
-    def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, Target], field: TipField, cut: CutData,
+    def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, FinishTarget], field: TipField, cut: CutData,
                  stock: StockMap, settings: PlanSettings, trimmed: Mapping[str, Sequence[Faces]], under: float) -> None:
         self.zones, self.checks, self.field, self.cut, self.stock = zones, checks, field, cut, stock
         self.settings, self.trimmed, self.under = settings, trimmed, under
@@ -173,7 +183,7 @@ class _ToolJob:
             bool(((z[:, 2] >= plane) & (z[:, 2] < top)).any()) for z in (self.checks[a.id].points for a in self.zones))
 
     def layer(self, plane: float, number: int) -> list[Workingstep]:
-        """The layers of a band that ends at a height of contact, mm, and what follows to leave even stock.
+        """The layers of a band that ends at a height of contact, mm, and the cuts that leave even stock.
 
         number : of the first of the workingsteps, of which there are two at most
         """
@@ -198,60 +208,61 @@ class _ToolJob:
         wanted = None if plane == -math.inf and not self.settings.planes else f.above(plane)
         return f.walk(f"S{number:02d}", wanted)
 
-    def again(self, zone: ZoneArea, least: float, number: int) -> list[Workingstep]:
-        """Another go at a zone that has been begun, where more than ``least`` mm is left; number : of the first."""
+    def again(self, zone: ZoneArea, min_left: float, number: int) -> list[Workingstep]:
+        """Another finish of a begun zone, where more than ``min_left`` mm is left; number : of the first."""
         f = self.finishes.get(zone.id)
-        return [] if f is None else f.walk_again(f"S{number:02d}", least)
+        return [] if f is None else f.walk_again(f"S{number:02d}", min_left)
 
-    def now(self) -> ToolNow:
-        """How far it is."""
-        return ToolNow(Ways.of(self.walked.ways), Ways.of(self.depths.ways),
-                       None if self.layers is None else self.layers.now(), tuple(s.id for s in self.layered),
-                       tuple(f.now() for f in self.begun))
+    def snapshot(self) -> ToolSnapshot:
+        """State of the tool."""
+        return ToolSnapshot(PackedLines.of(self.walked.ways), PackedLines.of(self.depths.ways),
+                       None if self.layers is None else self.layers.snapshot(), tuple(s.id for s in self.layered),
+                       tuple(f.snapshot() for f in self.begun))
 
-    def go_on(self, now: ToolNow, steps: Mapping[str, Workingstep]) -> None:
-        """Become what one like this, that had done nothing, had come to; steps : that were made, by id."""
-        for way in now.walked.lines():
+    def restore(self, snapshot: ToolSnapshot, steps: Mapping[str, Workingstep]) -> None:
+        """Take over the state of an interrupted plan, before any work; steps : that it made, by id."""
+        for way in snapshot.walked.lines():
             self.walked.add(way)
-        for way in now.depths.lines():
+        for way in snapshot.depths.lines():
             self.depths.cut(way)
-        self.layered = [steps[s] for s in now.layered]
-        if now.layers is not None:
-            self.layers = self._layers(now.layers)
+        self.layered = [steps[s] for s in snapshot.layered]
+        if snapshot.layers is not None:
+            self.layers = self._layers(snapshot.layers)
         zones = {z.id: z for z in self.zones}
-        for there in now.finishes:
+        for there in snapshot.finishes:
             self.finishes[there.zone] = f = self._finish(zones[there.zone], there)
             f.layers = None if there.layers is None else steps[there.layers]
 
-    def _layers(self, now: LayersNow | None = None) -> _Layers:
-        return _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under, now)
+    def _layers(self, snapshot: LayersSnapshot | None = None) -> _Layers:
+        return _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under, snapshot)
 
-    def _finish(self, zone: ZoneArea, now: FinishNow | None = None) -> Finish:
+    def _finish(self, zone: ZoneArea, snapshot: FinishSnapshot | None = None) -> Finish:
         return Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
-                      self.trimmed.get(zone.id, ()), self.walked, self.depths, now)
+                      self.trimmed.get(zone.id, ()), self.walked, self.depths, snapshot)
 
 
 class _Layers:
-    """The stock above all zones of a tool, taken off in depth layers, some of them at a time."""
+    """The stock above all zones of a tool, removed in depth layers, some of them at a time."""
 
     def __init__(self, zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, depths: Depths, under: float, now: LayersNow | None = None) -> None:
+                 settings: PlanSettings, depths: Depths, under: float,
+                 snapshot: LayersSnapshot | None = None) -> None:
         self.zones, self.field, self.cut, self.stock = zones, field, cut, stock
         self.settings, self.depths = settings, depths
         lat, tool = field.lattice, field.tool
         self.tips = tips = np.vstack([z.tips for z in zones])
         self.allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
-        # without a finish to follow, rims take every wall to size layer by layer, where what is below still holds it
+        # without a finish, rims take every wall to size layer by layer, while the stock below still supports it
         steep = [z.tips for z in zones if z.form is AreaForm.STEEP and settings.finishing]
         self.walls = np.vstack([np.zeros((0, 3)), *steep])
         self.bounded = cut.engaged < UNBOUNDED
-        # the finish of a floor has the whole front in what is left on it
+        # the finish of a floor has the whole front of the cutter in the allowance
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
         bottom, step = float(tips[:, 2].min()) + low, 0.85 * cut.step_down
-        self.top = top = stock.highest if now is None else now.top
-        self.swept, self.above = (top, top) if now is None else (now.swept, now.above)
+        self.top = top = stock.highest if snapshot is None else snapshot.top
+        self.swept, self.above = (top, top) if snapshot is None else (snapshot.swept, snapshot.above)
         self.left: list[tuple[float, NDArray[np.bool_]]] = []
-        if top <= bottom or now is not None and not now.left:
+        if top <= bottom or snapshot is not None and not snapshot.left:
             return
         heights = depth_layers.layer_heights(top, bottom, step)
         also = [f.bottom + low for f in zones if f.form is AreaForm.LEVEL] if self.bounded else []
@@ -259,16 +270,18 @@ class _Layers:
         if also:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
         self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
-        if now is not None:
-            del self.left[:-now.left]
+        if snapshot is not None:
+            del self.left[:-snapshot.left]
 
-    def now(self) -> LayersNow:
-        """How far they are."""
-        return LayersNow(self.top, self.swept, self.above, len(self.left))
+    def snapshot(self) -> LayersSnapshot:
+        """State of the layers."""
+        return LayersSnapshot(self.top, self.swept, self.above, len(self.left))
 
     def down_to(self, lowest: float, number: int) -> list[Workingstep]:
-        """The layers from ``lowest`` mm up that were not walked before, as one workingstep, and where even stock is to
-        stay another of those between them; number : of the first."""
+        """The layers from ``lowest`` mm up that were not cut before, as one workingstep; number : of the first.
+
+        Where even stock is required the cuts between them follow as another workingstep.
+        """
         field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
         linker = self._linker()
         chord = 0.5 * settings.chordal_tolerance
@@ -298,11 +311,11 @@ class _Layers:
         return made + self._step(number + len(made), "semi_finishing", linker)
 
     def _rim_pace(self, depth: float) -> Pace:
-        """Feeds along a wall that is taken to size, so deep, mm: bending the tool no more than a finish may.
+        """Feeds along a wall that is taken to size at a depth, mm: deflecting the tool no more than a finish may.
 
-        What stock does not show is no wider than its lattice can hide, what it shows is wider by that at most, and
-        beside a wall no wider than the allowance. In a slot too narrow for a ring a rim is all there is: there the feed
-        is that of layers.
+        Stock that the lattice hides is no wider than the lattice can hide, stock that it shows is wider by that at
+        most. Beside a wall it is no wider than the allowance. A slot too narrow for a ring has only a rim: there the
+        feed is that of layers.
         """
         cut, tool, hides = self.cut, self.field.tool, SURE_RIM * self.field.lattice.step
         fine = cut.finish or cut
@@ -316,7 +329,7 @@ class _Layers:
         return Pace(min(cut.feed, widest), cut.link_feed, seen, cut.step_down, fine.under(depth, hides).feed)
 
     def _thinner(self) -> CutData:
-        """The cut of what stands between layers: a slot at most, a part of a layer deep."""
+        """The cut of the stock between layers: a slot at most, a part of a layer deep."""
         depth = depth_layers.EVEN * self.cut.step_down
         return self.cut.under(depth, 0.5 * effective_diameter(self.field.tool.diameter, self.field.tool.corner_radius,
                                                               depth))
@@ -328,17 +341,17 @@ class _Layers:
                       cut.engaged)
 
     def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_]) -> None:
-        """Go over the stock that stands above a height, mm, in an area, down to it."""
+        """Cut the stock above a height, mm, in an area, down to it."""
         settings, side, fine = self.settings, 0.8 * self.field.tool.radius, 0.1 * self.field.lattice.step
         if self.bounded:
-            Clearing(linker, z, area, self.allowance, side, settings.climb, settings.either_way, depth_layers.STOCK_WORTH,
-                     fine).walk()
+            Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
+                     depth_layers.STOCK_WORTH, fine).walk()
         for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
 
     def _step(self, number: int, operation: str, linker: Linker) -> list[Workingstep]:
-        """What a linker walked as a workingstep; none where that is nothing."""
+        """The passes of a linker as a workingstep; none without passes."""
         if not linker.passes:
             return []
         step_id, tool, ids = f"S{number:02d}", self.field.tool, " ".join(z.id for z in self.zones)
@@ -348,19 +361,19 @@ class _Layers:
 
 
 def _own(field: TipField, tips: F64, z: float) -> NDArray[np.bool_]:
-    """(ny, nx) bool: where of the tips (n, 3), mm, that are finished, some lie at a height or lower."""
+    """(ny, nx) bool: nodes near tips (n, 3), mm, of finished samples that lie at a height or lower."""
     lat = field.lattice
     mask = lat.mask(tips[tips[:, 2] <= z + 1e-6, :2])
     return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
 
 
 def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:
-    """(ny, nx) bool a layer: where stock is to go down to it.
+    """(ny, nx) bool a layer: where stock is removed down to it.
 
     That is where this tool has something to finish below, and where shank and holder come once the tool is down in
-    any deeper layer: what stands there would meet them.
+    any deeper layer, since stock there would meet them.
 
-    tips    : (n, 3) float64, mm, what is finished; heights : mm, of the layers, descending
+    tips    : (n, 3) float64, mm, of the samples to finish; heights : mm, of the layers, descending
     """
     lat = field.lattice
     out: list[NDArray[np.bool_]] = []

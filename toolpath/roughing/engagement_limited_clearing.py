@@ -1,11 +1,11 @@
-"""A level of stock taken off from the air inwards, so that no more than a given part of the cutter is in it.
+"""A level of stock cleared from the air inwards, with a limit on the engaged angle.
 
-Borders of what is gone (``toolpath.roughing.inward_fronts``) are walked one after the other; each takes a strip of what the one before
-left. They begin along one wall and end along the other, so the tool never goes straight ahead into stock. Where a line
-would put too much of the cutter into it, lines between are walked first. A line begins where the one before began, or
-aslant where that comes back to its beginning; between two the tool goes back in air. Places no way leads to from the
-air are opened by a helix. What is left beside walls where ways end is less than the distance between lines: rings
-(``strategies.layers``) take it.
+Borders of the cleared area (``toolpath.roughing.inward_fronts``) are cut one after the other; each takes a strip of
+what the one before left. They begin along one wall and end along the other, so the tool never goes straight ahead into
+stock. Where a line would exceed the limit, lines between are cut first. A line begins where the one before began, or
+aslant where that returns to its beginning. Between two lines the tool goes back in air. A helix opens places that no
+way leads to from the air. The stock left beside walls where lines end is thinner than the distance between lines; rings
+(``strategies.depth_layers``) remove it. Places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -26,19 +26,20 @@ from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.passes.contours import moves_free
 from toolpath.roughing.inward_fronts import NARROW, Inwards
 from toolpath.stock.engagement import LOOK, SKIN_SHARE, SURE, over_limit
+from toolpath.workingsteps import CutDirection
 
-FINER = 4  # times the distance between lines is halved where too much of the cutter is in stock
+FINER = 4  # halvings of the distance between lines where the engaged angle exceeds the limit
 ASLANT = 2.0  # distances between lines: how far off a line begins on the one before
-BACK = 0.1  # of the radius: how far off the stock the tool goes back
-NEAR = 1.6  # distances between lines: what lies as near on the line before has to be gone first
-WIDE = 0.9  # of the radius: of a helix, at most, so that no core is left
+BACK = 0.1  # radii off the stock at which the tool goes back
+NEAR = 1.6  # distances between lines: a piece of the line before that lies this near comes first
+WIDE = 0.9  # radii: largest helix, so that no core is left
 TURN = math.radians(10.0)  # between points of a helix
 ABOVE = 0.1  # mm over what stands, where a helix begins
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A border of what is gone when the air has got ``when`` mm far, and which pieces have to be gone before."""
+    """A border of the cleared area when the front is ``when`` mm from the air, and the pieces that come before it."""
 
     line: Line
     when: float
@@ -47,16 +48,16 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False)
 class Clearing:
-    """One level to be taken off.
+    """One level to be cleared.
 
-    linker    : Linker; its limit of the engaged angle is kept
+    linker    : Linker; its limit of the engaged angle holds
     z         : mm, tip height of the level
-    area      : (ny, nx) bool on the lattice, where stock is to go
+    area      : (ny, nx) bool on the lattice, where stock is removed
     allowance : mm left beside walls
     side_step : mm between lines
-    climb     : stock on the right, else on the left; either : lines may be walked both ways
-    worth     : mm of stock over the cutter that makes a place worth a pass
-    thin      : mm, lines are thinned by
+    cut_direction : CutDirection of the lines
+    worth     : mm of stock over the cutter that justify a pass
+    thin      : mm, tolerance of thinning
     """
 
     linker: Linker
@@ -64,13 +65,12 @@ class Clearing:
     area: NDArray[np.bool_]
     allowance: float
     side_step: float
-    climb: bool
-    either: bool
+    cut_direction: CutDirection
     worth: float
     thin: float
 
     def walk(self) -> None:
-        """Take off what is reached from the air, then what a helix opens."""
+        """Clear the area that is reached from the air, then what helices open."""
         for _ in range(2):
             ways = Inwards.over(self.linker.field, self.linker.stock, self.z, self.area, self.allowance, self.worth)
             if ways is None:
@@ -92,18 +92,18 @@ class Clearing:
         if not (math.isfinite(over) and over > self.worth):
             return False
         round_way = 2.0 * math.pi * radius
-        # a turn takes no more than is counted as none, for it has the whole cutter in it
+        # a turn takes no more than a skin, which counts as no engagement, for it has the whole cutter in stock
         slope = min(math.tan(self.linker.motions.ramp_angle) * RAMP_SHARE,
                     SURE * SKIN_SHARE * self._tool.radius / round_way)
         turns = (over + ABOVE) / (round_way * slope)
         turn = np.arange(0.0, 2.0 * math.pi * (turns + 1.0) + TURN, TURN)
         height = np.maximum(over + ABOVE - radius * slope * turn, 0.0)
-        sense = -1.0 if self.climb else 1.0
+        sense = -1.0 if self.cut_direction.climbs else 1.0
         helix = middle + np.column_stack([radius * np.cos(turn), -sense * radius * np.sin(turn), height])
         return self.linker.add(Line(helix, False), self.thin, eased=True)
 
     def _inwards(self, ways: Inwards) -> None:
-        """Walk the borders, each when those before it are gone: one beside the last where there is any, the nearest."""
+        """Cut the borders, each after those before it: one beside the last where there is any, else the nearest."""
         pieces = self._pieces(ways)
         followers: list[list[int]] = [[] for _ in pieces]
         waits = [len(p.after) for p in pieces]
@@ -143,11 +143,12 @@ class Clearing:
 
     def _in_stock(self, line: Line) -> list[Line]:
         r = self._tool.radius
-        wanted = self.linker.stock.overlap(line.points, self._tool, least=0.0) > self.worth
+        wanted = self.linker.stock.overlap(line.points, self._tool, lower_bound=0.0) > self.worth
         return pieces_where(line, wanted, 0.6 * r, 3.0 * r)
 
     def _piece(self, ways: Inwards, line: Line, when: float, step: float, finer: int) -> None:
-        """Walk a line, and before it lines between it and what is gone where too much of the cutter would be in stock.
+        """Cut a line, and before it lines between it and the cleared area where the engaged angle would exceed the
+        limit.
 
         when : mm, of the line; step : mm, since the one before
         """
@@ -166,9 +167,9 @@ class Clearing:
         self.linker.add(line, self.thin)
 
     def _begun(self, ways: Inwards, line: Line, gone: float) -> Line:
-        """A line in the direction it is walked, from where the border of what is ``gone`` begins or passes by."""
-        here, flip = self.linker.at, not self.climb
-        if self.either and here is not None:
+        """A line in its cut direction, from where the border at ``gone`` begins or passes by."""
+        here, flip = self.linker.at, not self.cut_direction.climbs
+        if self.cut_direction.both_ways and here is not None:
             ends = np.hypot(*(line.points[[0, -1], :2] - here[:2]).T)
             flip = bool(ends[1] < ends[0])
         points = line.points[::-1] if flip else line.points
@@ -180,12 +181,12 @@ class Clearing:
             k = 0 if here is None else int(np.argmin(np.hypot(*(points[:, :2] - here[:2]).T)))
             points = np.vstack([points[k:], points[:k + 1]])
             along = np.cumsum(np.hypot(*np.diff(points[::-1, :2], axis=0).T))
-            asked = points[-2 - int(np.searchsorted(along, ASLANT * self.side_step).clip(0, len(along) - 1))]
+            start = points[-2 - int(np.searchsorted(along, ASLANT * self.side_step).clip(0, len(along) - 1))]
             ends = np.vstack(before)
         else:
-            asked = points[0]
+            start = points[0]
             ends = np.vstack([b[[-1 if flip else 0]] for b in before])
-        off = np.hypot(*(ends[:, :2] - asked[:2]).T)
+        off = np.hypot(*(ends[:, :2] - start[:2]).T)
         k = int(np.argmin(off))
         led = np.vstack([ends[k], points])
         if off[k] > ASLANT * self.side_step or not moves_free(ways.field, led[:2]).all():

@@ -1,13 +1,14 @@
-"""From the air inwards: when each place of a level is gone if the stock is taken off by discs that fit between walls.
+"""Fronts from the air inwards: when each place of a level is cleared by discs that fit between walls.
 
 Notation
     D(p)  mm, length of the shortest free way from the air to a tip place p
-    q(p)  mm, radius of the disc of tip places round p that is taken with it: half the tool's radius, less near walls
-    when  mm, min over the discs that hold a place of D + q
+    q(p)  mm, radius of the disc of tip places round p that is cleared with it: half the tool's radius, less near walls
+    when  mm, least D + q over the discs that hold a place
 
-Borders of {when < t} move on by no more than the growth of t along the ways, as in trochoidal milling: in a channel
-they are arcs from wall to wall, not lines along it. ``D`` solves |grad D| = 1 on the lattice (``kernels.march``), to
-first order; lines between are put where that is too coarse (``toolpath.roughing.engagement_limited_clearing``).
+Fronts {when < t} advance by no more than the growth of t along the ways, as in trochoidal milling: in a channel they
+are arcs from wall to wall, not lines along it. ``D`` solves |grad D| = 1 on the lattice (``kernels.march``) [Zhao2005],
+to first order. Where that is too coarse ``toolpath.roughing.engagement_limited_clearing`` adds lines between.
+Places are tips in mm, access frame.
 """
 
 from __future__ import annotations
@@ -37,11 +38,12 @@ NEVER = -1e9  # mm
 
 @dataclass(frozen=True, eq=False)
 class Inwards:
-    """When places at one tip height are gone.
+    """When places at one tip height are cleared.
 
     z      : mm
-    when   : (ny, nx) float64, mm of way from the air; inf where the tool does not get, or no disc does
-    wanted : (ny, nx) bool, where the tool is to be; known : where a way leads from the air
+    when   : (ny, nx) float64, mm of way from the air; inf where neither the tool nor a disc gets
+    wanted : (ny, nx) bool, where the tool has to come
+    known  : (ny, nx) bool, where a way leads from the air
     corner : mm, x and y of the first node
     """
 
@@ -56,9 +58,12 @@ class Inwards:
     @classmethod
     def over(cls, field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], allowance: float,
              worth: float) -> Inwards | None:
-        """That at tip height z, mm, over an area (ny, nx) and on the way to it; None where nothing stands.
+        """The fronts over an area and on the way to it; None where nothing stands [Zhao2005].
 
-        allowance : mm left beside walls; worth : mm of stock above z that is any
+        z         : mm, tip height
+        area      : (ny, nx) bool, on the lattice of the field
+        allowance : mm left beside walls
+        worth     : mm of stock above z that count
         """
         lat, r = field.lattice, field.tool.radius
         window = dilated(area, (4.0 * r + AROUND) / lat.step)
@@ -86,11 +91,11 @@ class Inwards:
 
     @property
     def last(self) -> float:
-        """When the last place is gone, mm; -inf where the tool gets nowhere from the air."""
+        """When the last place is cleared, mm; -inf where the tool gets nowhere from the air."""
         return float(self.when[np.isfinite(self.when)].max(initial=-math.inf))
 
     def lines(self, when: float) -> list[Line]:
-        """Borders of what is gone at a time, mm, stock on their right; they end where the tool is not free."""
+        """Fronts at a distance from the air, mm, stock on their right; they end where the tool is not free."""
         if when not in self._lines:
             known = np.isfinite(self.when)
             cells = np.zeros_like(known)
@@ -100,7 +105,8 @@ class Inwards:
         return self._lines[when]
 
     def shut(self) -> list[tuple[F64, float]]:
-        """Places no way leads to from the air: of each its widest spot (3,), and the room there, mm."""
+        """Areas that no way leads to from the air: the widest spot of each, (3,) float64, mm, access frame, and its
+        room, mm."""
         labels, count = ndimage.label(np.logical_and(self.wanted, ~self.known), np.ones((3, 3)))
         if not count:
             return []
@@ -126,11 +132,13 @@ def _way_to(wanted: NDArray[np.bool_], far: F64) -> NDArray[np.bool_]:
     return out
 
 
-def _grown(far: F64, air: NDArray[np.bool_], free: NDArray[np.bool_], least: float, most: float, step: float) -> F64:
-    """When places are gone that discs cover, (ny, nx) mm, by how far their middles are from the air.
+def _grown(far: F64, air: NDArray[np.bool_], free: NDArray[np.bool_], min_disc: float, max_disc: float,
+           step: float) -> F64:
+    """When places that discs cover are cleared, (ny, nx) mm, from the distance of their centres from the air.
 
-    far : (ny, nx) mm; least, most : mm, radius of a disc. One less than ``most`` stands on the ridge between two walls:
-    where the room beside it does not grow as fast as the way to a wall.
+    far              : (ny, nx) mm
+    min_disc, max_disc : mm, radius of a disc. One smaller than ``max_disc`` stands on the ridge between two walls:
+                         where the room beside it grows more slowly than the distance to a wall
     """
     room = ndimage.distance_transform_edt(np.pad(free, 1, mode="edge"))[1:-1, 1:-1] * step
     beside = np.pad(room, 1, mode="edge")
@@ -140,9 +148,9 @@ def _grown(far: F64, air: NDArray[np.bool_], free: NDArray[np.bool_], least: flo
             if di or dj:
                 there = beside[1 + di:beside.shape[0] - 1 + di, 1 + dj:beside.shape[1] - 1 + dj]
                 np.maximum(steepest, (there - room) / (step * math.hypot(di, dj)), out=steepest)
-    radius = np.minimum(room, most)
+    radius = np.minimum(room, max_disc)
     within = ndimage.distance_transform_edt(np.pad(air, 1, constant_values=True))[1:-1, 1:-1] * step
-    fits = free & np.isfinite(far) & ((room >= most) | ((steepest < RIDGE) & (room >= least)))
+    fits = free & np.isfinite(far) & ((room >= max_disc) | ((steepest < RIDGE) & (room >= min_disc)))
     when = np.where(fits, np.where(air, -within, far) + radius, np.inf)
     out = np.full_like(when, np.inf)
     spread(when, radius, step, out)

@@ -1,7 +1,8 @@
-"""What passes leave at samples of a zone, so that the planner can put passes in where it is too much.
+"""Residual material that passes leave at samples of a zone, so that the planner can add passes.
 
-Upright tools are measured by ``kernels.residual``, which knows level planes and walls and stops at what is cut;
-leaning ones by ``kernels.leaning``: plain signed distance to the cutting part, so that a gouge has its depth.
+Upright tools are measured by ``kernels.residual``, which knows level planes and walls and stops at cut material. Tilted
+ones are measured by ``kernels.leaning``: the plain signed distance to the cutting part, so that a gouge has its depth.
+Arrays are float64. Places are in mm, normals and axes dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -18,46 +19,50 @@ from toolpath.kernels.leaning import lower_leaning
 from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
 
 CELL = 0.6  # mm
-LEAST_MARGIN = 0.02  # mm
-UNTOUCHED = 1e3  # mm, residual of a sample no pass came near
-UNIT = 1e-6  # what the length of an axis may be off 1
+MIN_MARGIN = 0.02  # mm
+UNTOUCHED = 1e3  # mm, residual of a sample that no pass came near
+UNIT = 1e-6  # error of the length of an axis
 
 
 class ResidualMap:
     """Residual material at samples, lowered pass by pass.
 
-    points   : (n, 3) float64, mm; normals : (n, 3) float64 unit
-    margin   : mm, a cutter farther than this counts as not having come near
-    residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one went in
+    points   : (n, 3) float64, mm, access frame
+    normals  : (n, 3) float64, unit
+    margin   : mm, a cutter farther away does not count
+    residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one entered
     """
 
-    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = LEAST_MARGIN) -> None:
+    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = MIN_MARGIN) -> None:
         self.points = np.ascontiguousarray(points)
         upright = np.abs(normals[:, 2]) < 0.5
         self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
-        self.cell, self.margin = cell, max(margin, LEAST_MARGIN)
+        self.cell, self.margin = cell, max(margin, MIN_MARGIN)
         self.origin, self.ncx, self.ncy, self.starts, self.items = _binned(points, cell)
 
     def copied(self) -> ResidualMap:
-        """The same, to be lowered on its own."""
+        """A copy with a residual of its own."""
         out = copy.copy(self)
         out.residual = self.residual.copy()
         return out
 
     def cut(self, path: F64, tool: ToolBody) -> None:
-        """Lower the residual by one polyline of tips (m, 3), mm."""
+        """Lower the residual by one polyline of tips.
+
+        path : (m, 3) float64, mm, access frame
+        """
         lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
               self.ncy, np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.margin,
               self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
-        """Lower the residual by poses of a leaning tool: to the least signed distance, below 0 where it gouges.
+        """Lower the residual by poses of a tilted tool: to the least signed distance, below 0 where it gouges.
 
-        tips : (m, 3) float64, mm; axes : (m, 3) float64, unit, tip to spindle, as for ``leaning_depths``
+        tips, axes : (m, 3) float64, mm and unit, tip to spindle, access frame, as for ``leaning_depths``
 
-        Samples that nothing comes near by ``margin`` keep theirs, and so do those that would be lowered by no more
-        than 1e-6 mm. ``level`` is not asked: a leaning end has no plane of its own.
+        Samples farther than ``margin`` from the tool keep their residual, and so do those that would be lowered by no
+        more than 1e-6 mm. ``level`` does not count: a tilted end has no plane of its own.
 
         Raises
         ------
@@ -73,14 +78,14 @@ class ResidualMap:
 def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: float) -> F64:
     """Least signed distance from points to the cutting part of a tool over all poses of a pass.
 
-    points : (n, 3) float64, mm
-    tips   : (m, 3) float64, mm; one alone is a tool that stands
-    axes   : (m, 3) float64, unit, tip to spindle, neighbours less than a right angle apart
-    tool   : its cutting part counts: nose, and cylinder up to the end of the flutes, where a disc closes it
-    margin : mm
+    points     : (n, 3) float64, mm, access frame
+    tips, axes : (m, 3) float64, mm and unit, tip to spindle; neighbouring axes less than a right angle apart; a single
+                 pose is a tool that stands still
+    tool       : its cutting part counts: nose, and cylinder up to the end of the flutes, where a disc closes it
+    margin     : mm
 
-    Returns (n,) float64, mm: below 0 as deep as a point lay under the surface of the cutting part, the disc at the end
-    of the flutes with it; UNTOUCHED where that is more than ``margin``.
+    Returns (n,) float64, mm: below 0 by the depth of a point under the surface of the cutting part, the disc at the end
+    of the flutes included; UNTOUCHED beyond ``margin``.
 
     Raises
     ------
@@ -89,10 +94,10 @@ def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: fl
 
     Notes
     -----
-    From pose to pose the tip goes straight and the axis turns on the great circle at an even rate, by sine and cosine:
-    no error comes of that. (Chords of the turn made unit lag and lead by 0.016 theta^3 rad, 0.3 um at the end of a
-    20 mm tool that turns 0.1 rad.) A result is never too low and at most 1e-6 mm too high, whatever the turn, by the
-    bound in ``kernels.leaning``.
+    From pose to pose the tip goes straight and the axis turns on the great circle at an even rate, by sine and cosine,
+    without an error [Shoemake1985]. (Chords of the turn made unit lag and lead by 0.016 theta^3 rad, 0.3 um at the end
+    of a 20 mm tool that turns 0.1 rad.) A result is never too low and at most 1e-6 mm too high, by the bound in
+    ``kernels.leaning``.
     """
     points = np.ascontiguousarray(points, float)
     tips, axes = _poses(tips, axes)
@@ -112,9 +117,9 @@ def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
         at = "({})".format(", ".join(f"{x:.3f}" for x in tips[k]))
-        raise GeometryError(f"the tool axis at {at} is not unit, or a right angle or more from the one before",
+        raise GeometryError(f"the tool axis at {at} is not a unit vector, or turns 90 degrees or more in one move",
                             code="bad_axis", subjects=(at,), measured=None, limit=None,
-                            remedy="give axes of length 1 and poses between which they turn less")
+                            remedy="give axes of length 1 and poses close enough that axes turn less")
     axes = axes / size[:, None]
     return (np.repeat(tips, 2, axis=0), np.repeat(axes, 2, axis=0)) if len(tips) == 1 else (tips, axes)
 

@@ -1,7 +1,8 @@
-"""The planner's picture of the stock: a height over the plan, lowered pass by pass.
+"""The planner's model of the stock: a height over the plan, lowered pass by pass.
 
-It decides where something is left to cut and where a tool may come down in air. It errs only in time, never in
-safety: the proof reads the finished program with a model of its own (``verify``).
+It shows where stock is left to cut and where a tool may come down in air. Its errors cost time, never safety: the proof
+reads the finished program with a model of its own (``verify``). Arrays are float64. Places are in mm, axes
+dimensionless unit vectors, in the access frame.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ from zones.lattice import Lattice
 from zones.reach.assembly import Disc
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
-POOLED = 12  # nodes a side of the squares whose highest stock is kept
+POOLED = 12  # nodes a side of the squares whose highest stock is stored
 AIR_TOLERANCE = 0.01  # mm
-UPRIGHT = 1e-12  # of the normal of a face of a block
-LEANS = 1e-9  # of the axis of a bar: by less it stands, or lies
+UPRIGHT = 1e-12  # Z of the normal of an upright face of a block, at most
+LEANS = 1e-9  # tilt of the axis of a bar: with less it stands upright, or lies level
 ON_EDGE = 1e-9  # mm
-APART, MOST_POSED = 2.0, 0.1  # lattice steps, or of the radius, between poses that are taken off
+APART, MAX_POSED = 2.0, 0.1  # lattice steps, or radii, between poses that are removed
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
-SKIN = 0.08  # of the tool diameter, the most a descent steeper than the ramp may take off with the end of the tool
+SKIN = 0.08  # diameters: thickest stock that the end of the tool may take in a descent steeper than the ramp
 
 
 Ceilings = tuple[F64, NDArray[np.int64]]
@@ -45,9 +46,9 @@ class StockMap:
 
     lattice : Lattice
     top     : (ny, nx) float64, mm, height at the nodes; -inf where there is none
-    cover   : (ny, nx) float64, mm, no lower than anything in the cell round a node: what is thinner than a cell
-              is in it too. Left out, it is the highest of a node and its neighbours
-    part    : (ny, nx) float64, mm, no lower than the part in the cell; -inf everywhere where left out
+    cover   : (ny, nx) float64, mm, upper bound of everything in the cell round a node, also of stock thinner than a
+              cell; where None, the highest of a node and its neighbours
+    part    : (ny, nx) float64, mm, upper bound of the part in the cell; -inf everywhere where None
     """
 
     def __init__(self, lattice: Lattice, top: F64, cover: F64 | None = None, part: F64 | None = None) -> None:
@@ -63,8 +64,9 @@ class StockMap:
                part: TriangleTree | None = None) -> StockMap:
         """Stock that stands ``offset`` mm off a mesh everywhere: the envelope of balls on its surface.
 
-        tree, bounds : TriangleTree and (2, 3) float64, mm, of the part, or of a blank that holds it
-        part         : TriangleTree of the part where the mesh is another
+        tree   : TriangleTree of the part, or of a blank that holds it
+        bounds : (2, 3) float64, mm, access frame, of the same
+        part   : TriangleTree of the part where ``tree`` is a blank
         """
         lat = Lattice.over(bounds, offset + 3 * step, step)
         r, half = max(offset, 1e-3), HALF_DIAGONAL * step
@@ -75,15 +77,18 @@ class StockMap:
 
     @classmethod
     def box(cls, tree: TriangleTree, lower: F64, upper: F64, step: float) -> StockMap:
-        """A block between two corners (3,), mm, round the part."""
+        """A block round the part between two corners.
+
+        lower, upper : (3,) float64, mm, access frame
+        """
         return cls.block(tree, np.array([lower, upper]), np.eye(3), step)
 
     @classmethod
     def block(cls, tree: TriangleTree, box: F64, rotation: F64, step: float) -> StockMap:
-        """A block round the part, however it stands.
+        """A block round the part in any orientation.
 
         box      : (2, 3) float64, mm, lower and upper corner in a frame along its edges
-        rotation : (3, 3) float64, from there into the frame of the part
+        rotation : (3, 3) float64, dimensionless, from there into the frame of the part
         """
         corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
         lat = Lattice.over(np.array([corners.min(axis=0), corners.max(axis=0)]), 3 * step, step)
@@ -110,13 +115,13 @@ class StockMap:
 
     @classmethod
     def cylinder(cls, tree: TriangleTree, radius: float, ends: F64, step: float) -> StockMap:
-        """A round bar round the part, however it stands or lies.
+        """A round bar round the part in any orientation.
 
-        radius : float, mm; ends : (2, 3) float64, mm, middles of its two flat ends, in the frame of the part
+        radius : float, mm
+        ends   : (2, 3) float64, mm, frame of the part, centres of its two flat ends
 
-        Exact at the nodes. No place of a cell is higher than ``cover``: of the wall and of the upper end that holds at
-        the corner of the cell where each is highest, and nothing stands in a cell whose rectangle along the bar misses
-        the bar's outline.
+        Exact at the nodes. No place of a cell is higher than ``cover``: wall and upper end are bounded at the corner of
+        the cell where each is highest. Nothing stands in a cell whose rectangle along the bar misses the bar's outline.
         """
         low, high = ends if ends[1][2] >= ends[0][2] else ends[::-1]
         length = float(np.linalg.norm(high - low))
@@ -146,53 +151,55 @@ class StockMap:
         return cls(lat, top, np.maximum(cover, top), _in_cells(tree, lat))
 
     def copied(self) -> StockMap:
-        """The same stock, to be cut on its own."""
+        """A copy to be cut on its own."""
         out = copy.copy(self)
         out.top, out.cover = self.top.copy(), self.cover.copy()
         out._pooled, out._covered = self._pooled.copy(), self._covered.copy()
         return out
 
     def become(self, other: StockMap) -> None:
-        """Take over what a copy of this has come to."""
+        """Takes over the stock of a copy."""
         self.top, self.cover, self._ceilings = other.top, other.cover, other._ceilings
         self._pooled, self._covered = other._pooled, other._covered
 
-    def now(self) -> StockNow:
-        """What is left, to go on with another time; as views where nothing else will do."""
+    def snapshot(self) -> StockSnapshot:
+        """State of the stock, to continue from later; views of the arrays where possible."""
         if self._others is None:
-            return StockNow(self.top, self.cover, None, None)
+            return StockSnapshot(self.top, self.cover, None, None)
         cut = np.flatnonzero(self._others.known != [self.cover, self.top])
-        return StockNow(self.top, self.cover, cut, self._others.known.ravel()[cut])
+        return StockSnapshot(self.top, self.cover, cut, self._others.known.ravel()[cut])
 
-    def go_on(self, now: StockNow) -> None:
-        """Become what a map like this, cut so far by none, was left as.
+    def restore(self, snapshot: StockSnapshot) -> None:
+        """Take over the stock of a checkpoint, before any cut.
 
         Raises
         ------
         ValueError
-            That was no map like this.
+            The snapshot belongs to another map.
         """
         shape, hollows = self.top.shape, self._others is not None
-        if now.top.shape != shape or now.cover.shape != shape or hollows != (now.cut is not None):
-            raise ValueError("the stock that is kept is not of this lattice")
+        if snapshot.top.shape != shape or snapshot.cover.shape != shape or hollows != (snapshot.cut is not None):
+            raise ValueError("the stock of the checkpoint is not of this lattice")
         if self._others is not None:
-            known = np.array([now.cover, now.top])
-            known.ravel()[now.cut] = now.settled
+            known = np.array([snapshot.cover, snapshot.top])
+            known.ravel()[snapshot.cut] = snapshot.settled
             self._others.known = known
-        self.top, self.cover, self._ceilings = now.top.copy(), now.cover.copy(), None
+        self.top, self.cover, self._ceilings = snapshot.top.copy(), snapshot.cover.copy(), None
         self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)
 
     def left_by(self, others: Sequence[tuple[StockMap, F64]], lowest: float) -> None:
-        """Lower the stock to what other maps of it, seen along other axes, have left.
+        """Lower the stock to what maps of it along other axes have left.
 
-        others : StockMaps, each with the rotation (3, 3) from the frame of this one into its own
-        lowest : mm, below which the blank has nothing in this frame. The part may begin higher: a corner of the blank
-                 that stands lower than that is still in the way of tools along other axes
+        others : StockMaps, each with the rotation (3, 3) float64 from the frame of this one into its own
+        lowest : mm, lower end of the blank in this frame. The part may begin higher: a lower corner of the blank still
+                 stands in the way of tools along other axes
 
+        Notes
+        -----
         A place is gone where it lies above one of the others. ``cover`` stays a bound: another's cover counts as far
-        round a place as a cell reaches, and the way to the next place asked. ``top`` is lowered by theirs, node by
-        node, so a wall they have finished shows no more than half a cell of stock. A hollow under what is left counts
-        as stock until that is cut (``settle``).
+        round a place as a cell reaches, and to the next place compared. ``top`` is lowered by theirs, node by node, so
+        a wall that they have finished shows no more than half a cell of stock. A hollow under remaining stock counts as
+        stock until that is cut (``settle``).
         """
         if not others:
             return
@@ -201,9 +208,9 @@ class StockMap:
         self._pooled, self._covered = _pooled(self.top), _pooled(self.cover)
 
     def settle(self, last: bool = False) -> None:
-        """Lower what was cut since the last time into the hollows that lie under it; see ``left_by``.
+        """Lower stock that was cut since the last call into the hollows under it; see ``left_by``.
 
-        last : nothing is cut any more, and what the other maps say is let go
+        last : no more cuts follow, and the other maps are released
         """
         if self._others is not None:
             self._others.sink(self.top, self.cover, self.lattice)
@@ -211,19 +218,26 @@ class StockMap:
             self._others = None if last else self._others
 
     def cut(self, points: F64, tool: ToolBody) -> None:
-        """Take away what the cutting part sweeps along a polyline of tips (n, 3), mm."""
+        """Remove the volume that the cutting part sweeps along a polyline of tips.
+
+        points : (n, 3) float64, mm, access frame
+        """
         lat, self._ceilings = self.lattice, None
         stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
               tool.corner_radius)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
-        """Take away what a leaning tool has cut along poses, tips (n, 3) mm and axes (n, 3) unit.
+        """Remove the volume that a tilted tool cuts along poses.
 
-        Of its cutting part cylinders that lie inside, and the whole of a ball where flutes are on all of it that is
-        seen from below, at poses a few lattice steps apart: neither map falls too low.
+        tips, axes : (n, 3) float64, mm and unit, access frame
+
+        Notes
+        -----
+        Cylinders inside the cutting part, and the whole of a ball where flutes cover all of it that is seen from below,
+        at poses a few lattice steps apart: neither map falls too low.
         """
         lat, self._ceilings = self.lattice, None
-        spacing = max(APART * lat.step, MOST_POSED * tool.radius)
+        spacing = max(APART * lat.step, MAX_POSED * tool.radius)
         tips, axes = between(tips, axes, places_along(tips, axes, tool.flute_length, spacing))
         r, high = tool.corner_radius, tool.flute_length
         bent = ROUND if r > 0.0 else (0.5 * np.pi,)
@@ -240,10 +254,11 @@ class StockMap:
                 stamp_balls(heights, lat.x0, lat.y0, lat.step, centres, r, shrink)
 
     def stands_in(self, tips: F64, axes: F64, flank: Shell, bodies: Shell) -> NDArray[np.bool_]:
-        """(n,) bool: poses, tips (n, 3) mm and axes (n, 3) unit, at which stock stands in a leaning tool.
+        """Whether stock stands in a tilted tool at poses, (n,) bool.
 
-        flank  : of its cutting part: in stock where that is higher at the nearest node, the part counted
-        bodies : of neck, shank and holder: in stock where it is also higher than the part
+        tips, axes : (n, 3) float64, mm and unit, access frame
+        flank      : Shell of its cutting part, in stock where that is higher at the nearest node, the part included
+        bodies     : Shell of neck, shank and holder, in stock where that is also higher than the part
         """
         out, lat = np.zeros(len(tips), np.bool_), self.lattice
         first = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
@@ -256,48 +271,58 @@ class StockMap:
                       shell.levels, out)
         return out
 
-    def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8, *, least: float = -np.inf) -> F64:
-        """(n,) float64, mm: how far stock stands above the cutter's bottom at tips (n, 3); <= 0 is air.
+    def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8, *, lower_bound: float = -np.inf) -> F64:
+        """Height of stock above the cutter's bottom at tips, (n,) float64, mm; <= 0 is air.
 
-        rim   : lattice steps added to the radius looked at; -0.8 overlooks the walls a cutter touches, 0.7 sees
-                everything that may be there
-        least : mm, what less than that comes out as: who asks only for stock is told sooner with 0
+        tips        : (n, 3) float64, mm, access frame
+        rim         : lattice steps added to the radius; -0.8 leaves out the walls that a cutter touches, 0.7 includes
+                      everything that may be there
+        lower_bound : mm, smaller results come out as this; 0 is faster where only stock matters
         """
         out = np.empty(len(tips))
         lat = self.lattice
         overlaps(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
-                 tool.corner_radius, rim * lat.step, 0.0, least, out)
+                 tool.corner_radius, rim * lat.step, 0.0, lower_bound, out)
         return out
 
-    def under_end(self, tips: F64, tool: ToolBody, *, least: float = -np.inf) -> F64:
-        """(n,) float64, mm: the most that may stand under the end of the cutter at tips (n, 3), slivers included.
+    def under_end(self, tips: F64, tool: ToolBody, *, lower_bound: float = -np.inf) -> F64:
+        """Upper bound of the stock under the end of the cutter at tips, slivers included, (n,) float64, mm.
 
-        The end is what cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its
-        radius. See ``cover``; least as in ``overlap``.
+        tips        : (n, 3) float64, mm, access frame
+        lower_bound : mm, as in ``overlap``
+
+        The end cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its radius. See
+        ``cover``.
         """
         reach = tool.radius - 0.5 * tool.corner_radius
         out, lat = np.empty(len(tips)), self.lattice
         half = HALF_DIAGONAL * lat.step
         overlaps(self.cover, self._covered, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
-                 tool.corner_radius, reach + half - tool.radius, half, least, out)
+                 tool.corner_radius, reach + half - tool.radius, half, lower_bound, out)
         return out
 
     def above(self, z: float) -> F64:
-        """(n, 2) float64, mm: nodes where more than the part stands above height z."""
+        """Nodes where more than the part stands above height z, (n, 2) float64, mm, access frame."""
         iy, ix = np.nonzero(self.top > np.maximum(self.part, z))
         return np.column_stack([self.lattice.x0 + self.lattice.step * ix, self.lattice.y0 + self.lattice.step * iy])
 
     def standing(self, tips: F64, tool: ToolBody) -> F64:
-        """(n,) float64, mm: how far stock that is not beside a wall may stand above tips (n, 3) within the cutter."""
+        """Upper bound of the height of stock, not beside a wall, above tips within the cutter, (n,) float64, mm.
+
+        tips : (n, 3) float64, mm, access frame
+        """
         out, lat = np.empty(len(tips)), self.lattice
         standing(self.cover, self.part, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
                  HALF_DIAGONAL * lat.step, out)
         return out
 
     def meets_bodies(self, tips: F64, bodies: Sequence[Disc]) -> NDArray[np.bool_]:
-        """(n,) bool: at tips (n, 3), mm, stock would be in shank or holder, given as cylinders with their clearance.
+        """Whether stock would be in shank or holder at tips, (n,) bool.
 
-        Whatever cell it stands in: the radius is half a cell diagonal greater.
+        tips   : (n, 3) float64, mm, access frame
+        bodies : cylinders with their clearance
+
+        The radius is half a cell diagonal greater, so that it holds wherever stock stands in its cell.
         """
         out = np.zeros(len(tips), np.bool_)
         if not len(tips):
@@ -312,14 +337,16 @@ class StockMap:
         return out
 
     def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:
-        """(n,) bool: at tips (n, 3), mm, the tool may come down from above.
+        """Whether the tool may come down from above at tips, (n,) bool.
 
-        The cutting part touches nothing that the nodes show, and with its end takes no more than a skin of what
-        may stand between them.
+        tips : (n, 3) float64, mm, access frame
+
+        The cutting part touches no stock at the nodes, and its end takes no more than a skin of what may stand between
+        them.
         """
-        air = self.overlap(tips, tool, SURE_RIM, least=0.0) <= AIR_TOLERANCE
+        air = self.overlap(tips, tool, SURE_RIM, lower_bound=0.0) <= AIR_TOLERANCE
         if air.any():
-            air[air] = self.under_end(tips[air], tool, least=0.0) <= SKIN * tool.diameter
+            air[air] = self.under_end(tips[air], tool, lower_bound=0.0) <= SKIN * tool.diameter
         return air
 
     @property
@@ -329,10 +356,11 @@ class StockMap:
 
 
 class _Others:
-    """What maps of the same stock along other axes say; taken as they are when it is made.
+    """Maps of the same stock along other axes, in their state when this is made.
 
-    turns, frames : (k, 3, 3) and (k, 3), as ``sink`` takes them; lowest : mm, where ways down end
-    said          : for ``cover`` and for ``top``, what the others say, (k, ny, nx) mm, and the rise
+    turns, frames : (k, 3, 3) and (k, 3), as ``sink`` takes them
+    lowest        : mm, where ways down end
+    said          : for ``cover`` and for ``top``, the heights of the others, (k, ny, nx) mm, and the rise
     """
 
     def __init__(self, turns: F64, frames: F64, lowest: float, said: Sequence[tuple[F64, float]]) -> None:
@@ -404,11 +432,13 @@ def _pooled(top: F64) -> F64:
 
 
 @dataclass(frozen=True, eq=False)
-class StockNow:
-    """Heights of a ``StockMap``, (ny, nx) mm each.
+class StockSnapshot:
+    """State of a ``StockMap``.
 
-    cut, settled : (k,) int64, where ``cover`` and then ``top``, row by row, are not what they were when they were last
-                   settled, and (k,) mm, what that was; None where there are no hollows to settle into
+    top, cover   : (ny, nx) float64, mm
+    cut          : (k,) int64, index of the heights of ``cover`` and then ``top``, row by row, that changed since they
+                   were last settled; None without hollows to settle into
+    settled      : (k,) float64, mm, those heights when they were settled
     """
 
     top: F64

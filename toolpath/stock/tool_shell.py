@@ -1,7 +1,7 @@
-"""The shell of a tool: places on its outside, by which it is held against stock that is a height over the plan.
+"""The shell of a tool: places on its outside, compared with stock that is a height over the plan.
 
-Stock stands under its height without a gap, and no tool axis points down. So stock that is anywhere in a tool is also
-where the vertical line there leaves the tool below: on its shell. Places inside need not be asked.
+Stock stands under its height without a gap, and no tool axis points down. So stock anywhere in a tool is also where the
+vertical line there leaves the tool below: on its shell. Places inside need no check.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from toolpath.kernels.shell import BRANCH, LEAF
 from zones.reach.assembly import Clearances, Disc
 
 BITS = 8  # of each coordinate on the curve along which places are put in boxes
-KEPT = 48  # shells: of a tool as it is and a bit wider, for what may stand at its flank and under its end
+KEPT = 48  # shells: of a tool as it is and a little wider, for stock at its flank and under its end
 BODY_STEPS = 2.0  # lattice steps between places of neck, shank and holder; of the cutting part one
 
 
@@ -28,9 +28,9 @@ BODY_STEPS = 2.0  # lattice steps between places of neck, shank and holder; of t
 class Shell:
     """Places on a tool, in boxes, in boxes of boxes.
 
-    places : (n, 3) float64, mm, along two directions square to the tool axis and along it, from the tip
-    boxes  : (b, 6) float64, mm, middle and half the sides; those of ``LEAF`` places first, then of ``BRANCH`` of these
-    levels : (l + 1,) int64, where boxes of each level begin, and their number
+    places : (n, 3) float64, mm, frame of the tool: along two directions square to its axis and along it, from the tip
+    boxes  : (b, 6) float64, mm, centre and half the sides; those of ``LEAF`` places first, then of ``BRANCH`` of these
+    levels : (l + 1,) int64, index where boxes of each level begin, and their count
     """
 
     places: F64
@@ -39,7 +39,10 @@ class Shell:
 
     @classmethod
     def of(cls, places: F64) -> Shell:
-        """Places (n, 3), mm, put in boxes along a curve that fills space."""
+        """Places put in boxes along a curve that fills space [Morton1966].
+
+        places : (n, 3) float64, mm, frame of the tool
+        """
         if not len(places):
             return cls(places, np.zeros((0, 6)), np.zeros(2, np.int64))
         low = places.min(axis=0)
@@ -59,37 +62,37 @@ class Shell:
         return cls(places, np.vstack(boxes), levels)
 
 
-def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, beside: float, under: float, step: float,
+def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, off_flank: float, off_end: float, step: float,
            high: float) -> tuple[Shell, Shell]:
-    """The cutting part made smaller, and neck, shank and holder with their clearance.
+    """Shells of the cutting part made smaller, and of neck, shank and holder with their clearance.
 
-    beside, under : mm taken off its flank and off its end
-    step          : mm of the lattice of the stock
-    high          : mm from the tip, up to where stock may be; more is given than that
+    off_flank, off_end : mm removed from its flank and from its end
+    step               : mm of the lattice of the stock
+    high               : mm from the tip, up to which stock may stand; the shells reach at least that far
     """
     outer = ((0.5 * tool.neck_diameter + clear.neck, tool.flute_length, tool.neck_length),
              (0.5 * tool.shank_diameter + clear.shank, tool.neck_length, tool.stickout),
              *((d.radius, d.height, math.inf) for d in discs))
     # by powers of two, so that a few serve all passes
     high = step * 2.0 ** math.ceil(math.log2(max(high, step) / step))
-    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, beside, under, step, high)
+    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, off_flank, off_end, step, high)
 
 
 @lru_cache(maxsize=KEPT)
-def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], beside: float,
-            under: float, step: float, high: float) -> tuple[Shell, Shell]:
+def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], off_flank: float,
+            off_end: float, step: float, high: float) -> tuple[Shell, Shell]:
     flank: list[F64] = [np.zeros((0, 3))]
     inner = 0.0
-    for h in _heights(min(under, flute), min(flute, high), step):
-        # what of the cutting part is off its outside by ``under``: a rounded end, and a flank it goes over into
+    for h in _heights(min(off_end, flute), min(flute, high), step):
+        # the part of the cutter that lies ``off_end`` inside its outline: a rounded end, which passes into the flank
         low = max(corner - h, 0.0)
-        if corner > under and low > corner - under:
+        if corner > off_end and low > corner - off_end:
             continue
-        at = radius - corner + math.sqrt((corner - under) ** 2 - low * low) if corner > under else radius
-        # over the corner it is the side that counts: what may stand under the end may not stand beside it
-        low = max(corner - max(h - under, 0.0), 0.0)
-        side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - beside
-        at = max(min(max(at, side), radius - beside), 0.0)
+        at = radius - corner + math.sqrt((corner - off_end) ** 2 - low * low) if corner > off_end else radius
+        # over the corner the side counts: stock that may stand under the end may not stand beside it
+        low = max(corner - max(h - off_end, 0.0), 0.0)
+        side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - off_flank
+        at = max(min(max(at, side), radius - off_flank), 0.0)
         begin = 0.0 if len(flank) == 1 else min(inner + step, at)
         flank += [_ring(r, h, step) for r in _between(begin, at, step)]
         inner = at

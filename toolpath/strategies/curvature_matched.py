@@ -1,8 +1,9 @@
-"""Faces finished by a tilted flat or bull-nose end whose nose has their curvature (``toolpath.five_axis.matched_passes``), as motions.
+"""Faces finished by a tilted flat or bull-nose end whose nose has their curvature, as motions.
 
-A face is laid out as a whole, or in the pieces that take less way (``toolpath.five_axis.surface_partition``), and each pass is walked where
-it serves what is wanted. Where the tool would meet something with the axis it needs there, or the machine cannot take
-that axis, the pass breaks off and the rest is left to others.
+A face is laid out (``toolpath.five_axis.matched_passes``) as a whole, or in the pieces with the shorter way
+(``toolpath.five_axis.surface_partition``). Each pass is cut where it serves the target. Where the tool would meet an
+obstacle with the axis it needs there, or the machine cannot take that axis, the pass breaks off, and other passes take
+the rest.
 """
 
 from __future__ import annotations
@@ -20,31 +21,31 @@ from scipy.spatial import cKDTree
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.matched_passes import Matched, Strip, Wanted
+from toolpath.five_axis.matched_passes import MatchedPasses, MatchedStrip, MatchTolerances
 from toolpath.five_axis.oriented_motion import LOOK, TURN_S, Runs, Surroundings, in_turn
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece
 from toolpath.five_axis.surface_partition import parted
 from toolpath.passes.isoparametric_passes import IsoSurface, Laid
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.poses import places_along
 
 NAME = "curvature_matched"
-LEAST_TILT = math.radians(1.0)  # with which an end cuts in front and is clear of what it has cut behind
-SHARE = 0.25  # of the chordal tolerance: how deep the nose may be, and what leaving out poses may add
-LAID_SHARE = 0.8  # of the scallop, given to the strips; chords and facets take the rest
-ALONG, UP = 65, 33  # places of a face at which it is asked what it serves
+MIN_TILT = math.radians(1.0)  # an end then cuts in front and is clear of the surface behind
+SHARE = 0.25  # of the chordal tolerance: depth of the nose, and error of leaving out poses
+LAID_SHARE = 0.8  # of the scallop, for the strips; chords and facets take the rest
+ALONG, UP = 65, 33  # places of a face that are compared with the target
 TRIED = 9  # places each way at which the tool is tried before passes are laid out
-LEAST_FREE = 0.25  # of those that are wanted
-OFFS = (0.0, 0.25, 0.5)  # of the way a pass may stand off
-LEAST_AREA = 4.0  # of the squared radius
-MOST_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses held against what stands round the pass
+MIN_FREE = 0.25  # share of the wanted places
+OFFS = (0.0, 0.25, 0.5)  # shares of the distance that a pass may stand off
+MIN_AREA = 4.0  # of the squared radius
+MAX_LOOK = 0.5  # mm, of the tip and of the nose of the holder, between poses that are checked for obstacles
 
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """Of places of a face over the unit square, evenly each way: eta (UP,) of the rows, and which are wanted."""
+    """Places of a face over the unit square, evenly each way: eta (UP,) of the rows, and which places are wanted."""
 
     eta: F64
     wanted: NDArray[np.bool_]
@@ -61,7 +62,7 @@ class _Lattice:
         far = near.query(place.reshape(-1, 3))[0].reshape(UP, ALONG)
         return cls(at, far <= spacing + size)
 
-    def serves(self, s: Strip) -> NDArray[np.bool_]:
+    def serves(self, s: MatchedStrip) -> NDArray[np.bool_]:
         """(ALONG,) bool, evenly along the unit square: whether a strip cuts something wanted there."""
         xi = np.linspace(0.0, 1.0, ALONG)
         low, high = np.interp(xi, s.xi, s.low), np.interp(xi, s.xi, s.high)
@@ -75,27 +76,27 @@ def suits(tool: ToolBody) -> bool:
     return tool.radius > tool.corner_radius + 1e-9
 
 
-def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData, settings: PlanSettings,
-            around: Surroundings, allowance: float, most: float) -> Runs:
-    """The passes of a matched end for what of faces is wanted.
+def matched(faces: Sequence[Faces], target: FinishTarget, tool: ToolBody, cut: CutData, settings: PlanSettings,
+            around: Surroundings, allowance: float, max_seconds: float) -> Runs:
+    """The passes of a matched end over the target.
 
-    faces     : of the zone, exact
-    target    : Target; faces are wanted where its points are
-    around    : Surroundings
-    allowance : mm, to leave on the part
-    most      : s, what the usual passes take: passes that would take longer are not laid out
+    faces       : of the zone, exact
+    target      : FinishTarget
+    around      : Surroundings
+    allowance   : mm, to leave on the part
+    max_seconds : s, time of the usual passes; slower passes are not laid out
     """
     chord = SHARE * settings.chordal_tolerance
-    asked = Wanted(LAID_SHARE * settings.scallop_height, chord, LEAST_TILT, chord)
-    ends = _Ends(tool, asked, around, allowance, settings.lift, cKDTree(target.points), target.spacing)
+    tolerances = MatchTolerances(LAID_SHARE * settings.scallop_height, chord, MIN_TILT, chord)
+    ends = _Ends(tool, tolerances, around, allowance, settings.lift, cKDTree(target.points), target.spacing)
     found: list[tuple[str, Piece]] = []
     refused: list[str] = []
     for face in faces:
-        if face.area < LEAST_AREA * tool.radius**2:
+        if face.area < MIN_AREA * tool.radius**2:
             continue
         try:
             for laid in face.over_square:
-                made = ends.pieces(laid, cut.feed, most)
+                made = ends.pieces(laid, cut.feed, max_seconds)
                 if isinstance(made, str):
                     refused.append(f"{face.name}: {made}")
                 else:
@@ -108,15 +109,15 @@ def matched(faces: Sequence[Faces], target: Target, tool: ToolBody, cut: CutData
 
 @dataclass(frozen=True, eq=False)
 class _Ends:
-    """What the passes of a zone have in common.
+    """Common data of the passes of a zone.
 
-    asked         : Wanted of them
-    lift          : mm, by which a pass may stand off where facets of the part are in its way
-    near, spacing : tree of the places wanted and mm between these
+    tolerances    : MatchTolerances
+    lift          : mm, that a pass may stand off where facets of the part are in its way
+    near, spacing : tree of the target's points and mm between these
     """
 
     tool: ToolBody
-    asked: Wanted
+    tolerances: MatchTolerances
     around: Surroundings
     allowance: float
     lift: float
@@ -133,56 +134,56 @@ class _Ends:
         """(n,) bool: whether the tool cannot be where the grown one has its tip (n, 3), mm."""
         return self.around.blocked(tip + self.allowance * axis, axis, self.tool)
 
-    def pieces(self, laid: Laid, feed: float, most: float) -> list[Piece] | str:
-        """The pieces of the passes of a face, from one border to the other, or why there are none, in words."""
+    def pieces(self, laid: Laid, feed: float, max_seconds: float) -> list[Piece] | str:
+        """The pieces of the passes of a face, from one border to the other, or the reason why there are none."""
         if not isinstance(laid, IsoSurface):
-            return "it is gone over with others as one"
-        parts = parted(laid, self.grown, self.asked, round_way=TURN_S * feed / 60.0)
+            return "the face has common passes with others"
+        parts = parted(laid, self.grown, self.tolerances, round_way=TURN_S * feed / 60.0)
         found = [(part, _Lattice.of(part.iso, self.near, self.spacing)) for part in parts]
         found = [(part, lattice) for part, lattice in found if lattice.wanted.any()]
         if not all(math.isfinite(part.way) for part, _ in found):
-            return "the end of the tool does not fit it everywhere"
+            return "the end of the tool does not fit the face everywhere"
         seconds = 60.0 / feed * sum(part.way * float(lattice.wanted.mean()) for part, lattice in found)
-        if seconds >= most:
-            return f"its matched end would take {seconds:.0f} s, the usual passes {most:.0f}"
+        if seconds >= max_seconds:
+            return f"curvature-matched passes would take {seconds:.0f} s, the usual passes {max_seconds:.0f} s"
         out: list[Piece] = []
         for part, lattice in found:
             if not self._free(lattice, part.iso):
                 continue
-            over = Matched.over(part.iso, self.grown, self.asked)
+            over = MatchedPasses.over(part.iso, self.grown, self.tolerances)
             for s in over.lay_out():
                 served = lattice.serves(s)
                 if served.any():
                     out += self._walked(over, s, served)
-        return out or "the tool is hardly anywhere free with its end on it"
+        return out or "the tool is almost nowhere free with its end on the face"
 
     def _free(self, lattice: _Lattice, iso: IsoSurface) -> bool:
-        """Whether the tool can stand on its end in enough of the places that are wanted."""
+        """Whether the tool can stand on its end in enough of the wanted places."""
         rows, columns = (np.linspace(0, n - 1, TRIED).astype(int) for n in (UP, ALONG))
-        plan, free, none = Matched(iso, self.grown, self.asked, 0.0), 0, np.zeros(TRIED)
+        plan, free, none = MatchedPasses(iso, self.grown, self.tolerances, 0.0), 0, np.zeros(TRIED)
         for i in rows.tolist():
             at = plan.contacts(np.linspace(0.0, 1.0, TRIED), float(lattice.eta[i]))
-            tilt = plan.nose.least_tilt(at, none, self.asked.depth, self.asked.least_tilt)
+            tilt = plan.nose.least_tilt(at, none, self.tolerances.depth, self.tolerances.least_tilt)
             tip, axis = plan.stands(at, np.nan_to_num(tilt), none)
             good = ~np.isnan(tilt) & lattice.wanted[i, columns]
             free += int((~self.blocked(tip[good], axis[good])).sum())
-        return free >= max(LEAST_FREE * float(lattice.wanted[np.ix_(rows, columns)].sum()), 1.0)
+        return free >= max(MIN_FREE * float(lattice.wanted[np.ix_(rows, columns)].sum()), 1.0)
 
-    def _walked(self, over: Matched, s: Strip, served: NDArray[np.bool_]) -> list[Piece]:
-        """The pieces of one pass where it is wanted and the tool is free."""
+    def _walked(self, over: MatchedPasses, s: MatchedStrip, served: NDArray[np.bool_]) -> list[Piece]:
+        """The pieces of one pass that serve the target and where the tool is free."""
         xi = over.ways(s)
         tip, axis, normal = over.poses(s, xi)
         own = np.arange(len(xi), dtype=np.float64)
-        places = places_along(tip, axis, self.tool.stickout, min(LOOK * self.tool.radius, MOST_LOOK))
+        places = places_along(tip, axis, self.tool.stickout, min(LOOK * self.tool.radius, MAX_LOOK))
         whole, met = self._off(Piece(tip, axis, normal, self.tool.radius, on_end=True), places)
         here = np.clip(np.interp(places, own, xi), 0.0, 1.0)
-        asked = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
-        good = asked & ~met
+        wanted = binary_dilation(served)[np.rint(here * (ALONG - 1)).astype(np.int64)]
+        good = wanted & ~met
         return [part.raised(self.allowance)
-                for part in whole.parts(good, places, LEAST_PIECE * self.tool.radius)]
+                for part in whole.parts(good, places, MIN_PIECE * self.tool.radius)]
 
     def _off(self, piece: Piece, places: F64) -> tuple[Piece, NDArray[np.bool_]]:
-        """A pass as little off the surface as is free wherever standing off frees it, and (m,) bool where it is not.
+        """A pass as near to the surface as is free, and (m,) bool where no distance frees it.
 
         Facets of a hollow lie over its surface, and a matched nose is close to it far to both sides.
         """

@@ -1,4 +1,4 @@
-"""Stock taken off in depth layers: at each level, lines round what stands, only where stock is left."""
+"""Depth layers: at each level, lines round obstacles, only where stock is left. Places are tips in mm, access frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis wh
 
 
 def layer_heights(top: float, bottom: float, step: float) -> list[float]:
-    """Levels below the top of the stock, ``step`` mm apart, the last one at ``bottom``; descending."""
+    """Levels below the top of the stock, mm, ``step`` mm apart, the last one at ``bottom``; descending."""
     out = []
     z = top - step
     while z > bottom + 0.25 * step:
@@ -29,8 +29,8 @@ def layer_heights(top: float, bottom: float, step: float) -> list[float]:
 def between(upper: float, lower: float, step: float) -> list[float]:
     """Heights between two layers, mm, descending, no farther apart than ``EVEN`` of the deepest layer ``step``.
 
-    A layer leaves a stair where a face leans: over the height h below the layer above, h tan(lean) of stock beside it,
-    h sin(lean) along the normal. Layers walked in between leave no more than that of the height between them.
+    On an inclined face a layer leaves a stair: over the height h below the layer above, h tan(lean) of stock beside it,
+    h sin(lean) along the normal. Cuts between leave no more than that of the height between them.
 
     >>> between(0.0, -2.0, 2.0)
     [-0.5, -1.0, -1.5]
@@ -65,7 +65,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
         for lines in rings(field, z, active, start, side_step):
             kept: list[Line] = []
             for line in lines:
-                wanted = stock.overlap(line.points, tool, least=0.0) > STOCK_WORTH
+                wanted = stock.overlap(line.points, tool, lower_bound=0.0) > STOCK_WORTH
                 kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
             if kept:
                 yield kept
@@ -73,16 +73,17 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
         allowance: float, tolerance: float, unseen: bool, thin: float = 0.0) -> list[Line]:
-    """Lines that take the allowance off walls which no finishing pass of this tool will follow at this height.
+    """Lines that remove the allowance from walls which no finishing pass of this tool will follow at this height.
 
-    Without them a wall that is undercut, or is no business of this tool, keeps a thin rim that stands higher than
+    Without them an undercut wall, or one that this tool does not finish, keeps a thin rim. The rim stands higher than
     the flutes of a later, deeper pass and rubs on its neck.
 
-    finished  : (ny, nx) bool, where the finish of a wall at this height puts the tool
-    tolerance : mm, of the lines against the true boundary; the other parameters are those of ``layer``
-    unseen    : follow every wall, finished here or not, also where the stock map, coarser than a thin rim, shows
-                none; done once a flute length on the way down
-    thin      : mm off the wall, what a finish leaves: on a steep wall that is high over the cutter and no rim
+    area      : (ny, nx) bool on the lattice, where this tool has something to finish below
+    finished  : (ny, nx) bool on the lattice, where the finish of a wall at this height puts the tool
+    z, allowance, tolerance : mm, as in ``layer``; ``tolerance`` of the lines against the true boundary
+    unseen    : follow every wall, finished here or not, also where the stock map, coarser than a thin rim, shows none;
+                done once a flute length on the way down
+    thin      : mm, residual of a finish on the wall: on a steep wall that is high over the cutter and no rim
     """
     lat, tool = field.lattice, field.tool
     skip = dilated(finished, 3.0 * allowance / lat.step + 2.0) & ~_slots(field, z, allowance)
@@ -91,7 +92,7 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     out: list[Line] = []
     for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~skip, tolerance):
         off = SURE_RIM if unseen else -thin / stock.lattice.step
-        seen = stock.overlap(line.points, tool, off, least=0.0) > STOCK_WORTH
+        seen = stock.overlap(line.points, tool, off, lower_bound=0.0) > STOCK_WORTH
         wanted = seen & ~skip[lat.cells(line.points[:, :2])]
         out.extend(pieces_where(line, wanted, 0.5 * tool.radius, 2.0 * tool.radius))
     return out

@@ -1,10 +1,10 @@
-"""Passes along faces with a ball or bull nose that leans off their normal, led round what is in the way, as motions.
+"""Passes along faces with a ball or bull nose tilted off their normal, steered round obstacles, as motions.
 
-The axis wanted leans by a lead along the pass and a tilt aside of it, off the normal, so that the centre of the nose
-does not rub. Where the tool would meet something with it, or the machine cannot take it, the nearest axes that are free
-are taken, turning evenly along each pass and from one to the next (``toolpath.five_axis.axis_smoothing``); where there is none the
-pass breaks off and the rest is left to others. Where the ends of neighbours are close, with nothing in between, the
-tool stays down and walks them to and fro.
+The wanted axis has a lead along the pass and a tilt aside of it, off the normal, so that the centre of the nose does
+not rub. Where the tool would meet an obstacle with it, or the machine cannot take it, the nearest free axes are taken.
+They turn evenly along each pass and from one to the next (``toolpath.five_axis.axis_smoothing``). Where no axis is free
+the pass breaks off, and other passes take the rest. Where the ends of neighbours are close, with no obstacle between,
+the tool stays down and cuts them back and forth.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from numpy.typing import NDArray
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.five_axis.axis_smoothing import Limits, Steered, steered
+from toolpath.five_axis.axis_smoothing import AxisLimits, Steered, steered
 from toolpath.five_axis.oriented_motion import LOOK, Runs, Surroundings, in_turn, layers_over
 from toolpath.five_axis.oriented_pass import lead_and_tilt, posed
-from toolpath.five_axis.oriented_piece import LEAST_PIECE, Piece
-from toolpath.passes.pass_family import Target
+from toolpath.five_axis.oriented_piece import MIN_PIECE, Piece
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_settings import CutData, Leaned, PlanSettings
+from toolpath.plan_settings import CutData, PlanSettings, ToolLean
 from toolpath.poses import Axes, Blocked, places_along
 from toolpath.strategies.isoparametric import Stretch, course
 from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 
 NAME = "inclined_axis"
-LAID_SHARE = 0.8  # of the scallop, given to the distance between passes; chords and facets take the rest
-CHORD_SHARE = 0.5  # of the chordal tolerance, given to locations; leaving out poses takes a quarter
-LIMITS = Limits(math.radians(45.0), math.radians(4.0))
-WARY = 0.3  # mm that necks, shanks and holders keep more at stations, for what lies between these and what layers leave
-JOINED = math.radians(15.0)  # the most the axis turns from the end of a pass to the beginning of the next
-APART, ACROSS = 2.0, 0.5  # of the distance between passes, and of the radius: the tool stays down from one to the next
-LAYER = 0.6  # of what an end may take at once, a layer: cusps and lattice of the stock that one leaves take their share
-DIVIDED = 8.0  # of the radius: what is longer and cannot be walked as a whole is walked in halves
-MOST_LOOK = 0.5  # mm, of the tip, between poses of a way across that are held against part and stock
+LAID_SHARE = 0.8  # of the scallop, for the distance between passes; chords and facets take the rest
+CHORD_SHARE = 0.5  # of the chordal tolerance, for locations; leaving out poses takes a quarter
+LIMITS = AxisLimits(math.radians(45.0), math.radians(4.0))
+WARY = 0.3  # mm of additional clearance of neck, shank and holder at stations, for places between and stock of layers
+JOINED = math.radians(15.0)  # largest turn of the axis from the end of a pass to the beginning of the next
+APART, ACROSS = 2.0, 0.5  # distances between passes, and radii, over which the tool stays down
+LAYER = 0.6  # layer height as a share of the depth that an end may take; cusps and stock lattice take the rest
+DIVIDED = 8.0  # radii: a longer pass that cannot be cut as a whole is cut in halves
+MAX_LOOK = 0.5  # mm, of the tip, between poses of a way across that are checked against part and stock
 TRIED = 12  # stretches of a group on which both sides of a tilt are tried
 
 
 @dataclass(frozen=True, eq=False)
 class _Nose:
-    """The nose of a tool on faces, and what it must not meet.
+    """The nose of a tool on faces, and its obstacles.
 
-    grown     : the tool with the allowance all round: its tip is lower by that along the axis
+    grown     : the tool with the allowance all round; its tip is lower by that along the axis
     wary      : whether the tool enters something, with more room than it needs
     chord     : mm, of its locations
     """
@@ -63,7 +63,7 @@ class _Nose:
     chord: float
 
     def blocked(self, tips: F64, axes: F64) -> NDArray[np.bool_]:
-        """(n,) bool: whether the tool cannot be where the grown one has its tip (n, 3), mm."""
+        """(n,) bool: whether the tool is blocked where the grown one has its tip (n, 3), mm."""
         return self.around.blocked(tips + self.allowance * axes, axes, self.tool)
 
     def close(self, tips: F64, axes: F64) -> NDArray[np.bool_]:
@@ -73,8 +73,8 @@ class _Nose:
         out[free] = self.wary(tips[free] + self.allowance * axes[free], axes[free])
         return out
 
-    def led(self, s: Stretch, wanted: Axes, before: Steered | None) -> tuple[list[Piece], Steered]:
-        """The pieces of a stretch where the tool is free, in the order they are walked, and the axes of all of it.
+    def tilted(self, s: Stretch, wanted: Axes, before: Steered | None) -> tuple[list[Piece], Steered]:
+        """The free pieces of a stretch, in order of machining, and the axes of all of it.
 
         Raises
         ------
@@ -88,10 +88,10 @@ class _Nose:
             found = found.reversed()
         made = [Piece(tips, axis, axis, self.tool.radius, on_end=True).raised(self.allowance)
                 for tips, axis in found.pieces]
-        return [piece for piece in made if piece.length >= LEAST_PIECE * self.tool.radius], axes
+        return [piece for piece in made if piece.length >= MIN_PIECE * self.tool.radius], axes
 
     def free(self, s: Stretch, wanted: Axes) -> float:
-        """How much of a stretch, mm, is free with the axes wanted.
+        """Length of a stretch, mm, that is free with the wanted axes.
 
         Raises
         ------
@@ -103,8 +103,8 @@ class _Nose:
         return profile.length - sum(b - a for a, b in found.left)
 
 
-def asked(leaned: Leaned | None, form: AreaForm, tool: ToolBody) -> Leaned | None:
-    """How a tool is asked to lean on a zone of a form: not on level ones, nor without a corner; None if it is not."""
+def requested_lean(leaned: ToolLean | None, form: AreaForm, tool: ToolBody) -> ToolLean | None:
+    """Requested tilt of a tool on a zone of a form; None on level zones and for tools without a corner radius."""
     if leaned is None or form is AreaForm.LEVEL or tool.corner_radius <= 0.0:
         return None
     if form is not AreaForm.STEEP:
@@ -112,16 +112,16 @@ def asked(leaned: Leaned | None, form: AreaForm, tool: ToolBody) -> Leaned | Non
     return None if leaned.walls is None else replace(leaned, lead=0.0, tilt=leaned.walls)
 
 
-def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, settings: PlanSettings,
-        around: Surroundings, wary: Blocked, leaned: Leaned) -> Runs:
-    """The passes of a nose that leans, for what of faces is wanted.
+def inclined_passes(faces: Sequence[Faces], target: FinishTarget, field: TipField, cut: CutData,
+                    settings: PlanSettings, around: Surroundings, wary: Blocked, leaned: ToolLean) -> Runs:
+    """The passes of a tilted nose over the target.
 
     faces  : of the zone, exact
-    target : Target; faces are wanted where its points are
+    target : FinishTarget
     field  : TipField of the tool
     around : Surroundings
     wary   : whether the tool enters part or fixtures, with ``WARY`` mm more round neck, shank and holder
-    leaned : how far off the normal
+    leaned : requested tilt off the normal
     """
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
@@ -132,30 +132,30 @@ def led(faces: Sequence[Faces], target: Target, field: TipField, cut: CutData, s
     passes: list[list[Piece]] = []
     for group in planned.groups:
         passes.append([])
-        side = _freer(group, nose, leaned, refused)  # which side that is goes by how the parameters of a face run
-        before: dict[bool, Steered] = {}  # with a lead the axes of passes to and fro are not near each other
+        side = _freer(group, nose, leaned, refused)  # the side depends on the direction of the face's parameters
+        before: dict[bool, Steered] = {}  # with a lead the axes of passes back and forth are not near each other
         for s in group:
             way = s.turned and leaned.lead > 0.0
             try:
-                made, before[way] = nose.led(s, _wanted(s, leaned, side), before.get(way))
+                made, before[way] = nose.tilted(s, _wanted(s, leaned, side), before.get(way))
             except GeometryError as refusal:
                 refused.append(refusal.message)
                 continue
             passes[-1] += made
     if planned.groups and not any(passes):
-        refused.append("the tool is hardly anywhere free")
+        refused.append("the tool is almost nowhere free")
     found = _layered(passes, nose, max(APART * planned.side_step, ACROSS * tool.radius))
     runs = in_turn([(NAME, piece) for piece in found], tool, cut, settings, around, DIVIDED * tool.radius)
     return replace(runs, refused=tuple(dict.fromkeys([*refused, *runs.refused])))
 
 
-def _wanted(s: Stretch, leaned: Leaned, side: float) -> Axes:
-    """The axes wanted along a stretch: the nose leans forward the way it is walked, its tilt is on one side of it."""
+def _wanted(s: Stretch, leaned: ToolLean, side: float) -> Axes:
+    """The wanted axes along a stretch: the lead follows the direction of the cut, the tilt keeps to one side."""
     return lead_and_tilt(-leaned.lead if s.turned else leaned.lead, side * leaned.tilt)
 
 
-def _freer(group: Sequence[Stretch], nose: _Nose, leaned: Leaned, refused: list[str]) -> float:
-    """To which side, 1 or -1, a tilt leaves more of the passes free; what cannot be tried is told in ``refused``."""
+def _freer(group: Sequence[Stretch], nose: _Nose, leaned: ToolLean, refused: list[str]) -> float:
+    """Side, 1 or -1, on which a tilt leaves more of the passes free; ``refused`` gets the failed stretches."""
     if leaned.tilt == 0.0:
         return 1.0
     free = np.zeros(2)
@@ -169,9 +169,9 @@ def _freer(group: Sequence[Stretch], nose: _Nose, leaned: Leaned, refused: list[
 
 
 def _layered(passes: Sequence[Sequence[Piece]], nose: _Nose, apart: float) -> list[Piece]:
-    """The passes of groups, each group preceded by itself raised, layer by layer, where too much stands over it.
+    """The passes of groups, each group preceded by raised copies, layer by layer, where too much stands over it.
 
-    A layer goes over the whole of a group before the next: what stands beside a pass is in the way of its nose too.
+    A layer covers the whole of a group before the next one, since stock beside a pass also blocks its nose.
     """
     out: list[Piece] = []
     for group in passes:
@@ -185,10 +185,10 @@ def _layered(passes: Sequence[Sequence[Piece]], nose: _Nose, apart: float) -> li
 def _to_and_fro(pieces: Sequence[Piece], nose: _Nose, apart: float) -> list[Piece]:
     """Pieces joined where the tool can stay down from the end of one to the beginning of the next.
 
-    apart : mm, the most from one to the next
+    apart : mm, largest distance from one to the next
     """
     tool, out = nose.tool, list[Piece]()
-    look = min(LOOK * tool.radius, MOST_LOOK)
+    look = min(LOOK * tool.radius, MAX_LOOK)
     for piece in pieces:
         if out:
             tips, axes, away = (np.stack([getattr(out[-1], a)[-1], getattr(piece, a)[0]])

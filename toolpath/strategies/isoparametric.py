@@ -1,7 +1,8 @@
-"""Passes that follow the borders of trimmed faces, as papers/000 lays them out, kept off the whole part.
+"""Passes that follow the borders of trimmed faces [Sarkar2015], kept off the whole part.
 
-A face is laid over the unit square as a whole, so that neighbouring zones go on in each other's passes and the border
-of what a tool reaches, which is known to the spacing of samples only, bends none; each zone walks what serves it.
+A face is laid over the unit square as a whole. So neighbouring zones continue each other's passes, and the border of
+the reachable area, which is known to the spacing of samples only, bends no pass. Each zone cuts the passes that serve
+it.
 """
 
 from __future__ import annotations
@@ -18,27 +19,21 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import Line, true_runs
 from toolpath.passes.cutter_locations import lifted
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import Flank, Laid
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from zones.reach.tip_field import TipField
 
 NAME = "isoparametric"
-LEAST_AREA = 1.0  # of r²: a face smaller than that is left to passes in between
-ALONG = 129  # places along a pass at which it is asked what it serves
-OVERRUN = 0.3  # radii of the corner a pass goes on past the last place it serves
-
-
-"""A piece over the unit square and the eta of its passes."""
-
-
-"""What passes are laid over: a face, or several as one."""
+MIN_AREA = 1.0  # r²: passes of later rounds finish smaller faces
+ALONG = 129  # places along a pass that are compared with the target
+OVERRUN = 0.3  # radii of the corner that a pass runs past the last place it serves
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A piece of a pass: eta, and from which xi to which; ``turned``: walked from the greater xi to the less."""
+    """A piece of a pass at ``eta`` from xi ``low`` to ``high``; ``turned``: cut from the greater xi to the smaller."""
 
     iso: Laid
     eta: float
@@ -46,24 +41,29 @@ class Stretch:
     high: float
     turned: bool
 
-    def stepped(self, radius: float, scallop: float, chord: float) -> tuple[Profile, F64]:
-        """Its profile and the ways (n,) mm at which a ball is to be located; radius, scallop, chord : mm.
+    def stepped(self, radius: float, scallop: float, chord: float) -> tuple[PassProfile, F64]:
+        """Its profile and the distances along it at which a ball is located, (n,) float64, mm.
 
-        Raises GeometryError as ``Profile.of`` and ``steps`` do.
+        radius, scallop, chord : mm
+
+        Raises
+        ------
+        GeometryError
+            As ``PassProfile.of`` and ``steps``.
         """
-        profile = Profile.of(self.iso.curve(self.eta, self.low, self.high), chord, radius)
+        profile = PassProfile.of(self.iso.curve(self.eta, self.low, self.high), chord, radius)
         return profile, steps(profile, radius, chord, scallop)
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """What passes over trimmed faces would be.
+class FacePasses:
+    """Passes over trimmed faces.
 
     groups    : stretches of each piece of a face, pass after pass; on a wall each pass is one, from the highest down
-    steep     : on a wall, where a pass ends at what stands in its way; elsewhere it goes over it
-    way       : mm the tool goes along all of them
-    side_step : mm between neighbouring passes, the usual one
-    refused   : why faces have none, in words
+    steep     : on a wall, where a pass ends at an obstacle; elsewhere it goes over it
+    way       : mm, length of all passes
+    side_step : mm between neighbouring passes, median
+    refused   : reasons why faces have none
     """
 
     groups: tuple[tuple[Stretch, ...], ...]
@@ -73,16 +73,16 @@ class Course:
     refused: tuple[str, ...]
 
 
-def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: float, chord: float,
-           flank: Flank | None) -> Course:
-    """The passes of faces as far as they serve what is to be cut.
+def course(faces: Sequence[Faces], target: FinishTarget, field: TipField, scallop: float, chord: float,
+           flank: Flank | None) -> FacePasses:
+    """The passes of faces as far as they serve the target [Sarkar2015].
 
-    target  : Target; passes go where its points are
+    target  : FinishTarget; passes go where its points are
     field   : TipField of the tool
-    scallop : mm, what may be left between passes, the chordal error aside
+    scallop : mm, residual between passes without the chordal error
     chord   : mm, chordal tolerance of a pass
-    flank   : of the tool, on a wall: passes go the more level way, the stock on their right; None elsewhere: to and
-              fro, along the longer sides
+    flank   : of the tool, on a wall, where passes run along the more level sides with the stock on their right; None
+              elsewhere, where they run back and forth along the longer sides
     """
     radius = field.tool.corner_radius + field.allowance
     near = cKDTree(target.points)
@@ -94,7 +94,7 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
     todo = list(faces)
     while todo:
         face = todo.pop(0)
-        if face.area < LEAST_AREA * radius**2:
+        if face.area < MIN_AREA * radius**2:
             continue
         try:
             passes = face.passes(radius, max(scallop - chord, 0.5 * scallop), flank)
@@ -111,9 +111,9 @@ def course(faces: Sequence[Faces], target: Target, field: TipField, scallop: flo
             levels += own
             apart.append(step)
             way += length
-    if flank is not None:  # what stands above a pass would have to be taken off with it
+    if flank is not None:  # from the top down, so that no pass has to remove the stock above it
         groups = [mine for _, mine in sorted(levels, key=lambda level: -level[0])]
-    return Course(tuple(groups), flank is not None, way, float(np.median(apart)) if apart else 0.0, tuple(refused))
+    return FacePasses(tuple(groups), flank is not None, way, float(np.median(apart)) if apart else 0.0, tuple(refused))
 
 
 def _served(iso: Laid, etas: F64, near: cKDTree, spacing: float, radius: float,
@@ -157,25 +157,26 @@ def _spans(at: F64, wanted: NDArray[np.bool_], overrun: float) -> list[tuple[flo
     return out
 
 
-def laid(planned: Course, field: TipField, scallop: float, chord: float,
+def laid(planned: FacePasses, field: TipField, scallop: float, chord: float,
          lift: float) -> tuple[list[list[Line]], tuple[str, ...]]:
-    """The lines of a course, group by group, kept above the whole part, and why stretches have none, in words.
+    """The lines of passes, group by group, kept above the whole part, and the reasons why stretches have none.
 
-    lift : mm, up to which a tip may stand off the surface along its normal; the others as for ``course``
+    scallop, chord : mm, as for ``course``
+    lift           : mm, that a tip may stand off the surface along its normal
     """
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
-    out, refused, most = [], [], 0.0 if planned.steep else None
+    out, refused, max_rise = [], [], 0.0 if planned.steep else None
     for group in planned.groups:
         lines: list[Line] = []
         for s in group:
             try:
                 profile, ends = s.stepped(grown.corner_radius, scallop, chord)
-            except GeometryError as refusal:  # passes in between will have to do there
+            except GeometryError as refusal:  # passes of later rounds fill the gap
                 refused.append(refusal.message)
                 continue
             made = [Line(p + [0.0, 0.0, spare], False)
-                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift, most)[0]
+                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift, max_rise)[0]
                     if len(p) > 1]
             lines += [line.reversed() for line in reversed(made)] if s.turned else made
         out.append(lines)
@@ -183,13 +184,12 @@ def laid(planned: Course, field: TipField, scallop: float, chord: float,
 
 
 def suits(tool: ToolBody) -> bool:
-    """Whether a tool can take such passes: what is left between them is the corner's."""
+    """Whether a tool can take such passes: its corner forms the cusps between them."""
     return tool.corner_radius > 0.0
 
 
 def _against(place: F64, normal: F64) -> bool:
-    """Whether a pass along a wall, contacts and normals (n, 3), has its free side on the right: material has to be
-    there."""
+    """Whether a pass along a wall, contacts and normals (n, 3), has its free side on the right, not the material."""
     way = np.diff(place[:, :2], axis=0)
     free = 0.5 * (normal[1:, :2] + normal[:-1, :2])
     return float((way[:, 0] * free[:, 1] - way[:, 1] * free[:, 0]).sum()) < 0.0

@@ -1,7 +1,7 @@
 """Level planes: an end mill with a flat bottom follows the walls at the height of the plane, then rings inside.
 
-All moves are level. What the lines of the planning lattice miss is looked at again in small windows on finer ones:
-a corner of the free region between two walls that is narrower than a cell, and islands where rings turn sharply.
+All moves are level. Places that the lines of the planning lattice miss are treated again in small windows on finer
+lattices: corners of the free region between two walls narrower than a cell, and islands where rings turn sharply.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
 EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE
-FINER = 4  # times, of the lattice of one round to that of the next
-NEAR = 2.0  # steps of the planning lattice round what is left that lines are wanted in
-MOST_FINER = 2  # rounds on finer lattices
-MOST_NODES = 250_000  # of a window, where its lattice is finer than that of the planner
+FINER = 4  # ratio of the lattice of one round to that of the next
+NEAR = 2.0  # steps of the planning lattice round the residual that get lines
+MAX_FINER = 2  # rounds on finer lattices
+MAX_NODES = 250_000  # of a window, where its lattice is finer than that of the planner
 
 
 def plane_heights(tips: F64) -> list[float]:
-    """The heights at which level area is touched, descending; tips less than ``SAME_PLANE`` mm apart are one.
+    """Heights at which level area is touched, mm, descending; tips less than ``SAME_PLANE`` mm apart are one.
 
-    tips : (n, 3) float64, mm
+    tips : (n, 3) float64, mm, access frame
     """
     z = np.sort(tips[:, 2])[::-1]
     cuts = np.flatnonzero(np.diff(z) < -SAME_PLANE) + 1
@@ -39,15 +39,15 @@ def planes(field: TipField, tips: F64, tolerance: float, finer: int = 0) -> list
     """Passes over level area, plane by plane from the top.
 
     field     : TipField of a tool whose bottom is flat out to R - r
-    tips      : (n, 3) float64, mm, tips that touch the samples
+    tips      : (n, 3) float64, mm, access frame, tips that touch the samples
     tolerance : mm, of the lines along walls; never more than ``EXACT``
-    finer     : 0 for lines over all the area; k for lines near what is still left, on lattices ``FINER``**k finer
+    finer     : 0 for lines over all the area; k for lines near the residual, on lattices ``FINER``**k finer
 
     Returns
     -------
     list of lists of Line, one list a plane
-        Rings at most 0.8 of the flat diameter apart, half that with every k, and the line that touches whatever
-        stands beside the plane.
+        Rings at most 0.8 of the flat diameter apart, half that with every k, and the line that touches obstacles beside
+        the plane.
     """
     tool, step = field.tool, field.lattice.step
     out = []
@@ -66,7 +66,7 @@ def planes(field: TipField, tips: F64, tolerance: float, finer: int = 0) -> list
 
 def _plane(field: TipField, z: float, tips: F64, tolerance: float, share: float, near: float,
            join: float) -> list[Line]:
-    """Rings ``share`` times as far apart as usual over the tips at z, and what stands within ``near`` mm of them."""
+    """Rings ``share`` times as far apart as usual over the tips at z, and contours within ``near`` mm of them."""
     lat, tool = field.lattice, field.tool
     flat = tool.radius - tool.corner_radius
     mask = dilated(lat.mask(tips[:, :2]), near / lat.step)
@@ -88,7 +88,7 @@ def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField,
     for k in range(1, count + 1):
         mine = tips[group == k]
         lower, upper = mine[:, :2].min(axis=0) - cells * lat.step, mine[:, :2].max(axis=0) + cells * lat.step
-        step = max(lat.step / FINER**finer, float(np.sqrt(np.prod(upper - lower) / MOST_NODES)))
+        step = max(lat.step / FINER**finer, float(np.sqrt(np.prod(upper - lower) / MAX_NODES)))
         yield field.window(lower, upper, min(step, lat.step)), mine
 
 

@@ -1,9 +1,10 @@
-"""A spiral over shallow area: rings at growing distance from its border, joined turn by turn.
+"""A spiral over shallow area: rings at growing distance from its border, joined turn by turn [Lee2003].
 
-Place across the passes is the distance of a tip from the border of all tips in plan, so a ring is a level line of
-that distance and ``toolpath.passes.side_step`` brackets from ring to ring as it does from line to line. Where one closed ring
-follows the other, the way goes over from ring to ring along the whole turn, at equal shares of their lengths. On a
-round area turns are as far apart as the rings; beside a bay they may be a little farther, which measuring finds.
+The place across the passes is the distance of a tip from the border of all tips in plan. So a ring is a level line of
+that distance, and ``toolpath.passes.side_step`` brackets from ring to ring as from line to line. Where one closed ring
+follows the other, the path changes from ring to ring along the whole turn, at equal shares of their lengths. On a round
+area turns are as far apart as the rings. Beside a bay they may be a little farther apart; the measurement finds that.
+Places are in mm, access frame, float64.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
 from toolpath.passes.dragged_path import pieces
-from toolpath.passes.pass_family import Dragged, Family, Pass, Promise, Target, strip_width
+from toolpath.passes.pass_family import Dragged, Family, FinishTarget, Pass, Promise, strip_width
 from zones.lattice import Lattice
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
@@ -26,7 +27,7 @@ SMOOTH = 1.0  # lattice steps, of the distance field
 class Rings(Family):
     """Rings at distances from the border of the tips."""
 
-    def __init__(self, dragged: Dragged, target: Target, promise: Promise) -> None:
+    def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise) -> None:
         tips = target.tips[:, :2]
         step = max(0.5 * target.spacing, 0.05 * dragged.cutter.radius)
         near = max(1, int(np.ceil(NEAR * target.spacing / step)))
@@ -47,12 +48,16 @@ class Rings(Family):
         super().__init__(dragged, target, promise, t, cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], across)
 
     def pass_at(self, t: float, window: float, only: NDArray[np.bool_] | None = None) -> Pass:
-        """As in ``Family``; a ring is whole or is not there."""
+        """As in ``Family``; a ring is whole or absent.
+
+        only : (n,) bool; only tells whether the pass counts as whole
+        """
         lines = [p for way in self.ways(t) for p in pieces(self.dragged.limit, way, self.step, self.promise.chord)]
         return Pass(t, tuple(lines), only is None)
 
     def ways(self, t: float) -> list[F64]:
-        """Level lines of the distance: (n, 2) float64 mm each; a closed one repeats its first point."""
+        """Level lines of the distance, each (n, 2) float64, mm, access frame; a closed one repeats its first point
+        [Lorensen1987]."""
         ids, starts, closed = trace(self.far < t, self.inside, SEGMENTS)
         xy = np.empty((len(ids), 2))
         linear_crossings(ids, self.far, t, self.lattice.x0, self.lattice.y0, self.lattice.step, xy)
@@ -65,12 +70,13 @@ class Rings(Family):
 
 
 def spiralled(rings: Rings, places: list[float], climb: bool = True) -> list[F64]:
-    """Rings at ``places`` (mm, ascending) as tip paths (n, 3) mm, joined to spirals where ring follows ring.
+    """Rings as tip paths, each (n, 3) float64, mm, access frame, joined to spirals where ring follows ring [Lee2003].
 
-    A path begins with its outermost ring, whole, goes over to the next ring along each turn, and ends with its
-    innermost ring, whole. Where rings part or join, or one is open, a new path begins.
+    places : list of float, mm, ascending
+    climb  : clockwise, with the stock inside on the right, else the other way
 
-    climb : walked clockwise, with the stock inside on the right, else the other way
+    A path begins with its outermost ring, whole, changes to the next ring along each turn, and ends with its innermost
+    ring, whole. Where rings split or join, or one is open, a new path begins.
     """
     out: list[F64] = []
     chain: list[F64] = []

@@ -12,40 +12,42 @@ from toolpath.lines import Line
 from toolpath.passes.contours import contour_pieces, dilated
 from zones.reach.tip_field import TipField
 
-LEAST_STEP = 0.02  # mm, levels are never closer
-SHARP_DIP = 1.5e-4  # mm a sharp-cornered end goes below its level: rounding in the program must not lift it off
+MIN_STEP = 0.02  # mm, least distance of levels
+SHARP_DIP = 1.5e-4  # mm that a sharp-cornered end goes below its level, so that rounding in the program cannot lift it
 
 
 def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> float:
-    """Height between waterlines that leaves a given cusp on a steep area.
+    """Height between waterlines that leaves a given cusp on a steep area, mm [Lin1996].
 
     tool      : ToolBody
-    normals   : (n, 3) float64 unit normals of the area
+    normals   : (n, 3) float64, dimensionless, unit normals of the area, access frame
     cusp      : mm, along the normal
     step_down : mm, upper limit
 
-    Returns
-    -------
-    float, mm
-        On a wall that leans by n_z a corner r leaves s^2/(8 r) between lines s apart along the wall, s = dz/sin;
-        the flank above the corner leaves no more than dz n_z. The greater dz of the two holds for each sample;
-        the 5 % quantile over the area is taken, the rest is found by measuring.
+    Notes
+    -----
+    On a wall inclined by n_z a corner r leaves s^2/(8 r) between lines s apart along the wall, s = dz/sin. The flank
+    above the corner leaves no more than dz n_z. The greater dz of the two holds for each sample. The 5 % quantile over
+    the area is taken; the measurement finds the rest. Second order in the cusp.
     """
     nz = np.abs(normals[:, 2])
     by_corner = math.sqrt(8.0 * cusp * tool.corner_radius) * np.sqrt(np.maximum(1.0 - nz * nz, 0.0))
     by_flank = cusp / np.maximum(nz, 1e-6)
     wanted = float(np.quantile(np.maximum(by_corner, by_flank), 0.05)) if len(nz) else step_down
-    return max(LEAST_STEP, min(wanted, step_down))
+    return max(MIN_STEP, min(wanted, step_down))
 
 
 def heights(top: float, bottom: float, step: float) -> F64:
-    """Levels from top to bottom, both included, at most ``step`` mm apart, descending."""
+    """Levels from top to bottom, both included, at most ``step`` mm apart, descending, (n,) float64, mm."""
     n = max(1, math.ceil((top - bottom) / step - 1e-9)) if top > bottom else 0
     return np.linspace(top, bottom, n + 1)
 
 
 def lowest_of_groups(z: F64, window: float) -> F64:
-    """Levels that serve heights z (n,): each group no higher than ``window`` mm gets its lowest; descending."""
+    """Levels that serve heights: the lowest of each group no higher than ``window`` mm, descending, (m,) float64, mm.
+
+    z : (n,) float64, mm
+    """
     out: list[float] = []
     for v in np.unique(z).tolist():
         if not out or v > out[-1] + window:
@@ -57,7 +59,7 @@ def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance
     """Level lines that touch an area, level by level.
 
     field     : TipField
-    tips      : (n, 3) float64, mm, tips that touch the samples of the area
+    tips      : (n, 3) float64, mm, access frame, tips that touch the samples of the area
     levels    : (m,) float64, mm, descending
     window    : mm, a level serves the samples whose tip lies within this of it
     tolerance : mm, of the lines against the true boundary

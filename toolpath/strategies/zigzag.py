@@ -1,4 +1,4 @@
-"""Passes dragged over shallow area: straight ones to and fro or one way, or a spiral."""
+"""Passes dragged over shallow area: straight ones back and forth or one way, or a spiral."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.lines import Line, dense, pieces_where
 from toolpath.passes.contours import serving
 from toolpath.passes.feed_direction import best_direction
-from toolpath.passes.pass_family import Dragged, Pass, Promise, Swath, Target
+from toolpath.passes.pass_family import Dragged, FinishTarget, Pass, Promise, Swath
 from toolpath.passes.side_step import lay_out
 from toolpath.plan_settings import Pattern
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.spiral import Rings, spiralled
 from zones.reach.tip_field import TipField
 
-LEAST_STEP = 0.02  # mm between passes of a round
-WORTH_A_SPIRAL = 8  # straight passes from which on a spiral is tried
+MIN_STEP = 0.02  # mm between passes of a round
+WORTH_A_SPIRAL = 8  # least straight passes at which a spiral is tried
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Passes of an area, and what is needed to put more between them.
+class PassLayout:
+    """Passes of an area, and the data to add more between them.
 
     pattern   : ZIGZAG, ONE_WAY or SPIRAL
     swath     : the area along the feed
     places    : (k,) float64, mm, where whole passes lie; distance from the border for a spiral
     lines     : in order of machining
-    way       : mm, with what links cost
-    climb     : one way and spiral have the stock on the right, else on the left; to and fro has it on either side
-    rejected  : patterns that would be more way, with it
+    way       : mm, with the cost of links
+    climb     : one way and spiral have the stock on the right, else on the left; zigzag has it on either side
+    rejected  : longer patterns, with their way
     """
 
     pattern: Pattern
@@ -48,12 +48,15 @@ class Layout:
 
     @property
     def side_step(self) -> float:
-        """Distance between neighbouring whole passes in plan that is usual, mm; of a single one, what it began with."""
+        """Median distance between neighbouring whole passes in plan, mm; of a single one, the first guess."""
         usual = float(np.median(np.diff(self.places))) if len(self.places) > 1 else self.swath.guess
-        return max(usual, LEAST_STEP)
+        return max(usual, MIN_STEP)
 
     def near(self, failing: NDArray[np.int64]) -> list[Line]:
-        """The lines as far as they serve some samples of the area (indices): a side step round their tips."""
+        """The parts of the lines that serve some samples of the area: a side step round their tips.
+
+        failing : (n,) int64, index of the samples
+        """
         target, promise = self.swath.target, self.swath.promise
         return serving(self.lines, target.tips[failing, :2], self.side_step, target.spacing, promise.overrun,
                        promise.link)
@@ -61,7 +64,7 @@ class Layout:
     def between(self, k: int, failing: NDArray[np.int64]) -> list[Line]:
         """Lines of refining round k >= 1 along the feed, where samples still fail: the distance divided by 2^k.
 
-        failing : indices of the samples of the area
+        failing : (n,) int64, index of the samples
         """
         swath, step, parts = self.swath.subset(failing), self.side_step, 2 ** k
         if not len(swath.t):
@@ -73,20 +76,20 @@ class Layout:
         most = np.maximum(np.ceil(np.diff(at) / (1.5 * step)), 1.0)
         at = np.interp(np.arange(most.sum() + 1.0), np.concatenate([[0.0], np.cumsum(most)]), at)
         grid = np.interp(np.arange(parts * (len(at) - 1) + 1) / parts, np.arange(len(at)), at)
-        made = [swath.pass_at(t, max(width, LEAST_STEP))
+        made = [swath.pass_at(t, max(width, MIN_STEP))
                 for t, width in zip(grid[1::2].tolist(), (0.5 * (grid[2::2] - grid[:-1:2])).tolist(), strict=True)]
         return one_way(made, self.climb) if self.pattern is Pattern.ONE_WAY else to_and_fro(made)
 
 
-def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = Pattern.AUTO,
-         climb: bool = True) -> Layout:
+def laid(field: TipField, target: FinishTarget, promise: Promise, pattern: Pattern = Pattern.AUTO,
+         climb: bool = True) -> PassLayout:
     """Passes over an area: in the best direction of feed, or as a spiral.
 
     field   : TipField
     target  : Target, tips with the allowance of the field
     promise : Promise
     pattern : Pattern
-    climb   : as in ``Layout``
+    climb   : as in ``PassLayout``
     """
     dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance)
     swath = Swath(dragged, target, promise, best_direction(dragged, target, promise))
@@ -108,18 +111,18 @@ def laid(field: TipField, target: Target, promise: Promise, pattern: Pattern = P
     return replace(made[0], rejected=tuple((m.pattern, m.way) for m in made[1:]))
 
 
-def _of_a_piece(straight: Layout) -> bool:
+def _of_a_piece(straight: PassLayout) -> bool:
     """Whether an area is large and whole enough for a spiral to be tried."""
     return WORTH_A_SPIRAL <= len(straight.places) and len(straight.lines) <= 2 * len(straight.places)
 
 
-def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line], climb: bool) -> Layout:
+def _layout(pattern: Pattern, swath: Swath, places: list[float], lines: list[Line], climb: bool) -> PassLayout:
     way = sum(line.length for line in lines) + swath.promise.link * len(lines)
-    return Layout(pattern, swath, np.array(places), tuple(lines), way, climb)
+    return PassLayout(pattern, swath, np.array(places), tuple(lines), way, climb)
 
 
 def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
-    """Passes as lines in order across, every second one that has any walked back."""
+    """Passes as lines in order across, every second one in the other direction."""
     out: list[Line] = []
     flip = False
     for p in passes:
@@ -130,7 +133,7 @@ def to_and_fro(passes: list[Pass] | tuple[Pass, ...]) -> list[Line]:
 
 
 def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
-    """Passes as lines in order across, all walked the same way: against the feed for climb milling, else along it.
+    """Passes as lines in order across, all in one direction: against the feed for climb milling, else along it.
 
     The next pass, where the stock is, lies to the left of the feed.
     """
@@ -139,25 +142,26 @@ def one_way(passes: list[Pass] | tuple[Pass, ...], climb: bool) -> list[Line]:
 
 
 def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: float, wall: bool = False) -> list[Line]:
-    """A pass, and before it the same pass lifted where going downhill would take more than a skin off at once.
-
-    A descent is worked off only by going sideways, level or up: over a piece with a length s of such way each layer
-    after the first adds what ``slope`` times s allows. So a place where stock stands h above the pass is taken in n
-    equal layers, n the least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes
-    downhill for most of its way is walked uphill but for the pass itself where that needs fewer, on whichever side the
-    stock then is.
+    """A pass, preceded by raised copies of itself where going downhill would remove more than a skin at once.
 
     line  : Line; level ones are returned alone
     stock : StockMap as it stands
-    skin  : mm, the most that is taken off in a descent
-    slope : mm per mm, of the ramp down which the tool may go for any length
-    wall  : beside a wall, where what stands at the side of a tool is cut by its flank: only what is under its end
-            counts, and only where the pass goes down
+    skin  : mm, largest depth removed in a descent
+    slope : mm per mm, of the ramp that the tool may descend for any length
+    wall  : beside a wall the flank cuts stock at the side of the tool: only stock under the end counts, and only where
+            the pass goes down
 
     Returns
     -------
     list of Line
         The layers of each piece from the top down; the pass itself is last.
+
+    Notes
+    -----
+    Only sideways, level or rising moves work off a descent. Over a piece with a length s of such way each layer after
+    the first adds ``slope`` times s. So a place where stock stands h above the pass is cut in n equal layers, n the
+    least with h / n <= skin and, where it goes down, h - (n - 1) slope s <= skin. A piece that goes downhill for most
+    of its way is cut uphill but for the pass itself where that needs fewer layers, on whichever side the stock then is.
     """
     rise = np.ptp(line.points[:, 2])
     if rise < 1e-6:
@@ -178,7 +182,7 @@ def skimmed(line: Line, stock: StockMap, tool: ToolBody, skin: float, slope: flo
 
 
 def _layers(way: F64, over: F64, skin: float, slope: float) -> int:
-    """In how many layers a way (n, 3) is gone down to, ``over`` (n,) mm of stock on it."""
+    """Number of layers in which a way (n, 3) is cut, with ``over`` (n,) mm of stock on it."""
     move = np.diff(way, axis=0)
     aside = np.hypot(move[:, 0], move[:, 1])
     down = -move[:, 2] > slope * aside
@@ -188,8 +192,10 @@ def _layers(way: F64, over: F64, skin: float, slope: float) -> int:
 
 
 def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F64:
-    """(n,) float64, mm: how far stock stands above the cutter where the pass goes up or down, on a wall how far above
-    the end of the cutter where it goes down; 0 elsewhere."""
+    """Height of stock above the cutter where the pass goes up or down, (n,) float64, mm; 0 elsewhere.
+
+    On a wall it is the height above the end of the cutter, where the pass goes down.
+    """
     move = np.diff(points, axis=0)
     rise = -move[:, 2] if wall else np.abs(move[:, 2])
     steep = rise > 0.05 * np.hypot(move[:, 0], move[:, 1])  # 3 degrees

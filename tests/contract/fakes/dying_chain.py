@@ -11,7 +11,7 @@ import signal
 import service.pipeline as chain
 import service.stages.resume as resume
 from service.pipeline import verify_program, zones_only  # noqa: F401
-from toolpath.plan_checkpoint import Keeper
+from toolpath.plan_checkpoint import CheckpointKeeper
 from toolpath.planning.job_plan import plan_job
 
 PROVE = chain.prove
@@ -34,7 +34,7 @@ def plan(part_path, setup, out, progress, kept=None, **more):
             os.kill(os.getppid() if who == "worker" else os.getpid(), signal.SIGKILL)
             signal.pause()
 
-    class Watched(Keeper):
+    class Watched(CheckpointKeeper):
         def __init__(self, keeper):
             self.taken, self.keep, self.acts = keeper.taken, keeper.done, 0
 

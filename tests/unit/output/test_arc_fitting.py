@@ -21,7 +21,7 @@ from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, ro
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step
 from toolpath.linking.lead_arcs import arc_onto
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from verify.comparison.program_equivalence import difference
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
@@ -33,7 +33,7 @@ GRAIN = 2.0e-4  # mm, of the grid: of a point, and of a centre
 
 def cut_of(work, k=0):
     """The cut of the k-th step."""
-    return next(t for t in work.steps[k].trajectories if t.motion is Motion.CUT)
+    return next(t for t in work.steps[k].trajectories if t.motion is TrajectoryKind.CUT)
 
 
 def drawn(piece):
@@ -114,7 +114,7 @@ def test_words_that_every_control_takes():
 
 def test_links_and_a_tool_that_turns_are_not_touched():
     work = cutting(SHAPES["ring"])
-    down = replace(work.steps[0].trajectories[2], motion=Motion.CONNECT)
+    down = replace(work.steps[0].trajectories[2], motion=TrajectoryKind.CONNECT)
     ways = (*work.steps[0].trajectories[:2], down, *work.steps[0].trajectories[3:])
     same = fitted(replace(work, steps=(replace(work.steps[0], trajectories=ways),)), HALF)
     assert same.steps[0].trajectories == ways
@@ -124,7 +124,7 @@ def test_links_and_a_tool_that_turns_are_not_touched():
     assert cuts and cuts[0] is swings.steps[0].trajectories[2]
 
 
-@pytest.mark.parametrize("motion", [Motion.APPROACH, Motion.LIFT])
+@pytest.mark.parametrize("motion", [TrajectoryKind.APPROACH, TrajectoryKind.LIFT])
 def test_arcs_on_and_off_a_wall_are_written_as_arcs(motion):
     lead = arc_onto(np.array([3.0, 4.0, 1.0]), np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0]), 2.0, 0.5 * HALF)
     work = cutting(lead)

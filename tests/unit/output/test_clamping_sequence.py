@@ -13,7 +13,7 @@ from output.inverse_kinematics import RotaryMachine
 from output.linuxcnc import write_linuxcnc
 from output.stepnc.common import _curves
 from tests.synthetic_plan import clamped
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
 from verify.program.move_kinds import FEED
@@ -31,7 +31,7 @@ def wanted(plan):
     for step in plan.steps:
         turn = plan.clamping.frames[step.access].rotation
         for t in step.trajectories:
-            if t.motion is not Motion.RAPID:
+            if t.motion is not TrajectoryKind.RAPID:
                 a = np.tile([0.0, 0.0, 1.0], (len(t.points), 1)) if t.axes is None else t.axes
                 tips.append(t.points @ turn)
                 axes.append(a @ turn)
@@ -135,8 +135,8 @@ def test_limits_and_missing_frames_are_refused_by_name():
 def test_c_alone_round_an_upright_tool_is_no_curve():
     """After a pass that ends upright C goes home while nothing else moves."""
     tips, up = np.array([[0.0, 0.0, 20.0], [5.0, 0.0, 20.0]]), np.tile([0.0, 0.0, 1.0], (2, 1))
-    across = Leg(Motion.RAPID, tips, up, np.array([[0.0, 0.4], [0.0, 0.4]]), 0.0)
-    home = Leg(Motion.RAPID, tips[[1, 1]], up, np.array([[0.0, 0.4], [0.0, 0.0]]), 0.0)
+    across = Leg(TrajectoryKind.RAPID, tips, up, np.array([[0.0, 0.4], [0.0, 0.4]]), 0.0)
+    home = Leg(TrajectoryKind.RAPID, tips[[1, 1]], up, np.array([[0.0, 0.4], [0.0, 0.0]]), 0.0)
     (curve,) = _curves([across, home])
     assert len(curve.points) == 2
     assert len(_curves([home, across])) == 1
@@ -149,7 +149,7 @@ def test_the_place_of_the_rotary_axes_is_chosen_for_the_whole_step():
     lean = np.radians(20.0)
     axes = np.column_stack([np.sin(lean) * np.sin(a), -np.sin(lean) * np.cos(a), np.full(101, np.cos(lean))])
     tips = np.column_stack([np.linspace(-4.0, 4.0, 101), np.zeros(101), np.full(101, 12.0)])
-    step = replace(plan.steps[0], trajectories=(Trajectory(Motion.CUT, tips, 500.0, axes),))
+    step = replace(plan.steps[0], trajectories=(Trajectory(TrajectoryKind.CUT, tips, 500.0, axes),))
     clamping = replace(plan.clamping, machine=RotaryMachine("table-table-AC", limits=np.radians(
         [[-60.0, 60.0], [-190.0, 190.0]])))
     (section,) = sections(replace(plan, steps=(step,), clamping=clamping))
@@ -170,7 +170,7 @@ def test_parts_of_a_pass_over_the_pole_go_on_from_one_another(at):
     axes = np.column_stack([np.zeros(51), -np.sin(lean), np.cos(lean)])
     tips = np.column_stack([np.linspace(-4.0, 4.0, 51), np.zeros(51), np.full(51, 12.0)])
     parts = [(0, 51)] if at == 0 else [(0, at + 1), (at, 51)]
-    cuts = tuple(Trajectory(Motion.CUT, tips[a:b], 500.0, axes[a:b]) for a, b in parts)
+    cuts = tuple(Trajectory(TrajectoryKind.CUT, tips[a:b], 500.0, axes[a:b]) for a, b in parts)
     machine = RotaryMachine("table-table-AC", limits=np.radians([[-5.0, 110.0], [-360.0, 360.0]]))
     job = replace(plan, steps=(replace(plan.steps[0], trajectories=cuts),),
                   clamping=replace(plan.clamping, machine=machine))

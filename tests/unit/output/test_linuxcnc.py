@@ -11,7 +11,7 @@ from geometry.errors import OutputError
 from output.linuxcnc import LINE, path_tolerance, write_linuxcnc
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, CLEAR, FLAT, line, long_plan, plan, step, tiny
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 WORD = re.compile(r"([A-Z])(-?\d+\.?\d*)")
 
@@ -91,7 +91,7 @@ def test_steps_are_named_with_zone_strategy_faces_and_depth():
 def test_points_read_back_within_half_the_grid(seed):
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(scale=10.0 ** rng.integers(-6, 2, (400, 1)), size=(400, 3)), axis=0) - 5.0
-    text = write_linuxcnc(plan(step(1, BALL, "zigzag", trajectories=(Trajectory(Motion.CUT, points, 300.0),))))
+    text = write_linuxcnc(plan(step(1, BALL, "zigzag", trajectories=(Trajectory(TrajectoryKind.CUT, points, 300.0),))))
     read = np.array([p for g, _, p in moves(text) if g == 1])
     wanted = points[0]
     k = 0
@@ -146,7 +146,7 @@ def test_order_of_words_at_a_tool_change():
 
 
 def test_safe_before_every_tool_change_and_at_the_end():
-    low = step(1, FLAT, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    low = step(1, FLAT, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
     text = write_linuxcnc(plan(low, step(2, BALL, "waterline")))
     at = moves(text[: text.index("T1 M6")])
     assert at[-1][0] == 0 and at[-1][2][2] == CLEAR
@@ -154,8 +154,8 @@ def test_safe_before_every_tool_change_and_at_the_end():
 
 
 def test_rapids_never_slant_and_steps_that_do_not_join_go_over_the_clearance_plane():
-    a = step(1, BALL, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
-    b = step(2, BALL, "planar_floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
+    a = step(1, BALL, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    b = step(2, BALL, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
     path = moves(write_linuxcnc(plan(a, b)))
     for (_, _, p), (g, _, q) in zip(path, path[1:], strict=False):
         if g == 0 and None not in p:
@@ -184,15 +184,15 @@ def moving(*trajectories):
 
 
 def test_rejects():
-    cut = line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=100)
-    slanted = reject("slanted_rapid", moving(cut, line(Motion.RAPID, (1, 0, 0), (1, 2, 3))))
+    cut = line(TrajectoryKind.CUT, (0, 0, 0), (1, 0, 0), feed=100)
+    slanted = reject("slanted_rapid", moving(cut, line(TrajectoryKind.RAPID, (1, 0, 0), (1, 2, 3))))
     assert "(1.0000, 2.0000, 3.0000)" in slanted.subjects and "S01" in slanted.subjects
-    gap = reject("gap_in_path", moving(cut, line(Motion.LIFT, (1, 0, 0.01), (1, 0, 5), feed=100)))
+    gap = reject("gap_in_path", moving(cut, line(TrajectoryKind.LIFT, (1, 0, 0.01), (1, 0, 5), feed=100)))
     assert gap.measured == pytest.approx(0.01)
-    reject("bad_feed", moving(line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=0)))
-    reject("bad_feed", moving(line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=float("nan"))))
-    reject("bad_coordinate", moving(line(Motion.CUT, (0, 0, 0), (float("nan"), 0, 0), feed=100)))
-    reject("bad_trajectory", moving(Trajectory(Motion.CUT, np.zeros((1, 3)), 100.0)))
+    reject("bad_feed", moving(line(TrajectoryKind.CUT, (0, 0, 0), (1, 0, 0), feed=0)))
+    reject("bad_feed", moving(line(TrajectoryKind.CUT, (0, 0, 0), (1, 0, 0), feed=float("nan"))))
+    reject("bad_coordinate", moving(line(TrajectoryKind.CUT, (0, 0, 0), (float("nan"), 0, 0), feed=100)))
+    reject("bad_trajectory", moving(Trajectory(TrajectoryKind.CUT, np.zeros((1, 3)), 100.0)))
     reject("empty_step", step(1, BALL, "waterline", trajectories=()))
     reject("id_twice", step(1, BALL, "waterline"), step(1, BALL, "planar_floor"))
     reject("bad_work_offset", work_offset="G60")

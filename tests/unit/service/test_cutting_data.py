@@ -19,7 +19,7 @@ from service.stages.cautions import bent, dry, limited, uncut_centres
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
 from toolpath.planning.job_plan import LATTICE_CARE
-from toolpath.tool_deflection import Bend, effective_diameter, left_by_layers
+from toolpath.tool_deflection import DeflectionEstimate, effective_diameter, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
 FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}
@@ -130,10 +130,11 @@ def test_what_layers_leave_is_what_the_planner_leaves():
 
 
 def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
-    far, near = Bend(0.4, 0.05, 0.2, 0.12), Bend(0.06, 0.05, 0.8, 0.05)
+    far, near = DeflectionEstimate(0.4, 0.05, 0.2, 0.12), DeflectionEstimate(0.06, 0.05, 0.8, 0.05)
     steps = [replace(step(1, SLIM, "depth_layers"), bend=near), replace(step(2, SLIM, "depth_layers"), bend=far),
-             replace(step(3, SLIM, "waterline"), bend=Bend(0.004, 0.005, 1.0, 0.004)), step(4, SLIM, "zigzag"),
-             replace(step(5, SLIM, "waterline"), bend=Bend(0.02, 0.005, 1.0, 0.02, fixed=True))]
+             replace(step(3, SLIM, "waterline"), bend=DeflectionEstimate(0.004, 0.005, 1.0, 0.004)),
+             step(4, SLIM, "zigzag"),
+             replace(step(5, SLIM, "waterline"), bend=DeflectionEstimate(0.02, 0.005, 1.0, 0.02, fixed=True))]
     told = bent(steps)
     assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]
     assert told[0].sentence == ("tool T1 in S02 layers and 1 other steps, roughing: its tip would bend 0.400 mm "

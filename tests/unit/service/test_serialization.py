@@ -14,7 +14,7 @@ from service.serialization import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.planning.job_plan import Plan
-from toolpath.workingsteps import Arc, Motion, Trajectory, Workingstep
+from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 from verify.model import Finding, FindingKind
 from zones.lattice import Lattice
 
@@ -23,8 +23,8 @@ FINDING = Finding(FindingKind.PLUNGE, "program.linuxcnc.ngc", 7, "Z1", None, (1.
 
 @pytest.mark.parametrize("value", [
     None, True, 3, 2.675, float("inf"), -0.0, "ä \n", (), (1, (2.5, None)), [1, (2,)], {1: "a", "b": (0.1,)},
-    Motion.CUT, FINDING, Rates(1e4, 1e3, 0.001), HighWall(3.0, 1.0, 0.4), Lattice(0.1, 0.2, 0.08, 5, 7),
-    (Arc(0, 3, (1.5, 2.5), True),)])
+    TrajectoryKind.CUT, FINDING, Rates(1e4, 1e3, 0.001), HighWall(3.0, 1.0, 0.4), Lattice(0.1, 0.2, 0.08, 5, 7),
+    (ArcSpan(0, 3, (1.5, 2.5), True),)])
 def test_plain_values_come_back_as_they_were(value):
     back = unpack(pack(value))
     assert back == value and type(back) is type(value) and repr(back) == repr(value)
@@ -102,8 +102,9 @@ def test_bytes_that_are_not_ours_are_refused(data):
 
 @pytest.fixture
 def planned_step():
-    arcs = (Arc(0, 2, (0.5, 0.5), True),)
-    cut = Trajectory(Motion.CUT, np.array([[0.0, 0, 1], [1, 0, 1], [1, 1, 1.5]]), 300.0, arcs=arcs)
-    leaning = Trajectory(Motion.CONNECT, cut.points[1:], np.float64(20.5), np.array([[0.0, 0, 1], [0, 0.6, 0.8]]))
-    return Workingstep("S01", "S01 Z1", "Z1", (3, 4), "finishing", "waterline", BALL, 8000.0, 300.0, np.float64(0.3), 0.01,
-                       0.002, (cut, leaning), np.zeros((5, 2)), 4.0, 1.0)
+    arcs = (ArcSpan(0, 2, (0.5, 0.5), True),)
+    cut = Trajectory(TrajectoryKind.CUT, np.array([[0.0, 0, 1], [1, 0, 1], [1, 1, 1.5]]), 300.0, arcs=arcs)
+    leaning = Trajectory(TrajectoryKind.CONNECT, cut.points[1:], np.float64(20.5),
+                         np.array([[0.0, 0, 1], [0, 0.6, 0.8]]))
+    return Workingstep("S01", "S01 Z1", "Z1", (3, 4), "finishing", "waterline", BALL, 8000.0, 300.0, np.float64(0.3),
+                       0.01, 0.002, (cut, leaning), np.zeros((5, 2)), 4.0, 1.0)

@@ -18,8 +18,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from service.serialization import Known, pack, unpack
 from tests.hand_parts import Case, ball, corner, plan_part, tool
 from tests.unit.toolpath.strategies.test_isoparametric import bowl
-from toolpath.passes.pass_family import Target
-from toolpath.plan_checkpoint import Keeper, PlanNow, Ways
+from toolpath.passes.pass_family import FinishTarget
+from toolpath.plan_checkpoint import CheckpointKeeper, PackedLines, PlanSnapshot
 from toolpath.plan_settings import CutData
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
@@ -32,7 +32,7 @@ class Cut(Exception):
     """The plan ends here."""
 
 
-class Each(Keeper):
+class Each(CheckpointKeeper):
     """Keeps a plan after each of its acts.
 
     data : as it is kept, to begin with
@@ -43,10 +43,10 @@ class Each(Keeper):
         self.known, self.data, self.most = known, data, most
         self.kept: list[bytearray] = []
 
-    def taken(self, use: Callable[[PlanNow], Any]) -> Any:
+    def taken(self, use: Callable[[PlanSnapshot], Any]) -> Any:
         return None if self.data is None else use(unpack(self.data, self.known))
 
-    def done(self, now: Callable[[], PlanNow]) -> None:
+    def done(self, now: Callable[[], PlanSnapshot]) -> None:
         self.kept.append(pack(now(), self.known))
         if len(self.kept) == self.most:
             raise Cut
@@ -61,19 +61,19 @@ class Job:
         self.stock = stock or (lambda c: StockMap(c.stock_before.lattice, c.stock_before.top.copy(),
                                                   c.stock_before.cover.copy(), c.stock_before.part))
         self.cut = cut or {t: CutData(10_000, 800, 200, 3000, 0.3 * f.tool.diameter) for t, f in case.fields.items()}
-        self.checks = [Target(case.samples.points[z.samples], case.samples.normals[z.samples], z.tips, 0.2)
+        self.checks = [FinishTarget(case.samples.points[z.samples], case.samples.normals[z.samples], z.tips, 0.2)
                        for z in case.zones]
         self.known = Known({"ToolBody": {t: f.tool for t, f in case.fields.items()},
                             "ZoneArea": {z.id: z for z in case.zones}})
 
-    def run(self, keeper: Keeper) -> tuple[Plan, bytearray]:
+    def run(self, keeper: CheckpointKeeper) -> tuple[Plan, bytearray]:
         """A plan, and all there is of it and of the stock it leaves."""
         c, stock = self.case, self.stock(self.case)
         plan = plan_job(c.zones, self.checks, c.fields, self.cut, stock, self.settings, None, 4, self.trimmed, keeper)
         stock.settle(last=True)
         return plan, pack((plan, stock.top, stock.cover), self.known)
 
-    def whole(self) -> tuple[list[PlanNow], list[bytearray], Plan, bytearray]:
+    def whole(self) -> tuple[list[PlanSnapshot], list[bytearray], Plan, bytearray]:
         """What is kept after each act of a plan that nothing happens to, and what it comes to."""
         keeper = Each(self.known)
         plan, end = self.run(keeper)
@@ -172,8 +172,8 @@ def test_a_plan_cut_off_once_goes_on_to_its_end():
 
 def test_lines_come_back_in_their_order():
     lines = [np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), np.ones((1, 3))]
-    assert [a.tobytes() for a in Ways.of(lines).lines()] == [a.tobytes() for a in lines]
-    assert Ways.of([]).lines() == [] and Ways.of([]).points.shape == (0, 3)
+    assert [a.tobytes() for a in PackedLines.of(lines).lines()] == [a.tobytes() for a in lines]
+    assert PackedLines.of([]).lines() == [] and PackedLines.of([]).points.shape == (0, 3)
 
 
 @pytest.mark.parametrize("other", [
@@ -191,8 +191,8 @@ def test_what_does_not_fit_is_refused_before_any_stock_is_touched(other):
     stock = job.stock(job.case)
     before = stock.top.tobytes(), stock.cover.tobytes()
 
-    class Foreign(Keeper):
-        def taken(self, use: Callable[[PlanNow], Any]) -> Any:
+    class Foreign(CheckpointKeeper):
+        def taken(self, use: Callable[[PlanSnapshot], Any]) -> Any:
             with pytest.raises((ValueError, KeyError, TypeError, IndexError, AttributeError)):
                 use(other(states[4]))
             raise Cut

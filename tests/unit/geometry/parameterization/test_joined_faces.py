@@ -10,7 +10,7 @@ from geometry.parameterization.square_patches import squared
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball
 from toolpath.passes.cutter_locations import lifted
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import JoinedSurface, lay_out
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
@@ -94,7 +94,7 @@ def test_passes_over_faces_as_one_leave_the_scallop(turned):
     iso = JoinedSurface(iso.faces, iso.splines, turned)
     lines, body = [], ball(2.0 * radius)
     for eta in lay_out(iso, radius, scallop - chord).tolist():
-        profile = Profile.of(iso.curve(eta), chord, radius)
+        profile = PassProfile.of(iso.curve(eta), chord, radius)
         lines += lifted(profile, steps(profile, radius, chord, scallop), body, nothing, chord)[0]
     start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])
     moves = Moves(start, end, np.ones(len(start), bool), np.zeros(len(start), np.int32))

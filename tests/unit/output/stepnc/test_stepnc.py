@@ -15,7 +15,7 @@ from output.stepnc.part21 import quoted, real, time_stamp
 from output.workplan import Ap238, StockBox
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 WRITERS = {"tiny.arm.stpnc": write_stepnc_arm, "tiny.stpnc": write_stepnc_aim}
 both = pytest.mark.parametrize("write", WRITERS.values(), ids=["arm", "aim"])
@@ -108,10 +108,10 @@ def test_arm_units_signs_and_tool_bodies():
 def test_passes_along_the_borders_of_faces_are_told_by_parameters():
     """One pass alone goes forward; each against the one before it is to and fro."""
     along = np.array([[0.0, 0, 5], [10, 0, 5]])
-    one_way, both_ways = ([Trajectory(Motion.CUT, p, 600.0) for p in ways] for ways in
+    one_way, both_ways = ([Trajectory(TrajectoryKind.CUT, p, 600.0) for p in ways] for ways in
                           ([along, along + [0.0, 1, 0]], [along, along[::-1] + [0.0, 1, 0]]))
     for cuts, mode in ((one_way, "FORWARD"), (both_ways, "ZIGZAG")):
-        link = Trajectory(Motion.CONNECT, np.array([cuts[0].points[-1], cuts[1].points[0]]), 600.0)
+        link = Trajectory(TrajectoryKind.CONNECT, np.array([cuts[0].points[-1], cuts[1].points[0]]), 600.0)
         job = plan(step(1, BALL, "isoparametric", trajectories=(cuts[0], link, cuts[1])))
         text = write_stepnc_arm(job)
         assert text.count(f"UV_STRATEGY(.{mode}.,.CLIMB.,") == 1 and "PLANE_CL_STRATEGY" not in text
@@ -140,8 +140,8 @@ def test_arm_outline_is_closed():
 
 
 def test_steps_with_one_tool_that_do_not_join_are_linked_over_the_clearance_plane():
-    a = step(1, BALL, "planar_floor", trajectories=(line(Motion.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
-    b = step(2, BALL, "planar_floor", trajectories=(line(Motion.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
+    a = step(1, BALL, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
+    b = step(2, BALL, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (9, 3, 2), (5, 0, 2), feed=100),))
     wanted = np.array([[5, 0, 1], [5, 0, 25], [9, 3, 25], [9, 3, 2]], dtype=float)
     for write in WRITERS.values():
         data = instances(write(plan(a, b)))
@@ -222,7 +222,7 @@ def test_class_two_has_shapes_strategies_and_instructions_and_class_one_none():
 def test_zigzag_planes_follow_the_passes():
     t = np.linspace(0.0, 10.0, 5)
     there = np.column_stack([t, 0.5 * t, np.zeros(5)])
-    cut = (Trajectory(Motion.CUT, there, 100.0), Trajectory(Motion.CUT, there[::-1].copy(), 100.0))
+    cut = (Trajectory(TrajectoryKind.CUT, there, 100.0), Trajectory(TrajectoryKind.CUT, there[::-1].copy(), 100.0))
     normal = np.array(pass_plane_normal(step(1, BALL, "zigzag", trajectories=cut)))
     assert abs(normal @ (there[1] - there[0])) < 1e-12 and np.linalg.norm(normal) == pytest.approx(1.0)
 
@@ -238,11 +238,13 @@ def test_strings_and_reals():
 
 @both
 def test_rejects(write):
-    cut = line(Motion.CUT, (0, 0, 0), (1, 0, 0), feed=100)
+    cut = line(TrajectoryKind.CUT, (0, 0, 0), (1, 0, 0), feed=100)
     bad = {
-        "slanted_rapid": plan(step(1, BALL, "waterline", trajectories=(line(Motion.RAPID, (0, 0, 0), (1, 0, 1)),))),
+        "slanted_rapid": plan(step(1, BALL, "waterline",
+                                   trajectories=(line(TrajectoryKind.RAPID, (0, 0, 0), (1, 0, 1)),))),
         "gap_in_path": plan(step(1, BALL, "waterline", trajectories=(cut, cut))),
-        "empty_step": plan(step(1, BALL, "waterline", trajectories=(line(Motion.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
+        "empty_step": plan(step(1, BALL, "waterline",
+                                trajectories=(line(TrajectoryKind.CUT, (0, 0, 0), (0, 0, 0), feed=1),))),
         "bad_stock": plan(stock=StockBox(np.zeros(3), np.array([1.0, 1.0, 0.0]))),
         "id_twice": plan(step(1, BALL, "waterline"), step(1, BALL, "planar_floor")),
     }

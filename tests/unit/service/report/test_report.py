@@ -10,11 +10,11 @@ import pytest
 from service.report import report
 from tests.synthetic_plan import BALL, step
 from toolpath.planning.zone_finishing import ZonePlan
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 
 def cut(length: float, feed: float) -> tuple[Trajectory, ...]:
-    return (Trajectory(Motion.CUT, np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]), feed),)
+    return (Trajectory(TrajectoryKind.CUT, np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]), feed),)
 
 
 @pytest.fixture

@@ -22,9 +22,9 @@ from service.stages.access_plan import Side
 from service.stages.resume import Resumed
 from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.plan_checkpoint import NOTHING, Keeper, PlanNow
+from toolpath.plan_checkpoint import NOTHING, CheckpointKeeper, PlanSnapshot
 from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock.stock_map import StockMap, StockNow
+from toolpath.stock.stock_map import StockMap, StockSnapshot
 from verify.model import NcProgram, Proof, Spent
 from zones.lattice import Lattice
 
@@ -52,18 +52,18 @@ class Job:
         """An attempt that ends before it plans or proves more than so often or after so many acts; its files."""
         self.planned, self.proved, self.acts = [], 0, 0
 
-        class Watched(Keeper):
-            def __init__(self, keeper: Keeper) -> None:
+        class Watched(CheckpointKeeper):
+            def __init__(self, keeper: CheckpointKeeper) -> None:
                 self.taken = keeper.taken  # type: ignore[method-assign]
                 self.keep = keeper.done
 
-            def done(_self, now: Callable[[], PlanNow]) -> None:
+            def done(_self, now: Callable[[], PlanSnapshot]) -> None:
                 self.acts += 1
                 _self.keep(now)
                 if self.acts == acts:
                     raise Cut
 
-        def planner(zones: Any, *args: Any, keeper: Keeper, **more: Any) -> Plan:
+        def planner(zones: Any, *args: Any, keeper: CheckpointKeeper, **more: Any) -> Plan:
             if len(self.planned) == plans:
                 raise Cut
             self.planned.append(zones[0].access)
@@ -171,7 +171,7 @@ class Prepared:
     def resumed(self, kept: Kept, **changes: Any) -> Resumed:
         return Resumed(kept, replace(self.ready, **changes), self.checks, self.samples)
 
-    def side(self, keeper: Keeper = NOTHING) -> Side:
+    def side(self, keeper: CheckpointKeeper = NOTHING) -> Side:
         """A plan, with the stock as it leaves it."""
         self.made += 1
         left = StockMap(Lattice(0.0, 0.0, 0.5, 3, 2), np.arange(6.0).reshape(2, 3))
@@ -226,16 +226,16 @@ def test_what_is_whole_but_no_plan_is_made_again(prepared, tmp_path, words):
     assert prepared.asked(kept) == 1 and prepared.asked(kept) == 0
 
 
-UNDER_WAY = PlanNow(3, (), StockNow(np.zeros((2, 3)), np.ones((2, 3)), None, None), ())
+UNDER_WAY = PlanSnapshot(3, (), StockSnapshot(np.zeros((2, 3)), np.ones((2, 3)), None, None), ())
 
 
 def test_a_plan_under_way_is_there_until_the_plan_is(prepared, tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
     told: list[dict[str, int]] = []
     kept = Kept(tmp_path / "kept", told.append)
-    found: list[PlanNow | None] = []
+    found: list[PlanSnapshot | None] = []
 
-    def make(keeper: Keeper, change: Callable[[], object] = lambda: None) -> Side:
+    def make(keeper: CheckpointKeeper, change: Callable[[], object] = lambda: None) -> Side:
         found.append(keeper.taken(lambda now: now))
         keeper.done(lambda: replace(UNDER_WAY, acts=len(found), steps=prepared.side().made.steps))
         assert kinds(kept) == ["acts"]
@@ -263,12 +263,12 @@ def test_a_plan_under_way_is_written_down_now_and_then(prepared, tmp_path, monke
     monkeypatch.setattr(resume, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     written: list[float] = []
 
-    def now(seconds: float) -> PlanNow:
+    def now(seconds: float) -> PlanSnapshot:
         written.append(clock[0])
         clock[0] += seconds
         return UNDER_WAY
 
-    def make(keeper: Keeper) -> Side:
+    def make(keeper: CheckpointKeeper) -> Side:
         for k in range(4000):
             clock[0] = max(clock[0], 0.1 * k)
             keeper.done(partial(now, 0.0 if k < 500 else 2.0))
@@ -283,7 +283,7 @@ def test_what_is_no_plan_under_way_is_thrown_away(prepared, tmp_path, monkeypatc
     monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
     kept = Kept(tmp_path / "kept")
 
-    def make(keeper: Keeper) -> Side:
+    def make(keeper: CheckpointKeeper) -> Side:
         keeper.done(lambda: UNDER_WAY)
         (path,) = (tmp_path / "kept").iterdir()
         kept.put(*path.name.split("-"), len(words).to_bytes(8, "little") + words)

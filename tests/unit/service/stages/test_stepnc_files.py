@@ -13,7 +13,7 @@ from service.stages.access_plan import Program
 from service.stages.stepnc_files import stepnc_files, stepnc_under_way
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_what_nobody_waited_for_does_not_stay(job, apart, tmp_path):
 
 def test_what_differs_from_the_program_is_no_file_there_either(job, apart, tmp_path):
     (program,), *rest = job
-    moved = replace(program.work.steps[0], trajectories=(line(Motion.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))
+    moved = replace(program.work.steps[0], trajectories=(line(TrajectoryKind.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))
     with (pytest.raises(InternalError) as differs,
           stepnc_under_way([replace(program, work=plan(moved))], *rest, tmp_path) as files):
         files()

@@ -16,7 +16,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from service.stages.cautions import lives_ended
 from tests import synthetic_plan as made
 from toolpath.feeds.tool_life import minutes_in_cut, with_fresh_cutters, worn
-from toolpath.workingsteps import Motion, Trajectory, trajectory_seconds
+from toolpath.workingsteps import Trajectory, TrajectoryKind, trajectory_seconds
 
 CLEAR, FEED, AIR = made.CLEAR, 600.0, 3000.0
 
@@ -26,7 +26,7 @@ def passes(*lengths: float) -> tuple[Trajectory, ...]:
     out: list[Trajectory] = []
     at = np.array([0.0, 0.0, CLEAR])
 
-    def go(motion: Motion, to: list[float], feed: float) -> None:
+    def go(motion: TrajectoryKind, to: list[float], feed: float) -> None:
         nonlocal at
         end = np.array(to)
         out.append(Trajectory(motion, np.array([at, end]), feed))
@@ -35,14 +35,14 @@ def passes(*lengths: float) -> tuple[Trajectory, ...]:
     for k, length in enumerate(lengths):
         y = float(k)
         if k:
-            go(Motion.RAPID, [0.0, y, CLEAR], 0.0)
-        go(Motion.RAPID, [0.0, y, 5.0], 0.0)
-        go(Motion.APPROACH, [0.0, y, 2.0], 200.0)
-        go(Motion.CUT, [length, y, 2.0], FEED)
-        go(Motion.CONNECT, [length, y + 0.5, 2.0], AIR)
-        go(Motion.CUT, [0.0, y + 0.5, 2.0], FEED)
-        go(Motion.LIFT, [0.0, y + 0.5, 5.0], AIR)
-        go(Motion.RAPID, [0.0, y + 0.5, CLEAR], 0.0)
+            go(TrajectoryKind.RAPID, [0.0, y, CLEAR], 0.0)
+        go(TrajectoryKind.RAPID, [0.0, y, 5.0], 0.0)
+        go(TrajectoryKind.APPROACH, [0.0, y, 2.0], 200.0)
+        go(TrajectoryKind.CUT, [length, y, 2.0], FEED)
+        go(TrajectoryKind.CONNECT, [length, y + 0.5, 2.0], AIR)
+        go(TrajectoryKind.CUT, [0.0, y + 0.5, 2.0], FEED)
+        go(TrajectoryKind.LIFT, [0.0, y + 0.5, 5.0], AIR)
+        go(TrajectoryKind.RAPID, [0.0, y + 0.5, CLEAR], 0.0)
     return tuple(out)
 
 
@@ -51,13 +51,13 @@ def step(number: int, *lengths: float):
 
 
 def cuts(steps) -> list[np.ndarray]:
-    return [t.points for s in steps for t in s.trajectories if t.motion is Motion.CUT]
+    return [t.points for s in steps for t in s.trajectories if t.motion is TrajectoryKind.CUT]
 
 
 def test_minutes_are_those_of_moves_at_the_feed_and_below_it():
     s = step(1, 100.0)
     kept = [t.motion for t, m in zip(s.trajectories, minutes_in_cut(s), strict=True) if m > 0.0]
-    assert kept == [Motion.APPROACH, Motion.CUT, Motion.CUT]
+    assert kept == [TrajectoryKind.APPROACH, TrajectoryKind.CUT, TrajectoryKind.CUT]
 
 
 def test_minutes_hold_cuts_faster_than_the_feed_of_the_step_and_all_where_air_is_no_faster():
@@ -66,7 +66,7 @@ def test_minutes_hold_cuts_faster_than_the_feed_of_the_step_and_all_where_air_is
     assert minutes_in_cut(eased).sum() == minutes_in_cut(s).sum() > 0.2
     same = replace(s, feed=AIR, trajectories=tuple(replace(t, feed=AIR) for t in s.trajectories))
     kept = [t.motion for t, m in zip(same.trajectories, minutes_in_cut(same), strict=True) if m > 0.0]
-    assert kept == [m for m in (t.motion for t in s.trajectories) if m is not Motion.RAPID]
+    assert kept == [m for m in (t.motion for t in s.trajectories) if m is not TrajectoryKind.RAPID]
     assert minutes_in_cut(s).sum() == pytest.approx(2 * 100.0 / FEED + 3.0 / 200.0, rel=0.01)
     assert trajectory_seconds(s.trajectories, s.rates).sum() == pytest.approx(s.seconds)
     assert trajectory_seconds((), s.rates).shape == (0,)

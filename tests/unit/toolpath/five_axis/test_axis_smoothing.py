@@ -6,21 +6,21 @@ import pytest
 from geometry.parameterization.grid_map import GridMap
 from tests.hand_parts import ball
 from tests.unit.toolpath.five_axis.test_oriented_pass import CHORD, SCALLOP, opposite, tree_of, wall
-from toolpath.five_axis.axis_smoothing import FAN, SPACING, Limits, fan, steered
+from toolpath.five_axis.axis_smoothing import FAN, SPACING, AxisLimits, fan, steered
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
 from toolpath.passes.cutter_locations import tips
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import IsoSurface
 from toolpath.poses import angles_between
 from zones.reach.assembly import Clearances
 
-WIDE = Limits(np.radians(40.0), np.radians(6.0))
+WIDE = AxisLimits(np.radians(40.0), np.radians(6.0))
 R = 2.0
 
 
 def profile_over(surface, eta=0.5):
     at = np.linspace(0.0, 1.0, 5)
-    return Profile.of(IsoSurface(surface, GridMap.of(np.dstack(np.meshgrid(at, at)))).curve(eta), CHORD, R)
+    return PassProfile.of(IsoSurface(surface, GridMap.of(np.dstack(np.meshgrid(at, at)))).curve(eta), CHORD, R)
 
 
 def nothing(tip, _axis):
@@ -58,7 +58,7 @@ def test_a_fan_is_even_and_has_its_own_axis_first():
 def test_a_sudden_turn_is_spread_by_the_closed_form(spread):
     angle, surface = np.radians(10.0), wall(0.0)
     profile = profile_over(surface)
-    made = steered(profile, ball(2.0 * R), jump(0.0, angle), nothing, Limits(1.0, 1.0, spread))
+    made = steered(profile, ball(2.0 * R), jump(0.0, angle), nothing, AxisLimits(1.0, 1.0, spread))
     lean = np.arctan2(made.axis[:, 0], made.axis[:, 2])
     s = made.contact[:, 0]
     want = np.where(s > 0.0, angle - 0.5 * angle * np.exp(-s / spread), 0.5 * angle * np.exp(s / spread))
@@ -70,7 +70,7 @@ def test_a_sudden_turn_is_spread_by_the_closed_form(spread):
 
 def test_turns_are_spread_until_they_keep_to_the_limit():
     limit = np.radians(1.0)
-    made = steered(profile_over(wall(0.0)), ball(2.0 * R), jump(0.0, np.radians(20.0)), nothing, Limits(1.0, limit))
+    made = steered(profile_over(wall(0.0)), ball(2.0 * R), jump(0.0, np.radians(20.0)), nothing, AxisLimits(1.0, limit))
     assert 0.4 * limit < made.per_mm <= limit
 
 
@@ -91,7 +91,7 @@ def test_no_station_is_blocked_where_an_axis_of_the_fan_is_free_and_the_field_st
         at = tip + up[:, None] * axis
         return (np.abs(at[:, 0]) < 3.0) & (at[:, 1] > -20.0)
 
-    made = steered(profile, body, upright, bar, Limits(np.radians(40.0), np.radians(10.0)))
+    made = steered(profile, body, upright, bar, AxisLimits(np.radians(40.0), np.radians(10.0)))
     assert made.free.all()
     normal = np.tile([0.0, -1.0, 0.0], (len(made.contact), 1))
     tip = tips(made.contact, normal, body, made.axis)
@@ -143,7 +143,7 @@ def test_passes_between_walls_are_walked_whole_with_steered_axes_and_not_with_th
     field = lead_and_tilt(0.0, np.radians(30.0))
     ends = steps(profile, R, CHORD, SCALLOP)
     blunt = posed(profile, ends, body, field, free, CHORD, 0.003)
-    made = steered(profile, body, field, free, Limits(np.radians(70.0), np.radians(10.0)))
+    made = steered(profile, body, field, free, AxisLimits(np.radians(70.0), np.radians(10.0)))
     led = posed(profile, ends, body, made, free, CHORD, 0.003)
     assert made.free.all()
     assert sum(b - a for a, b in blunt.left) > 0.9 * profile.length
@@ -152,7 +152,7 @@ def test_passes_between_walls_are_walked_whole_with_steered_axes_and_not_with_th
 
 def test_a_pass_shorter_than_it_takes_to_get_round_is_led_too():
     """Both ends are nearer than it takes to turn through the cone at the limit."""
-    profile, slow = profile_over(wall(0.0)), Limits(np.radians(40.0), np.radians(0.2))
+    profile, slow = profile_over(wall(0.0)), AxisLimits(np.radians(40.0), np.radians(0.2))
     assert slow.cone / slow.per_mm > profile.length
     blocked = beside = 0
 

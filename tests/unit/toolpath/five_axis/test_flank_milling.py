@@ -8,11 +8,11 @@ import pytest
 import toolpath.five_axis.flank_milling as flank
 from geometry.errors import GeometryError
 from tests.hand_parts import ball, tool
-from toolpath.five_axis.flank_milling import Wall, Wanted, bands
+from toolpath.five_axis.flank_milling import FlankTolerances, FlankWall, bands
 from toolpath.five_axis.oriented_piece import Piece, thinned_poses
 from toolpath.stock.residual_map import leaning_depths
 
-ASKED = Wanted(0.02, 0.002, 0.002)
+ASKED = FlankTolerances(0.02, 0.002, 0.002)
 LENGTH, HEIGHT = 40.0, 8.0
 
 
@@ -71,7 +71,7 @@ def left_and_deep(wall, band, count=2000):
 @pytest.mark.parametrize("body", [ball(6.0), tool(6.0, 1.0), tool(6.0, 0.0)], ids=["ball", "bull", "flat"])
 @pytest.mark.parametrize("angle", [-0.2, 0.0, 0.15])
 def test_a_plane_takes_one_pass_that_lies_on_it(body, angle):
-    wall = Wall(leaned(angle))
+    wall = FlankWall(leaned(angle))
     (band,) = bands(wall, body, ASKED)
     tip, axis = band.poses(50)
     ruling = np.array([0.0, np.sin(angle), np.cos(angle)])
@@ -85,7 +85,7 @@ def test_a_plane_takes_one_pass_that_lies_on_it(body, angle):
 
 @pytest.mark.parametrize("hollow", [False, True])
 def test_on_a_cone_axes_go_through_its_apex(hollow):
-    wall = Wall(cone(hollow=hollow))
+    wall = FlankWall(cone(hollow=hollow))
     (band,) = bands(wall, ball(6.0), ASKED)
     tip, axis = band.poses(41)
     # the axis is the ruling moved off the wall: both lie in a plane through the axis of the cone
@@ -99,8 +99,8 @@ def test_on_a_cone_axes_go_through_its_apex(hollow):
 @pytest.mark.parametrize("radius", [3.0, 5.0])
 def test_what_a_twisted_wall_leaves_falls_with_the_square_of_the_height(radius):
     """Half as high turns half as much along a ruling: a quarter of the miss."""
-    wanted = Wanted(0.1, 10.0, 0.002)  # where anything may be left, the steepest way is as good as a ruling
-    wall, body = Wall(twisted(0.5)), ball(2.0 * radius)
+    wanted = FlankTolerances(0.1, 10.0, 0.002)  # where anything may be left, the steepest way is as good as a ruling
+    wall, body = FlankWall(twisted(0.5)), ball(2.0 * radius)
     whole, half = (bands(wall, body, wanted, 0.5 - 0.5 * h, 0.5 + 0.5 * h)[0] for h in (1.0, 0.5))
     misses = [sum(left_and_deep(wall, band)) for band in (whole, half)]
     assert misses[1] <= 0.3 * misses[0]
@@ -116,13 +116,13 @@ def test_a_wall_that_bulges_is_cut_in_as_few_bands_as_leave_little_enough():
             normal = np.column_stack([0.0 * xi, -np.cos(a), np.sin(a)])
             return np.column_stack([LENGTH * xi, 0.0 * xi, 0.0 * xi]) + 150.0 * normal, normal
 
-    wall = Wall(Bulge())
+    wall = FlankWall(Bulge())
     made = bands(wall, ball(10.0), ASKED)
     assert [(b.low, b.high) for b in made] == [(0.5, 1.0), (0.0, 0.5)]
     for band in made:
         left, deep = left_and_deep(wall, band)
         assert 0.007 < left <= ASKED.left and deep <= 1.25 * ASKED.depth
-    whole, = bands(wall, ball(10.0), Wanted(0.06, 0.002, 0.002))
+    whole, = bands(wall, ball(10.0), FlankTolerances(0.06, 0.002, 0.002))
     assert 0.04 < left_and_deep(wall, whole)[0] < 0.06
 
 
@@ -134,20 +134,20 @@ def test_what_is_round_both_ways_is_refused_with_what_it_misses():
             return 20.0 * normal, normal
 
     with pytest.raises(GeometryError) as refusal:
-        bands(Wall(Dome()), ball(6.0), ASKED)
+        bands(FlankWall(Dome()), ball(6.0), ASKED)
     assert refusal.value.code == "bad_pass"
     assert refusal.value.measured > ASKED.left
 
 
 def test_flutes_shorter_than_the_wall_take_more_bands():
     short = tool(6.0, 1.0, neck=30.0)
-    made = bands(Wall(leaned(0.1)), short, ASKED)
+    made = bands(FlankWall(leaned(0.1)), short, ASKED)
     room = short.flute_length - short.corner_radius
     assert len(made) == int(np.ceil(HEIGHT / np.cos(0.1) / room))
 
 
 def test_an_allowance_is_left():
-    wall = Wall(leaned(0.1))
+    wall = FlankWall(leaned(0.1))
     (band,) = bands(wall, ball(6.0), ASKED, allowance=0.3)
     xi = np.linspace(0.05, 0.95, 50)
     depth = leaning_depths(wall.contact(xi, np.full(50, 0.5))[0], *band.poses(400), band.tool, 1.0)
@@ -159,13 +159,13 @@ def test_it_does_not_matter_how_the_wall_stands():
     q *= np.sign(np.linalg.det(q))
     plain, turned = cone(), cone()
     turned.turn = q if q[2, 2] > 0 else q @ np.diag([1.0, -1.0, -1.0])
-    a, b = (bands(Wall(w), ball(6.0), ASKED)[0] for w in (plain, turned))
-    assert Wall(turned)._upwards
+    a, b = (bands(FlankWall(w), ball(6.0), ASKED)[0] for w in (plain, turned))
+    assert FlankWall(turned)._upwards
     assert np.abs(b.poses(20)[0] - a.poses(20)[0] @ turned.turn.T).max() < 1e-3
 
 
 def test_a_pass_is_raised_over_what_its_end_would_meet_and_ends_where_that_is_too_much():
-    wall = Wall(leaned(0.0))
+    wall = FlankWall(leaned(0.0))
     (band,) = bands(wall, ball(6.0), ASKED)
 
     def blocked(tip, axis):
@@ -187,7 +187,7 @@ def test_a_pass_is_raised_over_what_its_end_would_meet_and_ends_where_that_is_to
 
 
 def test_a_pass_goes_only_where_it_is_wanted():
-    (band,) = bands(Wall(leaned(0.1)), ball(6.0), ASKED)
+    (band,) = bands(FlankWall(leaned(0.1)), ball(6.0), ASKED)
     served = np.zeros(101, np.bool_)
     served[20:61] = True
     (piece,) = band.pieces(lambda tip, axis: np.zeros(len(tip), np.bool_), 0.002, served)
@@ -221,7 +221,7 @@ def test_the_steps_of_the_search_are_smoothed_out_and_straight_changes_are_left_
 
 def test_on_a_plane_with_oblique_ends_the_axis_stays_the_steepest():
     """Its own parameters fan to both sides; every ruling of a plane is as good."""
-    wall = Wall(Ruled(straight(0.0, 0.0, 0.0), shorter(0.8, 0.1 * HEIGHT)))
+    wall = FlankWall(Ruled(straight(0.0, 0.0, 0.0), shorter(0.8, 0.1 * HEIGHT)))
     (band,) = bands(wall, ball(6.0), ASKED)
     axis = band.poses(200)[1]
     assert np.degrees(np.arccos(np.clip(axis @ axis[100], -1.0, 1.0))).max() < 1.0  # 27 where it goes along the ends
@@ -237,7 +237,7 @@ def shorter(share, y):
 
 def test_a_tool_whose_flutes_end_where_its_corner_does_has_no_flank():
     with pytest.raises(GeometryError) as refused:
-        bands(Wall(leaned(0.1)), replace(ball(6.0), flute_length=3.0), ASKED)
+        bands(FlankWall(leaned(0.1)), replace(ball(6.0), flute_length=3.0), ASKED)
     assert refused.value.code == "bad_pass" and "no flank" in refused.value.message
 
 

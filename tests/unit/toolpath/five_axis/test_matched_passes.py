@@ -11,8 +11,8 @@ from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
-from toolpath.five_axis.matched_passes import Matched, Wanted
-from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
+from toolpath.five_axis.matched_passes import MatchedPasses, MatchTolerances
+from toolpath.five_axis.tilted_end import Nose, PassContacts, strip_edges
 from toolpath.passes.isoparametric_passes import IsoSurface
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
@@ -51,8 +51,8 @@ def measured(surface, body, passes):
     (bowl(-200.0, -150.0), 0.5, 0.02, tool(12.0, 1.0)), (bowl(80.0, -90.0), 0.5, 0.02, tool(12.0, 0.0))],
     ids=["hollow", "curvature that grows", "convex", "saddle"])
 def test_the_proof_finds_no_more_left_and_no_deeper_cut_than_asked(surface, least, height, body):
-    wanted = Wanted(0.9 * height, 0.001, np.radians(least), 0.0003)
-    made = Matched.over(passes_along_y(surface), body, wanted)
+    wanted = MatchTolerances(0.9 * height, 0.001, np.radians(least), 0.0003)
+    made = MatchedPasses.over(passes_along_y(surface), body, wanted)
     strips = made.lay_out()
     left = measured(surface, body, [made.located(s) for s in strips])
     assert left.max() <= height
@@ -65,7 +65,7 @@ def test_the_proof_finds_no_more_left_and_no_deeper_cut_than_asked(surface, leas
     (bowl(1e9, 1e9), 0.02, tool(12.0, 0.0), 4), (bowl(60.0, 60.0), 0.0, tool(6.0, 0.0), 9)], ids=["plane", "sphere"])
 def test_strips_as_wide_as_the_tool_are_cut_to_the_ends_of_the_face(surface, least, body, most):
     """The edges of such strips lie the whole radius behind the contact: passes go on so far, and do not crawl."""
-    made = Matched.over(passes_along_y(surface), body, Wanted(0.0045, 0.001, np.radians(least), 0.0003))
+    made = MatchedPasses.over(passes_along_y(surface), body, MatchTolerances(0.0045, 0.001, np.radians(least), 0.0003))
     strips = made.lay_out()
     assert len(strips) <= most
     left = measured(surface, body, [made.located(s) for s in strips])
@@ -73,14 +73,15 @@ def test_strips_as_wide_as_the_tool_are_cut_to_the_ends_of_the_face(surface, lea
 
 
 def test_a_level_plane_without_a_least_tilt_takes_a_strip_a_tool_wide():
-    made = Matched.over(passes_along_y(bowl(1e9, 1e9)), tool(12.0, 0.0), Wanted(0.0045, 0.001, 0.0, 0.0003))
+    made = MatchedPasses.over(passes_along_y(bowl(1e9, 1e9)), tool(12.0, 0.0),
+                              MatchTolerances(0.0045, 0.001, 0.0, 0.0003))
     assert len(made.lay_out()) == 4
 
 
 def test_a_place_whose_height_is_not_known_counts_as_one_the_nose_enters(monkeypatch):
     """At a pole there is no normal: no tilt may be called free there."""
     surface, body = bowl(60.0, 150.0), tool(6.0, 0.0)
-    at = Contacts.on(surface, np.array([[0.5, 0.5], [0.3, 0.4]]), np.tile([0.0, 1.0], (2, 1)))
+    at = PassContacts.on(surface, np.array([[0.5, 0.5], [0.3, 0.4]]), np.tile([0.0, 1.0], (2, 1)))
     nose, heights = Nose(surface, body, surface.domain), Nose.heights
     assert np.isfinite(nose.least_tilt(at, np.zeros(2), 1e-3, 0.0)).all()
 
@@ -96,14 +97,15 @@ def test_a_place_whose_height_is_not_known_counts_as_one_the_nose_enters(monkeyp
 def test_few_passes_where_the_nose_matches():
     """On the hollow of 60 by 150 mm a flat of 12 mm cuts strips of 6.6 mm, a ball of 12 mm such of 0.5 mm."""
     body = tool(12.0, 0.0)
-    strips = Matched.over(passes_along_y(bowl(60.0, 150.0)), body, Wanted(0.005, 0.0, 0.0, 0.0003)).lay_out()
+    strips = MatchedPasses.over(passes_along_y(bowl(60.0, 150.0)), body,
+                                MatchTolerances(0.005, 0.0, 0.0, 0.0003)).lay_out()
     width = strip_width(matching_tilt(np.array([1 / 60]), body), np.array([1 / 60]), np.array([1 / 150]), body, 0.005)
     assert len(strips) <= np.ceil(2 * HALF * 1.02 / (0.9 * width[0]))
 
 
 def test_the_strip_is_where_the_nose_stands_lower_than_the_height():
     surface, body = bowl(60.0, 150.0), tool(12.0, 0.0)
-    at = Contacts.on(surface, np.array([[0.5, 0.5]]), np.array([[0.0, 1.0]]))
+    at = PassContacts.on(surface, np.array([[0.5, 0.5]]), np.array([[0.0, 1.0]]))
     nose, straight = Nose(surface, body, surface.domain), np.zeros(1)
     tilt = nose.least_tilt(at, straight, 0.0, 0.0)
     assert tilt[0] == pytest.approx(matching_tilt(np.array([1 / 60]), body)[0], rel=2e-3)
@@ -117,8 +119,8 @@ def test_the_strip_is_where_the_nose_stands_lower_than_the_height():
 @pytest.mark.parametrize(("surface", "least"), [(bowl(60.0, 150.0), 0.0), (bowl(-200.0, -150.0), 0.5)])
 def test_a_pass_goes_on_until_the_nose_from_edge_to_edge_is_over_the_border(surface, least, turn):
     """Turned, the nose reaches ahead of the contact and of the edge on one side, and lags on the other."""
-    wanted = Wanted(0.0045, 0.001, np.radians(least), 0.0003)
-    made = Matched.over(passes_along_y(surface), tool(12.0, 0.0), wanted)
+    wanted = MatchTolerances(0.0045, 0.001, np.radians(least), 0.0003)
+    made = MatchedPasses.over(passes_along_y(surface), tool(12.0, 0.0), wanted)
     strip = made.strip(0.5, np.full(len(made.stations), np.radians(turn)))
     assert made.run_out >= strip.ends[1] - 1.0
     assert np.diff(made.stations).max() <= 1.0 / 32.0 + 1e-12  # however far it runs out
@@ -137,7 +139,7 @@ def test_a_pass_goes_on_until_the_nose_from_edge_to_edge_is_over_the_border(surf
 def test_edges_lie_where_a_nose_of_many_places_has_them(surface, depth):
     """Of a strip but two places of the nose wide a straight line between heights took 6 %."""
     body, rng = tool(30.0, 0.0), np.random.default_rng(6)
-    at = Contacts.on(surface, rng.uniform(0.3, 0.7, (20, 2)), np.tile([0.0, 1.0], (20, 1)))
+    at = PassContacts.on(surface, rng.uniform(0.3, 0.7, (20, 2)), np.tile([0.0, 1.0], (20, 1)))
     nose, turn = Nose(surface, body, surface.domain), rng.uniform(-0.1, 0.1, 20)
     tilt = nose.least_tilt(at, turn, depth, np.radians(0.25))
 
@@ -151,7 +153,7 @@ def test_edges_lie_where_a_nose_of_many_places_has_them(surface, depth):
 def test_a_tilt_below_the_least_enters_and_one_above_does_not():
     surface, body = bowl(40.0, 25.0, 2e-5), tool(12.0, 1.0)
     uv = np.random.default_rng(1).uniform(0.2, 0.8, (12, 2))
-    at = Contacts.on(surface, uv, np.tile([0.0, 1.0], (12, 1)))
+    at = PassContacts.on(surface, uv, np.tile([0.0, 1.0], (12, 1)))
     nose, turn = Nose(surface, body, surface.domain), np.linspace(-0.3, 0.3, 12)
     least = nose.least_tilt(at, turn, 1e-4, 0.0)
     for tilt, free in ((least + 1e-3, True), (least - 3e-3, False)):
@@ -160,8 +162,8 @@ def test_a_tilt_below_the_least_enters_and_one_above_does_not():
 
 
 def test_where_no_tilt_is_enough_it_is_said():
-    with pytest.raises(GeometryError, match="no tilt keeps its end out") as found:
-        Matched.over(passes_along_y(bowl(5.0, 5.0)), tool(12.0, 0.0), Wanted(0.005, 0.0, 0.0, 0.0003))
+    with pytest.raises(GeometryError, match="no tilt keeps the end of the tool out") as found:
+        MatchedPasses.over(passes_along_y(bowl(5.0, 5.0)), tool(12.0, 0.0), MatchTolerances(0.005, 0.0, 0.0, 0.0003))
     assert found.value.code == "bad_pass" and "T1" in found.value.subjects
 
 

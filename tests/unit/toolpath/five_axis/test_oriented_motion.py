@@ -7,9 +7,9 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.five_axis.oriented_motion import LEAST_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
+from toolpath.five_axis.oriented_motion import MIN_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.plan_settings import Turning
+from toolpath.plan_settings import RotaryAxes
 from toolpath.stock.stock_map import StockMap
 from zones.reach.assembly import Clearances, Disc
 
@@ -168,7 +168,7 @@ def test_no_place_of_the_flank_goes_faster_than_the_feed():
     assert paced(low * [0.01, 0.01, 1.0], axes, reach, 1000.0, np.zeros(180)) is None
     straight = np.column_stack([np.linspace(0.0, 10.0, 5), np.zeros((5, 2))])
     np.testing.assert_allclose(paced(straight, np.repeat(LEAN, 5, axis=0), 9.0, 800.0, np.zeros(4)), 800.0)
-    assert LEAST_PACE < 0.2
+    assert MIN_PACE < 0.2
 
 
 def test_no_feed_is_written_that_the_axes_cannot_keep_up_with():
@@ -222,7 +222,7 @@ def test_axes_that_lie_are_left_and_cost_no_more_than_others():
     stock = block((0.0, 0.0), (30.0, 30.0, 3.0))
     flat = np.array([[1.0, 0.0, 0.0]])
     assert loaded(stock, np.array([[10.0, 15.0, 2.0]]), flat, tool(6.0, 1.0), (), Clearances(), 0.6)[0]
-    free = Turning(lambda a: np.ones(len(a), bool), lambda t, a: None, np.array([0.0, 0.0, 1.0]), -1e3)
+    free = RotaryAxes(lambda a: np.ones(len(a), bool), lambda t, a: None, np.array([0.0, 0.0, 1.0]), -1e3)
     around = Surroundings(lambda tips, axes: np.zeros(len(tips), bool), free, stock, (), Clearances())
     lean = np.array([[np.sqrt(1.0 - z * z), 0.0, z] for z in (0.05, 0.3)])
     assert around.blocked(np.full((2, 3), 40.0), lean, tool(6.0, 1.0)).tolist() == [True, False]

@@ -10,9 +10,9 @@ from geometry.parameterization.grid_map import GridMap
 from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import ball, tool
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, leaned, posed
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.strategies.isoparametric import course
 from verify.moves import Moves
@@ -52,7 +52,7 @@ def walked(surface, body, field, tree, scallop=SCALLOP):
     blocked = enters(tree, body, Clearances())
     pieces, left, way = [], 0.0, 0.0
     for eta in lay_out(iso, body.corner_radius, scallop - CHORD).tolist():
-        profile = Profile.of(iso.curve(eta), CHORD, body.corner_radius)
+        profile = PassProfile.of(iso.curve(eta), CHORD, body.corner_radius)
         made = posed(profile, steps(profile, body.corner_radius, CHORD, scallop), body, field, blocked, CHORD, 0.003)
         pieces += made.pieces
         left, way = left + sum(b - a for a, b in made.left), way + profile.length
@@ -98,7 +98,7 @@ def test_a_course_over_a_face_is_walked_leaning_with_the_material_on_the_right()
     points, normals = surface.points_and_normals(s)
     field = TipField(tree, body, Clearances(), np.array([points.min(axis=0), points.max(axis=0)]), 5.0, 0.2)
     face = TrimmedFace(3, surface, (np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),), 360.0)
-    found = course([face], Target(points, normals, points, 0.5), field, SCALLOP, CHORD, Flank(RADIUS, 0.0))
+    found = course([face], FinishTarget(points, normals, points, 0.5), field, SCALLOP, CHORD, Flank(RADIUS, 0.0))
     free = enters(tree, body, Clearances())
     groups = []
     for stretches in found.groups:
@@ -162,7 +162,7 @@ def over_the_crest(surface, field, blocked):
     def curve(t):
         return surface.points_and_normals(np.column_stack([t, 0.5 + 0 * t]))
 
-    profile = Profile.of(curve, CHORD, RADIUS)
+    profile = PassProfile.of(curve, CHORD, RADIUS)
     return posed(profile, steps(profile, RADIUS, CHORD), ball(2.0 * RADIUS), field, blocked, CHORD)
 
 

@@ -11,7 +11,7 @@ from geometry.surfaces.nurbs import NurbsSurface
 from tests.hand_parts import tool
 from tests.unit.toolpath.five_axis.test_matched_passes import bowl, measured, passes_along_y, random_surface
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width
-from toolpath.five_axis.matched_passes import Matched, Wanted
+from toolpath.five_axis.matched_passes import MatchedPasses, MatchTolerances
 from toolpath.five_axis.surface_partition import (
     CELLS,
     FINE,
@@ -24,10 +24,10 @@ from toolpath.five_axis.surface_partition import (
     price,
     turned,
 )
-from toolpath.five_axis.tilted_end import Contacts, Nose, strip_edges
+from toolpath.five_axis.tilted_end import Nose, PassContacts, strip_edges
 from toolpath.passes.isoparametric_passes import IsoSurface
 
-ASKED = Wanted(0.0045, 0.001, 0.0, 0.0003)
+ASKED = MatchTolerances(0.0045, 0.001, 0.0, 0.0003)
 M = CELLS * FINE
 
 
@@ -66,7 +66,7 @@ def even(reach=0.1, length=40.0):
 @pytest.mark.parametrize("surface", [bowl(60.0, 150.0), bowl(60.0, 60.0), bowl(-200.0, -150.0), bowl(1e9, 1e9)],
                          ids=["hollow", "round", "convex", "plane"])
 def test_what_is_curved_alike_everywhere_stays_whole(surface):
-    parts = parted(passes_along_y(surface), tool(12.0, 0.0), Wanted(0.0045, 0.001, np.radians(0.5), 0.0003))
+    parts = parted(passes_along_y(surface), tool(12.0, 0.0), MatchTolerances(0.0045, 0.001, np.radians(0.5), 0.0003))
     assert len(parts) == 1 and (parts[0].low == 0.0).all() and (parts[0].high == 1.0).all()
 
 
@@ -91,7 +91,7 @@ def test_where_principal_directions_change_places_it_is_cut_between_and_fed_both
 
 def test_a_tight_corner_is_cut_off_and_what_is_gently_curved_beside_it_has_passes_of_its_own():
     iso = passes_along_y(hollow(cornered))
-    asked = Wanted(0.0045, 0.001, np.radians(0.5), 0.0003)
+    asked = MatchTolerances(0.0045, 0.001, np.radians(0.5), 0.0003)
     parts = parted(iso, tool(12.0, 0.0), asked, round_way=0.0)
     whole, = parted(iso, tool(12.0, 0.0), asked, round_way=0.0, cut=False)
     assert sum(p.way for p in parts) < 0.95 * whole.way
@@ -166,7 +166,7 @@ def test_a_strip_fed_any_way_is_near_what_the_nose_leaves(off):
     """The closed strip against heights over the surface, turned as it is wanted: what the twist does is left out."""
     body, surface = tool(12.0, 0.0), bowl(60.0, 150.0)
     a = np.radians(off)
-    at = Contacts.on(surface, np.array([[0.5, 0.5]]), np.array([[np.sin(a), np.cos(a)]]))
+    at = PassContacts.on(surface, np.array([[0.5, 0.5]]), np.array([[np.sin(a), np.cos(a)]]))
     nose = Nose(surface, body, surface.domain)
     best = 0.0
     for turn in np.radians(np.arange(-20.0, 21.0, 2.5)):
@@ -226,7 +226,7 @@ def test_the_proof_finds_no_more_left_and_no_deeper_cut_on_a_parted_surface():
     counts = []
     for cut in (False, True):
         parts = parted(iso, body, ASKED, cut=cut)
-        made = [Matched.over(p.iso, body, ASKED) for p in parts]
+        made = [MatchedPasses.over(p.iso, body, ASKED) for p in parts]
         passes = [m.located(s) for m in made for s in m.lay_out()]
         left = measured(surface, body, passes)
         assert left.max() <= 0.005

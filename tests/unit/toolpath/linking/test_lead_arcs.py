@@ -9,17 +9,17 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
-from toolpath.counterexamples import BARRED, LEAST_BARRED, Counterexamples
+from toolpath.counterexamples import BARRED, MIN_BARRED, Counterexamples
 from toolpath.five_axis.oriented_motion import Surroundings, with_ways
 from toolpath.five_axis.oriented_piece import Piece
 from toolpath.lines import Line, dense
 from toolpath.linking.lead_arcs import SIZES, arc_onto, radii
 from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import Motions
-from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import StockMap
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from zones.reach.assembly import Clearances
 
 
@@ -48,7 +48,7 @@ def test_arcs_are_no_longer_than_the_pass_and_not_too_small_to_be_one():
 
 
 CHORD = 0.005
-FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+FREE = RotaryAxes(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
                np.array([0.0, 0, 1]), -100.0)
 WALL = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([0, 18, 0], [30, 22, 8]))
 
@@ -70,17 +70,17 @@ def along(z, x0=6.0, x1=24.0, y=15.999):
 
 
 def parts(link):
-    return [(t.motion, t) for t in link.trajectories if t.motion is not Motion.RAPID]
+    return [(t.motion, t) for t in link.trajectories if t.motion is not TrajectoryKind.RAPID]
 
 
 def test_a_pass_along_a_wall_begins_and_ends_on_an_arc():
     link = beside_the_wall(0.2)
     assert link.add(along(6.0))
     made = parts(link)
-    k = [m for m, _ in made].index(Motion.CUT)
+    k = [m for m, _ in made].index(TrajectoryKind.CUT)
     cut = made[k][1]
     onto, off = [t for _, t in made[k - 2:k]], [t for _, t in made[k + 1:k + 3]]
-    assert {t.motion for t in onto} == {Motion.APPROACH} and {t.motion for t in off} == {Motion.LIFT}
+    assert {t.motion for t in onto} == {TrajectoryKind.APPROACH} and {t.motion for t in off} == {TrajectoryKind.LIFT}
     assert [t.feed for t in onto] == [3000, 800] and [t.feed for t in off] == [800, 3000]  # slow beside the wall
     lat = link.stock.lattice
     skin = next(y for y in lat.y0 + lat.step * np.arange(lat.ny) if y > 18 - 0.2)  # the first node of it
@@ -101,12 +101,12 @@ def test_a_thicker_skin_takes_a_wider_arc_and_one_too_thick_takes_none():
     for skin in (0.2, 0.7, 1.6):
         link = beside_the_wall(skin)
         assert link.add(along(6.0))
-        first = next(t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5)
+        first = next(t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and len(t.points) >= 5)
         far.append(round(15.999 - float(first.points[0, 1]), 3))
     assert far == [0.48, 1.0, 2.0]
     link = beside_the_wall(5.0)
     assert link.add(along(6.0))
-    assert not [t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5]
+    assert not [t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and len(t.points) >= 5]
 
 
 def test_an_arc_is_gone_once():
@@ -114,7 +114,8 @@ def test_an_arc_is_gone_once():
     link = beside_the_wall(0.2)
     assert link.add(along(6.0)) and link.add(Line(np.array([[6.0, 15.999, 6.0], [20.0, 15.998, 6.0]]), False))
     assert link.add(Line(np.array([[9.0, 15.998, 6.0], [24.0, 15.999, 6.0]]), False))
-    arcs = [t.points for t in link.trajectories if t.motion in (Motion.APPROACH, Motion.LIFT) and len(t.points) >= 5]
+    arcs = [t.points for t in link.trajectories if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT)
+            and len(t.points) >= 5]
     moves = [tuple(np.round(np.hstack([a, b]), 4)) for arc in arcs for a, b in zip(arc[:-1], arc[1:], strict=True)]
     assert len(arcs) >= 4 and len(set(moves)) == len(moves)
 
@@ -123,7 +124,8 @@ def test_in_a_slot_with_no_room_there_are_no_arcs_and_the_pass_is_walked():
     link = beside_the_wall(0.2, slot=4.3)
     assert link.add(along(6.0))
     assert link.passes == 1
-    assert all(len(t.points) < 5 for t in link.trajectories if t.motion in (Motion.APPROACH, Motion.LIFT))
+    assert all(len(t.points) < 5 for t in link.trajectories
+               if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT))
 
 
 def test_level_after_level_the_tool_goes_down_off_the_wall():
@@ -133,7 +135,7 @@ def test_level_after_level_the_tool_goes_down_off_the_wall():
         link.add(Line(along(z - 0.5).points[::-1].copy(), False))
     assert link.passes == 6
     for t in link.trajectories:
-        if t.motion is not Motion.CUT:
+        if t.motion is not TrajectoryKind.CUT:
             down = np.flatnonzero(np.abs(np.diff(t.points[:, 2])) > 1e-9)
             assert (t.points[down, 1] < 15.6).all() and (t.points[down + 1, 1] < 15.6).all()
 
@@ -142,13 +144,13 @@ def test_where_the_tool_is_barred_there_is_no_arc_but_the_pass():
     """The far end of the first arc is nearer to the pass than a bar reaches round it, but not on it."""
     link = beside_the_wall(0.2)
     link.add(along(6.0))
-    far = next(t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5).points[0]
+    far = next(t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and len(t.points) >= 5).points[0]
     again = beside_the_wall(0.2)
     again.found = Counterexamples(barred={"T1": far[None]})
     assert again.add(along(6.0)) and again.passes == 1
-    reach = max(BARRED * again.field.tool.radius, LEAST_BARRED)
+    reach = max(BARRED * again.field.tool.radius, MIN_BARRED)
     for t in again.trajectories:
-        if t.motion is not Motion.RAPID and t.points[:, 2].min() < 7.0:
+        if t.motion is not TrajectoryKind.RAPID and t.points[:, 2].min() < 7.0:
             low = dense(t.points, 0.05)
             low = low[low[:, 2] < 6.2]
             assert not len(low) or np.linalg.norm(low - far, axis=1).min() > reach - 1e-9
@@ -168,7 +170,7 @@ def test_beside_the_end_of_a_wall_an_arc_does_not_curl_round_it(x):
                   Depths(stock.lattice), walls=True)
     assert link.add(along(6.0, 4.0, x))
     for t in link.trajectories:
-        if t.motion in (Motion.APPROACH, Motion.LIFT) and len(t.points) >= 5:
+        if t.motion in (TrajectoryKind.APPROACH, TrajectoryKind.LIFT) and len(t.points) >= 5:
             assert t.points[:, 1].max() <= 15.999 + 1e-9
 
 
@@ -185,10 +187,10 @@ def test_a_ring_begins_where_there_is_room_for_an_arc():
     c = np.array([[18.003, 15], [18.003, 11.997], [11.997, 11.997], [11.997, 18.003], [18.003, 18.003], [18.003, 15]])
     ring = Line(np.column_stack([c, np.full(6, 3.0)]), True)
     assert link.add(ring)
-    cut = next(t for t in link.trajectories if t.motion is Motion.CUT).points
+    cut = next(t for t in link.trajectories if t.motion is TrajectoryKind.CUT).points
     assert (cut[0] == cut[-1]).all() and cut[0, 0] < 18.0
     assert np.isclose(Line(cut, True).length, ring.length)
-    assert [t for t in link.trajectories if t.motion is Motion.APPROACH and len(t.points) >= 5]
+    assert [t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and len(t.points) >= 5]
 
 
 def test_a_ring_that_is_gone_down_along_is_left_where_it_ends():
@@ -210,12 +212,12 @@ def test_a_ring_that_is_gone_down_along_is_left_where_it_ends():
     assert link.add(Line(np.column_stack([ring + 15.0, np.full(len(ring), 3.4)]), True))
     ends = [(a.points[-1], b.points[0]) for a, b in zip(link.trajectories[:-1], link.trajectories[1:], strict=True)]
     assert max(float(np.linalg.norm(a - b)) for a, b in ends) == 0.0
-    assert steep(link) and link.trajectories[-1].motion is Motion.LIFT
+    assert steep(link) and link.trajectories[-1].motion is TrajectoryKind.LIFT
 
 
 def steep(link):
     """Whether the tool came down along the pass."""
-    cut = next(t for t in link.trajectories if t.motion is Motion.CUT).points
+    cut = next(t for t in link.trajectories if t.motion is TrajectoryKind.CUT).points
     return cut[0, 2] > cut[-1, 2] + 1.0
 
 
@@ -237,7 +239,7 @@ def test_a_flank_comes_onto_its_wall_on_an_arc_square_to_itself(lean):
     made = with_ways(Piece(tips, axes, np.tile(away, (33, 1)), 8.0), body, CutData(10_000, 1000.0, 200, 3000, 3.6),
                      PlanSettings(0.01, 0.002, 0.0, 0.0, 20.0, 19.0, RAMP, turning=FREE), around)
     assert not isinstance(made, str)
-    arcs = [t for t in made if t.motion is Motion.CONNECT]
+    arcs = [t for t in made if t.motion is TrajectoryKind.CONNECT]
     assert len(arcs) == 2 and all(len(t.points) >= 5 for t in arcs)
     for arc, end in ((arcs[0].points, tips[0]), (arcs[1].points[::-1], tips[-1])):
         assert np.allclose(arc[-1], end) and np.abs((arc - end) @ axis).max() < 1e-9

@@ -18,7 +18,7 @@ from toolpath.linking.rapid_travel import OVER, Motions
 from toolpath.passes.pass_order import nearest_order
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import SKIN, StockMap
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 
 TOP = 4.0
 
@@ -53,7 +53,7 @@ def steepest_cut(link):
     """Steepest descent of the cutting moves, rad."""
     worst = 0.0
     for t in link.trajectories:
-        if t.motion is Motion.CUT:
+        if t.motion is TrajectoryKind.CUT:
             d = np.diff(t.points, axis=0)
             worst = max(worst, float(np.arctan2(-d[:, 2], np.hypot(d[:, 0], d[:, 1])).max()))
     return worst
@@ -66,9 +66,10 @@ def motions(link):
 def test_in_air_the_tool_comes_straight_down():
     link = linker(top=-1.0)
     assert link.add(straight(5, 20, 10, 1.0))
-    assert motions(link) == [Motion.RAPID, Motion.RAPID, Motion.APPROACH, Motion.APPROACH, Motion.CUT]
+    assert motions(link) == [TrajectoryKind.RAPID, TrajectoryKind.RAPID, TrajectoryKind.APPROACH,
+                             TrajectoryKind.APPROACH, TrajectoryKind.CUT]
     assert link.trajectories[-1].points.tolist() == [[5, 10, 1], [20, 10, 1]]
-    feeds = [t.feed for t in link.trajectories if t.motion is Motion.APPROACH]
+    feeds = [t.feed for t in link.trajectories if t.motion is TrajectoryKind.APPROACH]
     assert feeds == [3000, 800]  # nothing stands where it comes down
 
 
@@ -76,8 +77,8 @@ def test_from_outside_the_stock_it_comes_in_level():
     link = linker()
     assert link.add(straight(1.0, 20, 10, 3.2))
     cut = link.trajectories[-1]
-    assert cut.motion is Motion.CUT and len(cut.points) == 2
-    first = next(t for t in link.trajectories if t.motion is Motion.APPROACH)
+    assert cut.motion is TrajectoryKind.CUT and len(cut.points) == 2
+    first = next(t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH)
     assert (first.points[:, 0] < -2.0).all()  # beside the block
 
 
@@ -107,7 +108,7 @@ def test_a_way_down_is_not_gone_again_as_far_as_a_line_before_went_the_same():
     assert again.add(line)
     np.testing.assert_array_equal(again.trajectories[-1].points, whole[6:])
     assert steepest_cut(again) <= RAMP
-    down = [t.points for t in again.trajectories if t.motion is Motion.APPROACH][-1]
+    down = [t.points for t in again.trajectories if t.motion is TrajectoryKind.APPROACH][-1]
     np.testing.assert_array_equal(down[-1], whole[6])
 
 
@@ -178,7 +179,7 @@ def test_to_and_fro_along_a_leaning_line_the_way_back_takes_no_more_than_a_skin(
     x = 15.0 + 0.5 * length * np.array([-1.0, 1.0])
     line = Line(np.column_stack([x, [15.0, 15.0], [1.5, 1.5 + rise]]), False)
     assert link.add(line)
-    cuts = [t.points for t in link.trajectories if t.motion is Motion.CUT]
+    cuts = [t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT]
     cut = np.vstack([cuts[0], *(c[1:] for c in cuts[1:])])
     assert (cut[-2:] == line.points).all() and cut[0, 2] >= TOP
     dug, aside = digging(cut, cut[:, 0])
@@ -237,7 +238,7 @@ def test_a_line_is_left_out_where_the_stock_stands_in_the_way_of_the_shank():
     link.stock.cut(np.array([[5.0, 15, 0.0], [25.0, 15, 0.0]]), tool(4.4, 0.0))
     link.stock.cut(np.array([[4.0, 15, 3.0], [12.0, 15, 3.0]]), tool(9.6, 0.0))
     assert not link.add(line)  # opened at one end: the shank gets in as far as it is open
-    cut = np.vstack([t.points for t in link.trajectories if t.motion is Motion.CUT])
+    cut = np.vstack([t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT])
     assert 5.0 <= cut[:, 0].min() < 5.5 and 11.5 < cut[:, 0].max() <= 12.7
     assert sum(s.length for s in link.skipped) == pytest.approx(13.0, abs=1.5)
 
@@ -251,8 +252,8 @@ def test_the_next_pass_beside_is_reached_without_a_lift():
     link = linker()
     link.add(straight(-1, 25, 10, 3.0))
     link.add(Line(straight(-1, 25, 12, 3.0).points[::-1], False))
-    assert motions(link)[-2:] == [Motion.CONNECT, Motion.CUT]
-    assert motions(link).count(Motion.RAPID) == 2
+    assert motions(link)[-2:] == [TrajectoryKind.CONNECT, TrajectoryKind.CUT]
+    assert motions(link).count(TrajectoryKind.RAPID) == 2
 
 
 def test_a_deeper_level_is_reached_down_a_ramp_along_the_pass():
@@ -261,7 +262,7 @@ def test_a_deeper_level_is_reached_down_a_ramp_along_the_pass():
     before = len(link.trajectories)
     link.add(loop(4, 2.4))
     new = link.trajectories[before:]
-    assert all(t.motion is not Motion.RAPID for t in new)
+    assert all(t.motion is not TrajectoryKind.RAPID for t in new)
     assert steepest_cut(link) <= RAMP
     assert new[-1].points[0, 2] == pytest.approx(3.2) and new[-1].points[-1, 2] == pytest.approx(2.4)
 
@@ -273,7 +274,7 @@ def test_a_deeper_level_is_reached_beside_the_pass_where_that_is_in_air():
     before = len(link.trajectories)
     link.add(loop(8, 2.4))
     new = link.trajectories[before:]
-    assert [t.motion for t in new] == [Motion.CONNECT] * 2 + [Motion.CUT]
+    assert [t.motion for t in new] == [TrajectoryKind.CONNECT] * 2 + [TrajectoryKind.CUT]
     assert [t.feed for t in new] == [3000, 800, 800]
     down = new[0].points
     assert down[0, 2] == 3.2 and down[-1, 2] == 2.4 and steepest_cut(link) < 1e-9
@@ -287,7 +288,7 @@ def test_ways_through_air_to_a_pass_beside_are_as_fast_as_links_and_slow_before_
     link.add(straight(-5, 35, 10, 3.0))
     link.add(Line(straight(-5, 35, 18, 3.0).points[::-1], False))
     ways = [(t.feed, float(np.linalg.norm(np.diff(t.points, axis=0), axis=1).sum())) for t in link.trajectories
-            if t.motion is Motion.CONNECT]
+            if t.motion is TrajectoryKind.CONNECT]
     assert ways == [(3000, pytest.approx(8.0))]  # from beside the stock to beside it
 
 
@@ -299,7 +300,7 @@ def test_on_its_way_to_a_pass_the_tool_is_slow_where_the_lattice_may_not_show_wh
     before = len(link.trajectories)
     link.add(Line(np.array([[25.0, 17.0, 2.0], [25.0, 11.0, 2.0]]), False))
     first = link.trajectories[before]
-    assert first.motion is not Motion.RAPID and first.feed == 800
+    assert first.motion is not TrajectoryKind.RAPID and first.feed == 800
 
 
 def test_no_link_goes_through_a_wall():
@@ -307,8 +308,8 @@ def test_no_link_goes_through_a_wall():
     link = linker(tool(2.0, 0.0), top=-1.0, post=True)
     link.add(straight(5, 11.5, 15, 1.0))
     link.add(straight(18.5, 25, 15, 1.0))
-    assert motions(link).count(Motion.RAPID) == 2  # only to where the first pass begins
-    over = next(t for t in link.trajectories if t.motion is Motion.CONNECT)
+    assert motions(link).count(TrajectoryKind.RAPID) == 2  # only to where the first pass begins
+    over = next(t for t in link.trajectories if t.motion is TrajectoryKind.CONNECT)
     assert over.feed == 3000 and 3.0 + OVER <= over.points[:, 2].max() < 3.5
     for t in link.trajectories:
         way = dense(t.points, 0.05)
@@ -323,7 +324,7 @@ def test_over_what_stands_as_high_as_rapids_go_the_clearance_plane_is_the_way():
                   Depths(stock.lattice))
     link.add(straight(5, 11.5, 15, 1.0))
     link.add(straight(18.5, 25, 15, 1.0))
-    assert Motion.CONNECT not in motions(link) and motions(link).count(Motion.RAPID) == 5
+    assert TrajectoryKind.CONNECT not in motions(link) and motions(link).count(TrajectoryKind.RAPID) == 5
 
 
 def test_what_stands_between_two_passes_is_gone_over_and_not_through():
@@ -333,7 +334,7 @@ def test_what_stands_between_two_passes_is_gone_over_and_not_through():
     before, stock = len(link.trajectories), link.stock.copied()
     link.add(straight(9.5, 20, 10, 1.0))
     over = link.trajectories[before]
-    assert over.motion is Motion.CONNECT and not stock.above(1.0).size == 0
+    assert over.motion is TrajectoryKind.CONNECT and not stock.above(1.0).size == 0
     assert stock.overlap(dense(over.points, 0.05), link.field.tool).max() <= 0.01
     assert stock.in_air(dense(over.points[1:3], 0.05), link.field.tool).all()
     assert TOP < over.points[:, 2].max() < link.motions.rapid_floor
@@ -349,7 +350,7 @@ def test_a_shank_is_not_led_into_what_stands_beside_the_way_across():
     stand(link.stock, 12.0, 5.0, before=13.0)
     assert link.add(straight(2, 7, 10, 0.5)) and link.add(straight(18, 23, 10, 0.5))
     for t in link.trajectories:
-        if t.motion is not Motion.RAPID:
+        if t.motion is not TrajectoryKind.RAPID:
             assert not link.stock.meets_bodies(dense(t.points, 0.05), link.field.discs).any()
 
 
@@ -360,8 +361,9 @@ def test_what_of_a_pass_is_in_air_is_gone_as_fast_as_a_link():
     for link in (slow, fast):
         stand(link.stock, 15.0, 1.5)
         assert link.add(straight(3, 27, 10, 1.0))
-    ways = [[t for t in link.trajectories if t.motion in (Motion.CUT, Motion.CONNECT)] for link in (slow, fast)]
-    assert [t.motion for t in ways[1]] == [Motion.CONNECT, Motion.CUT]
+    ways = [[t for t in link.trajectories if t.motion in (TrajectoryKind.CUT, TrajectoryKind.CONNECT)]
+            for link in (slow, fast)]
+    assert [t.motion for t in ways[1]] == [TrajectoryKind.CONNECT, TrajectoryKind.CUT]
     assert [t.feed for t in ways[1]] == [3000, 800]
     np.testing.assert_allclose(np.vstack([ways[1][0].points, ways[1][1].points[1:]])[[0, -1]], ways[0][0].points)
     begin = ways[1][1].points[0, 0]
@@ -376,8 +378,8 @@ def test_finish_ends_at_the_clearance_plane_with_feed_below_the_rapid_floor():
     link = linker()
     link.add(straight(5, 20, 10, 3.2))
     done = link.finish()
-    assert done[-2].motion is Motion.LIFT and done[-2].points[-1, 2] == 6.0
-    assert done[-1].motion is Motion.RAPID and done[-1].points[-1, 2] == 8.0
+    assert done[-2].motion is TrajectoryKind.LIFT and done[-2].points[-1, 2] == 6.0
+    assert done[-1].motion is TrajectoryKind.RAPID and done[-1].points[-1, 2] == 8.0
     assert len(link.finish()) == len(done)
     for a, b in zip(done[:-1], done[1:], strict=True):
         assert (a.points[-1] == b.points[0]).all()
@@ -408,7 +410,7 @@ def test_where_the_tool_is_barred_a_line_is_left_out():
     link = linker(top=-1.0)
     link.found = Counterexamples(barred={link.field.tool.id: np.array([[12.0, 10.0, 1.0]])})
     assert not link.add(straight(5, 20, 10, 1.0))
-    cuts = [t.points for t in link.trajectories if t.motion is Motion.CUT]
+    cuts = [t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT]
     ends = sorted((float(p[:, 0].min()), float(p[:, 0].max())) for p in cuts)
     gap = BARRED * link.field.tool.radius
     assert len(ends) == 2 and ends[0][0] == 5.0 and ends[1][1] == 20.0
@@ -454,7 +456,7 @@ def test_what_a_line_has_above_the_rapids_is_not_walked():
     link = linker()
     up = Line(np.array([[5.0, 10.0, 1.0], [15.0, 10.0, 1.0], [25.0, 10.0, 11.0], [28.0, 10.0, 11.0]]), False)
     assert link.add(up) and link.add(straight(5, 20, 14, 1.0))
-    cut = np.vstack([t.points for t in link.trajectories if t.motion is Motion.CUT])
+    cut = np.vstack([t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT])
     floor = link.motions.rapid_floor
     assert cut[:, 2].max() <= floor and cut[cut[:, 1] == 10.0][:, 2].max() > floor - 0.5
     assert max(t.points[:, 2].max() for t in link.trajectories) <= link.motions.clearance
@@ -497,15 +499,16 @@ def test_in_a_gap_it_only_just_fits_a_tool_comes_down_where_it_has_been():
     before = len(link.trajectories)
     assert link.add(loop(0.8, 1.0))
     new = link.trajectories[before:]
-    cuts = [t.points for t in new if t.motion is Motion.CUT]
-    assert sum(t.length for t in new if t.motion is Motion.CUT) < 15.0 * loop(0.8, 1.0).length  # 30 down the ramp
+    cuts = [t.points for t in new if t.motion is TrajectoryKind.CUT]
+    # 30 down the ramp
+    assert sum(t.length for t in new if t.motion is TrajectoryKind.CUT) < 15.0 * loop(0.8, 1.0).length
     heights = [8.0, *(float(p[-1, 2]) for p in cuts)]  # and no more than a layer and a half at once
     assert heights[-1] == 1.0 and max(np.diff(heights[::-1])) <= 1.5
     link.keep_down([])
     before = len(link.trajectories)
     assert link.add(loop(0.8, 0.6))  # deeper than it has been: down along the pass from just above there
     new = link.trajectories[before:]
-    assert max(t.points[0, 2] for t in new if t.motion is Motion.CUT) < 1.3
+    assert max(t.points[0, 2] for t in new if t.motion is TrajectoryKind.CUT) < 1.3
     assert steepest_cut(link) <= RAMP
     link.stock.become(StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, 8.0]), 0.15))
     before = len(link.trajectories)
@@ -519,7 +522,8 @@ def test_the_last_bit_of_a_way_down_is_slow_where_something_stands_there():
         link = linker(tool(4.0, 0.0), top=1.0)
         link.stock.become(StockMap(link.stock.lattice, link.stock.top, link.stock.cover + skin, link.stock.part))
         link.add(straight(5, 25, 10, 1.0))
-        down = [t for t in link.trajectories if t.motion is Motion.APPROACH and t.points[-1, 2] < t.points[0, 2]]
+        down = [t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH
+                and t.points[-1, 2] < t.points[0, 2]]
         assert down[-1].feed == feed
 
 
@@ -542,12 +546,12 @@ def test_a_way_down_goes_down_no_faster_than_straight_down_it_may():
     link = linker(step_down=0.5)
     link.motions.plunge_feed = 10.0
     assert link.add(straight(13, 17, 15, TOP - 0.5))
-    down = [t for t in link.trajectories if t.motion is Motion.CUT and np.diff(t.points[:, 2]).min() < -1e-9]
+    down = [t for t in link.trajectories if t.motion is TrajectoryKind.CUT and np.diff(t.points[:, 2]).min() < -1e-9]
     assert down
     for t in down:
         way = np.diff(t.points, axis=0)
         assert (-way[:, 2] / np.linalg.norm(way, axis=1)).max() * t.feed == pytest.approx(10.0)
-    assert [t.feed for t in link.trajectories if t.motion is Motion.CUT][-1] == 800
+    assert [t.feed for t in link.trajectories if t.motion is TrajectoryKind.CUT][-1] == 800
 
 
 def test_back_in_air_the_tool_goes_the_same_way_but_once():
@@ -555,8 +559,8 @@ def test_back_in_air_the_tool_goes_the_same_way_but_once():
     assert link.add(straight(5, 20, 10, 1.0))
     a = np.linspace(0.0, 2.0 * np.pi, 20)
     way = np.vstack([[20.0, 10.0, 1.0], np.column_stack([19.5 + 0.5 * np.cos(a), 10 + 0.5 * np.sin(a), np.ones(20)])])
-    assert link.keep_down([way]) and link.trajectories[-1].motion is Motion.CONNECT
-    assert not link.keep_down([way]) and link.trajectories[-1].motion is Motion.RAPID
+    assert link.keep_down([way]) and link.trajectories[-1].motion is TrajectoryKind.CONNECT
+    assert not link.keep_down([way]) and link.trajectories[-1].motion is TrajectoryKind.RAPID
     assert link.add(straight(5, 20, 12, 1.0))
     long = np.column_stack([np.tile([20.0, 4.0], 20), np.linspace(12.0, 13.0, 40), np.ones(40)])
     assert not link.keep_down([long])  # by the clearance plane it is sooner

@@ -10,7 +10,7 @@ from tests.hand_parts import box_mesh
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 from toolpath.passes.cutter_locations import lifted, tips
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 
 TOOLS = {name: ToolBody("T1", 1, 6.0, corner, 20.0, 6.0, 30.0, 6.0, 40.0)
          for name, corner in (("ball", 3.0), ("bull", 1.0), ("flat", 0.0))}
@@ -64,7 +64,7 @@ def test_on_level_places_of_a_pass_the_end_stands_on_the_side_it_has_beside_them
         return np.column_stack([0 * t, 9.0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))
 
     for curve, side in ((across, [1.0, 0, 0]), (along, [-1.0, 0, 0])):
-        profile = Profile.of(curve, 0.01, 1.0)
+        profile = PassProfile.of(curve, 0.01, 1.0)
         ends = np.linspace(0.0, profile.length, 30)
         (made,), raised = lifted(profile, ends, body, lambda xy: np.full(len(xy), -np.inf), 0.01)
         assert np.isfinite(made).all() and not raised
@@ -73,7 +73,8 @@ def test_on_level_places_of_a_pass_the_end_stands_on_the_side_it_has_beside_them
 
 
 def level_pass(length=30.0):
-    return Profile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))),
+    return PassProfile.of(lambda t: (np.column_stack([length * t, 0 * t, 0 * t]),
+                                     np.tile([0.0, 0.0, 1.0], (len(t), 1))),
                       0.001, 3.0)
 
 

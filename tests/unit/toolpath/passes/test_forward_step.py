@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError
-from toolpath.passes.forward_step import Profile, arc_rule, errors, steps
+from toolpath.passes.forward_step import PassProfile, arc_rule, errors, steps
 
 RADIUS = 5.0
 PROFILES = {
@@ -40,7 +40,7 @@ def measured(curve, t0, t1, radius):
 @pytest.mark.parametrize("name", PROFILES)
 def test_steps_use_the_tolerance_and_never_more(name, tolerance):
     curve = curve_of(name)
-    profile = Profile.of(curve, tolerance, RADIUS)
+    profile = PassProfile.of(curve, tolerance, RADIUS)
     ends = steps(profile, RADIUS, tolerance)
     t = profile.parameters(ends)
     off = np.array([measured(curve, a, b, RADIUS) for a, b in zip(t[:-1], t[1:], strict=True)])
@@ -54,14 +54,14 @@ def test_steps_use_the_tolerance_and_never_more(name, tolerance):
     ("sine", 8, 24, 74), ("bump", 7, 18, 56), ("concave", 9, 28, 89), ("convex", 10, 31, 96)])
 def test_as_many_blocks_as_the_published_scheme_needs(name, half, tenth, hundredth):
     """Counts of the derivation's own check; one more where what is left of a step makes a block."""
-    profile = Profile.of(curve_of(name), 0.005, RADIUS)
+    profile = PassProfile.of(curve_of(name), 0.005, RADIUS)
     for tolerance, blocks in ((0.5, half), (0.05, tenth), (0.005, hundredth)):
         assert len(steps(profile, RADIUS, tolerance)) - 1 in (blocks, blocks + 1)
 
 
 @pytest.mark.parametrize("name, most", [("sine", 8.74), ("bump", 4.09), ("concave", 1.47), ("convex", 1.5)])
 def test_the_arc_rule_leaves_more_than_the_tolerance(name, most):
-    profile = Profile.of(curve_of(name), 0.5, RADIUS)
+    profile = PassProfile.of(curve_of(name), 0.5, RADIUS)
     off = errors(profile, arc_rule(profile, RADIUS, 0.5), RADIUS)
     assert off.max() == pytest.approx(0.5 * most, rel=0.35)
 
@@ -77,7 +77,7 @@ def test_a_helix_on_a_cylinder_leaves_what_its_torsion_says(degrees, error):
         n = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(t))])
         return big * n + np.column_stack([np.zeros((len(t), 2)), s * np.cos(way)]), n
 
-    profile = Profile.of(curve, 0.01, RADIUS)
+    profile = PassProfile.of(curve, 0.01, RADIUS)
     assert errors(profile, np.array([0.0, profile.length]), RADIUS)[0] == pytest.approx(error, rel=1e-3)
     k, t = -np.sin(way) ** 2 / big, np.sin(way) * np.cos(way) / big
     assert errors(profile, np.array([0.0, profile.length]), RADIUS)[0] == pytest.approx(
@@ -92,7 +92,7 @@ def test_a_pass_that_bends_aside_is_followed_for_the_sake_of_the_ridge():
         turn = 1.2 * t
         return (50.0 * np.column_stack([np.cos(turn), np.sin(turn), 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1)))
 
-    profile = Profile.of(curve, tolerance, RADIUS)
+    profile = PassProfile.of(curve, tolerance, RADIUS)
     aside = tolerance / np.sqrt(2 * scallop / RADIUS)
     assert np.diff(steps(profile, RADIUS, tolerance, scallop))[:-1] == pytest.approx(np.sqrt(8 * 50 * aside), rel=2e-3)
     bare = np.sqrt((RADIUS + tolerance) ** 2 - RADIUS**2)
@@ -103,14 +103,14 @@ def test_a_straight_pass_is_one_step_or_steps_of_the_greatest_length():
     def curve(t):
         return np.column_stack([100.0 * t, 0 * t, 0 * t]), np.tile([0.0, 0.0, 1.0], (len(t), 1))
 
-    profile = Profile.of(curve, 0.01, RADIUS)
+    profile = PassProfile.of(curve, 0.01, RADIUS)
     assert np.diff(steps(profile, RADIUS, 0.01)).tolist() == pytest.approx([40.0, 40.0, 20.0])
     assert len(steps(profile, RADIUS, 0.01, longest=200.0)) == 2
 
 
 def test_a_pass_without_length_is_refused():
     with pytest.raises(GeometryError) as refusal:
-        Profile.of(lambda t: (np.zeros((len(t), 3)), np.tile([0.0, 0.0, 1.0], (len(t), 1))), 0.01, RADIUS)
+        PassProfile.of(lambda t: (np.zeros((len(t), 3)), np.tile([0.0, 0.0, 1.0], (len(t), 1))), 0.01, RADIUS)
     assert refusal.value.code == "bad_pass"
 
 
@@ -122,7 +122,7 @@ def test_a_straight_pass_along_which_the_surface_twists_keeps_the_tolerance(long
         normal = np.column_stack([0 * t, -x / 4.0, np.ones(len(t))])
         return np.column_stack([x, 0 * t, 0 * t]), normal / np.linalg.norm(normal, axis=1)[:, None]
 
-    profile = Profile.of(curve, tolerance, 3.0)
+    profile = PassProfile.of(curve, tolerance, 3.0)
     way = np.linspace(0.0, profile.length, 5001)
     point, normal = curve(way / profile.length)
     assert np.abs(profile.centres(way, 3.0) - point - 3.0 * normal).max() < 0.002 * tolerance
@@ -140,5 +140,5 @@ def test_a_pass_across_an_edge_is_refused_with_the_place():
         return np.column_stack([x, 0 * t, z]), np.column_stack([np.sin(lean), 0 * t, np.cos(lean)])
 
     with pytest.raises(GeometryError, match=r"4\.00|3\.99") as refusal:
-        Profile.of(curve, 0.01, RADIUS)
+        PassProfile.of(curve, 0.01, RADIUS)
     assert refusal.value.code == "bad_pass"

@@ -15,7 +15,7 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
 from toolpath.kernels.beside import left_beside
 from toolpath.passes.cutter_locations import lifted, tips
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out, side_step
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
@@ -90,7 +90,7 @@ def left_standing(iso: IsoSurface, chord: float) -> np.ndarray:
     """What is left at a fine lattice of places away from the borders, under polylines of tips, mm."""
     paths = []
     for eta in lay_out(iso, RADIUS, SCALLOP).tolist():
-        profile = Profile.of(iso.curve(eta), chord, RADIUS)
+        profile = PassProfile.of(iso.curve(eta), chord, RADIUS)
         paths.append(profile.centres(steps(profile, RADIUS, chord, SCALLOP), RADIUS) - [0.0, 0.0, RADIUS])
     xi, eta = np.meshgrid(np.linspace(0.02, 0.98, 120), np.linspace(0.005, 0.995, 301))
     return Envelope(paths, Cutter.ball(diameter=2 * RADIUS, length=20.0)).along(*iso.contact(xi.ravel(), eta.ravel()))
@@ -197,7 +197,7 @@ def test_a_bull_nose_round_a_post_keeps_the_chordal_tolerance(radius, diameter, 
     iso, body = post(radius), tool(diameter, corner_radius=corner)
     lines = []
     for eta in lay_out(iso, corner, 0.02, Flank(0.5 * diameter, 3.0)).tolist():
-        profile = Profile.of(iso.curve(eta), chord, corner)
+        profile = PassProfile.of(iso.curve(eta), chord, corner)
         lines += lifted(profile, steps(profile, corner, chord, 0.02), body, lambda xy: np.full(len(xy), -np.inf),
                         chord)[0]
     start, end = np.vstack([q[:-1] for q in lines]), np.vstack([q[1:] for q in lines])

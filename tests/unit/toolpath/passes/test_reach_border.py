@@ -10,7 +10,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.reach_border import COARSEST, FAR, beyond
 from zones.reach.tip_field import touchable
 
@@ -31,7 +31,7 @@ def on_plate(xy):
 
 def places(field, points, normals, lift: float = LIFT):
     """Points, normals and tips of what is beyond the border."""
-    more = beyond(field, Target(points, normals, points, SPACING), lift)
+    more = beyond(field, FinishTarget(points, normals, points, SPACING), lift)
     return more.points, more.normals, more.tips
 
 
@@ -93,7 +93,7 @@ def test_no_place_lies_on_another_face_or_on_a_fixture():
     field = field_of(TriangleTree(faced((box_mesh((-20.0, -20.0, -2.0), (4.0, 20.0, 0.0)), 7),
                                         (box_mesh((4.0, -20.0, -2.0), (20.0, 20.0, 0.0)), 0))), ball(3.0))
     points, normals = on_plate(spread(lambda x, y: (x < 3.95) & (np.abs(y) < 3.0) & (x > -3.0)))
-    target = Target(points, normals, points, SPACING)
+    target = FinishTarget(points, normals, points, SPACING)
     anywhere = beyond(field, target, LIFT).points
     own = beyond(field, target, LIFT, faces=(7,)).points
     assert (anywhere[:, 0] > 4.01).any() and (own[:, 0] <= 4.0).all() and (own[:, 0] < -3.0).any()

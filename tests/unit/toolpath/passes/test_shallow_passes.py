@@ -11,7 +11,7 @@ from tests.hand_parts import SURFACES, ball, dome, field_of, terraces, tool
 from tests.plan_checks import dense
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
-from toolpath.passes.pass_family import Promise, Target
+from toolpath.passes.pass_family import FinishTarget, Promise
 from toolpath.plan_settings import Pattern
 from toolpath.strategies import zigzag
 from zones.reach.tip_field import touchable
@@ -25,7 +25,7 @@ def laid(field, keep, density, scallop, pattern=Pattern.ZIGZAG, chord=0.004, cli
     """Layout over what the tool reaches of a mesh, and those points, normals and tips."""
     samples = with_normals(field.tree.mesh, keep, density)
     able, _, tips = touchable(field, samples.points, samples.normals, 0.0)
-    target = Target(samples.points[able], samples.normals[able], tips[able], density ** -0.5)
+    target = FinishTarget(samples.points[able], samples.normals[able], tips[able], density ** -0.5)
     return zigzag.laid(field, target, Promise(scallop, chord, 0.3, 20.0), pattern, climb), target
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from toolpath.counterexamples import HighWall
-from toolpath.planning.depth_bands import LEAST_DEPTH, planes
+from toolpath.planning.depth_bands import MIN_DEPTH, planes
 
 
 def test_without_high_walls_there_is_no_plane():
@@ -21,7 +21,7 @@ def test_bands_are_even_and_no_wall_is_free_for_more_than_asked(corner, thicknes
     heights = planes([wall], corner, 8.0)
     depths = -np.diff([wall.top, *heights, wall.bottom])
     assert np.allclose(depths, depths[0])
-    deepest = max(8.0 * thickness - corner, LEAST_DEPTH * thickness)
+    deepest = max(8.0 * thickness - corner, MIN_DEPTH * thickness)
     assert depths[0] <= deepest * (1.0 + 1e-9) < depths[0] * (1.0 + 1.0 / len(heights))
 
 

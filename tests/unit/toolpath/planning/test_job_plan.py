@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 from tests.hand_parts import Case, ball, corner, dome, low_walls, plan_part, slope_field, terraces, tool
 from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.lines import Line
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
 from toolpath.planning.zone_finishing import Finish
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import EVEN
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import CutDirection, TrajectoryKind
 from zones.machinable_area import AreaForm
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it
@@ -52,20 +52,21 @@ def replanned(c: Case, stock: StockMap | None = None, checks=None, cut=None, pro
     work = StockMap(before.lattice, before.top.copy(), before.cover.copy(), before.part)
     settings: PlanSettings = replace(c.settings, **changes)
     cut = cut or {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
-    checks = checks or [Target(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
+    checks = checks or [FinishTarget(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2)
+                        for z in c.zones]
     plan = plan_job(c.zones, checks, c.fields, cut, work, settings, progress)
     return replace(c, settings=settings, stock_before=before, plan=plan)
 
 
 def bytes_of(c: Case) -> list[bytes]:
-    return [p.tobytes() for _, p in c.moves(*Motion)]
+    return [p.tobytes() for _, p in c.moves(*TrajectoryKind)]
 
 
 def test_a_later_round_walks_only_what_no_earlier_one_has():
     """Rounds ask for the first six tenths of a line, for its first four, and for all of it."""
     c = case("walls")
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
-    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
     stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
     finish = Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings)
@@ -80,7 +81,7 @@ def test_a_later_round_walks_only_what_no_earlier_one_has():
     finish.strategy = replace(finish.strategy, rounds=rounds)
     (step,) = finish.walk("S01")
     level = [t.points[np.abs(t.points[:, 2] - points[0, 2]) < 1e-9] for t in step.trajectories
-             if t.motion is Motion.CUT]
+             if t.motion is TrajectoryKind.CUT]
     level = [p for p in level if len(p) > 1]
     assert len(level) == 2  # nothing at all in the second round
     second = level[1]
@@ -93,7 +94,7 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
     """What a finish has cut is measured as if layers had: once nothing is left, not even another way is tried."""
     c = case("walls")
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
-    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
 
     def fresh():
@@ -103,7 +104,8 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
     first = fresh()
     (step,) = first.walk("S05")
     assert not len(first.plan().left) and first.plan().step == "S05"
-    part = replace(step, id="S02", strategy="depth_layers", trajectories=step.trajectories[:len(step.trajectories) // 2])
+    part = replace(step, id="S02", strategy="depth_layers",
+                   trajectories=step.trajectories[:len(step.trajectories) // 2])
     half, whole = fresh(), fresh()
     half.measure(part)
     assert half.walk("S06") and half.plan().strategy == "waterline" and half.plan().step == "S06"
@@ -118,7 +120,7 @@ def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
     """The second of two zones asks for the line of the first and for one more; both count for it as walked."""
     c = case("walls")
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
-    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
     stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
     walked, depths = Walked(), Depths(stock.lattice)
@@ -131,7 +133,7 @@ def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
             return [lines] if k == 0 else []
 
         finish.strategy = replace(finish.strategy, rounds=rounds)
-        made.append([t.points for s in finish.walk("S01") for t in s.trajectories if t.motion is Motion.CUT])
+        made.append([t.points for s in finish.walk("S01") for t in s.trajectories if t.motion is TrajectoryKind.CUT])
         left.append(finish.residual.residual.copy())
     ends = [{p.round(6).tobytes() for t in cuts for p in t} for cuts in made]
     assert made[0] and made[1] and len(ends[0] & ends[1]) <= OVERLAP + 1
@@ -190,7 +192,7 @@ def test_what_became_of_a_zone_agrees_with_its_step(name):
         s = steps[p.step]
         assert (s.zone, s.strategy, s.side_step) == (p.zone.id, p.strategy, p.side_step)
         own = [t for s in c.plan.steps if s.zone == p.zone.id for t in s.trajectories]
-        cuts = [t.motion is Motion.CUT for t in own]  # a way down at a feed of its own is part of its pass
+        cuts = [t.motion is TrajectoryKind.CUT for t in own]  # a way down at a feed of its own is part of its pass
         assert p.passes == sum(b and not a for a, b in zip([False, *cuts], cuts, strict=False)) > 0
         flat = p.zone.tool.radius - p.zone.tool.corner_radius
         dragged = {"zigzag", "spiral"}
@@ -218,14 +220,15 @@ def test_every_step_carries_the_data_of_its_own_tool():
         cut = CUT[s.tool.id]
         assert (s.spindle_rpm, s.feed) == (cut.spindle_rpm, cut.feed)
         assert (s.scallop_height, s.chordal_tolerance) == (c.settings.scallop_height, c.settings.chordal_tolerance)
-        feeds = {m: {t.feed for t in s.trajectories if t.motion is m} for m in Motion}
-        assert feeds[Motion.CUT] == {cut.feed} and feeds[Motion.CONNECT] <= {cut.feed, cut.link_feed}
-        assert feeds[Motion.APPROACH] <= {cut.plunge_feed, cut.feed, cut.link_feed}
-        assert {cut.link_feed} <= feeds[Motion.LIFT] <= {cut.feed, cut.link_feed}  # off a wall on an arc, then up
-        assert feeds[Motion.RAPID] == {0.0}
+        feeds = {m: {t.feed for t in s.trajectories if t.motion is m} for m in TrajectoryKind}
+        assert feeds[TrajectoryKind.CUT] == {cut.feed} and feeds[TrajectoryKind.CONNECT] <= {cut.feed, cut.link_feed}
+        assert feeds[TrajectoryKind.APPROACH] <= {cut.plunge_feed, cut.feed, cut.link_feed}
+        # off a wall on an arc, then up
+        assert {cut.link_feed} <= feeds[TrajectoryKind.LIFT] <= {cut.feed, cut.link_feed}
+        assert feeds[TrajectoryKind.RAPID] == {0.0}
         # a descent ends at the plunge feed, or where nothing stands at that of the cut; a way in level may be a link
         for a, b in zip(s.trajectories[:-1], s.trajectories[1:], strict=True):
-            if a.motion is Motion.APPROACH and b.motion is Motion.CUT:
+            if a.motion is TrajectoryKind.APPROACH and b.motion is TrajectoryKind.CUT:
                 level = bool((np.diff(a.points[:, 2]) == 0.0).all())
                 assert a.feed in (cut.feed, cut.link_feed if level else cut.plunge_feed)
 
@@ -245,7 +248,7 @@ def test_finishing_switched_off_leaves_the_layers_alone():
     full = replanned(case("corner"))
     c = replanned(full, finishing=False)
     assert c.plan.zones == () and {s.strategy for s in c.plan.steps} == {"depth_layers"}
-    ways = [[np.vstack([w.points for w in s.trajectories if w.motion is Motion.CUT]) for s in plan.steps
+    ways = [[np.vstack([w.points for w in s.trajectories if w.motion is TrajectoryKind.CUT]) for s in plan.steps
              if s.operation == "roughing" and s.tool.id == "T2"] for plan in (full.plan, c.plan)]
     levels = [{round(z, 6) for p in way for z, flat in zip(p[1:, 2], np.diff(p[:, 2]) == 0.0, strict=True) if flat}
               for way in ways]
@@ -256,19 +259,19 @@ def test_finishing_switched_off_leaves_the_layers_alone():
 def test_layers_alone_take_walls_to_size_as_they_go_down():
     """What a finish would take off goes in every layer, so that a wall is never cut free before it is to size."""
     plans = [replanned(case("walls"), finishing=finishing).plan for finishing in (True, False)]
-    way = [sum(w.length for s in p.steps if s.operation == "roughing" for w in s.trajectories if w.motion is Motion.CUT)
+    way = [sum(w.length for s in p.steps if s.operation == "roughing" for w in s.trajectories
+               if w.motion is TrajectoryKind.CUT)
            for p in plans]
     assert way[1] > 1.1 * way[0] > 0.0
 
 
 def test_the_side_of_the_cut_is_told_on_every_step_and_free_where_both_ways_are_allowed():
     c = case("corner")
-    climb, conventional = replanned(c), replanned(c, climb=False)
-    assert all(s.climb for s in climb.plan.steps) and not any(s.climb for s in conventional.plan.steps)
+    climb, conventional = replanned(c), replanned(c, cut_direction=CutDirection.CONVENTIONAL)
+    assert all(s.cut_direction.climbs for s in climb.plan.steps)
+    assert not any(s.cut_direction.climbs for s in conventional.plan.steps)
     assert bytes_of(climb) != bytes_of(conventional)
-    # with both ways allowed the wish for one of them changes no move
-    assert bytes_of(replanned(c, either_way=True)) == bytes_of(replanned(c, either_way=True, climb=False))
-    assert bytes_of(replanned(c, either_way=True)) != bytes_of(climb)
+    assert bytes_of(replanned(c, cut_direction=CutDirection.EITHER)) != bytes_of(climb)
 
 
 def test_progress_is_told_for_every_zone():
@@ -287,7 +290,7 @@ def test_nothing_to_machine_makes_an_empty_plan():
 @pytest.mark.parametrize("pattern", Pattern)
 def test_zones_no_sample_of_which_is_judged_get_no_passes(pattern):
     c = case("dome")
-    none = [Target(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.2) for _ in c.zones]
+    none = [FinishTarget(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.2) for _ in c.zones]
     again = replanned(c, checks=none, pattern=pattern, roughing=False)
     assert again.plan.steps == ()
     assert all(p.step is None and p.passes == 0 and not len(p.left) for p in again.plan.zones)
@@ -303,9 +306,9 @@ def test_what_no_pass_gets_to_is_told_and_nothing_else():
     for z in c.zones:
         points, normals = c.samples.points[z.samples].copy(), c.samples.normals[z.samples]
         points[buried] -= 0.2 * normals[buried]  # asked for, but inside the part
-        checks.append(Target(points, normals, z.tips, 0.2))
+        checks.append(FinishTarget(points, normals, z.tips, 0.2))
     again = replanned(c, checks=checks)
-    moves = again.moves(Motion.CUT)
+    moves = again.moves(TrajectoryKind.CUT)
     for p, check in zip(again.plan.zones, checks, strict=True):
         assert len(p.left) > 20
         left = brute_residual(check.points, moves)
@@ -322,7 +325,7 @@ def test_no_sample_of_a_level_area_stays_uncovered_by_the_flat(name):
     for p in floors:
         body = p.zone.tool
         step = next(s for s in c.plan.steps if s.id == p.step)
-        walked = np.vstack([dense(t.points, 0.04) for t in step.trajectories if t.motion is Motion.CUT])
+        walked = np.vstack([dense(t.points, 0.04) for t in step.trajectories if t.motion is TrajectoryKind.CUT])
         points = c.samples.points[p.zone.samples]
         at = walked[np.abs(walked[:, 2, None] - np.unique(points[:, 2].round(3))).min(axis=1) < 0.005]
         away, which = cKDTree(at[:, :2]).query(points[:, :2])
@@ -353,11 +356,11 @@ def deepest_layer(c: Case, aside: float = ASIDE) -> float:
     stock, worst = SlowStock(c), 0.0
     for s in c.plan.steps:
         for t in s.trajectories:
-            if t.motion is Motion.RAPID:
+            if t.motion is TrajectoryKind.RAPID:
                 continue
             p = dense(t.points, stock.step)
             for k, tip in enumerate(p):
-                if s.operation == "roughing" and t.motion is Motion.CUT and k % 3 == 0:
+                if s.operation == "roughing" and t.motion is TrajectoryKind.CUT and k % 3 == 0:
                     worst = max(worst, depth_at(stock, tip, s.tool, aside) / (STEP_DOWN * s.tool.diameter))
                 if k >= LAG:
                     stock.sink(p[k - LAG], s.tool, 0.0)
@@ -395,7 +398,7 @@ def above_part(c: Case, **changes) -> np.ndarray:
     """Stock along the normal over all samples of the zones that look up, mm, once the layers are done."""
     lat = c.stock_before.lattice
     stock = StockMap(lat, c.stock_before.top.copy(), c.stock_before.cover.copy(), c.stock_before.part)
-    checks = [Target(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
+    checks = [FinishTarget(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
     cut = {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
     plan_job(c.zones, checks, c.fields, cut, stock, replace(c.settings, finishing=False, **changes))
     mine = np.concatenate([z.samples for z in c.zones if z.form is not AreaForm.LEVEL])
@@ -434,7 +437,7 @@ def test_walls_that_layers_take_to_size_are_fed_as_in_a_finish():
     slow, fast = [], []
     for step in replanned(c, cut=cut).plan.steps:
         if step.operation == "roughing":
-            for way in (w for w in step.trajectories if w.motion is Motion.CUT):
+            for way in (w for w in step.trajectories if w.motion is TrajectoryKind.CUT):
                 field = c.fields[step.tool.id]
                 level = way.points[np.abs(way.points[:, 2] - way.points[:, 2].min()) < 1e-9]
                 off = field.off_blocked(float(level[0, 2]))

@@ -16,7 +16,7 @@ from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.engagement import CLOSE, LOOK, angles
 from toolpath.stock.stock_map import StockMap
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import CutDirection, TrajectoryKind
 
 ALLOWANCE, Z = 0.2, 5.0
 MOST = math.radians(120.0)
@@ -30,7 +30,7 @@ class Watched(Linker):
         go, self.worst, self.eased = self.go.feed, 0.0, False
 
         def feed(motion, points, feed):
-            if motion is Motion.CUT and not self.eased:
+            if motion is TrajectoryKind.CUT and not self.eased:
                 way = dense(points, LOOK * self.field.tool.radius)
                 self.worst = max(self.worst, float(angles(self.stock, way, self.field.tool).max()))
             go(motion, points, feed)
@@ -42,14 +42,14 @@ class Watched(Linker):
         return super().add(line, tolerance, eased=eased)
 
 
-def cleared(mesh, lower, upper, area, climb=True, either=False):
+def cleared(mesh, lower, upper, area, cut_direction=CutDirection.CLIMB):
     field = field_of(mesh, tool(4.0, 0.0))
     stock = StockMap.box(TriangleTree(mesh), np.array(lower, float), np.array(upper, float), 0.1)
     motions = Motions(800, 200, 3000, 10000, 12.0, 10.0, RAMP, 1.6, 0.001)
     link = Watched(field, stock, motions, Depths(stock.lattice), engaged=MOST)
     lat = field.lattice
     y, x = np.meshgrid(lat.y0 + lat.step * np.arange(lat.ny), lat.x0 + lat.step * np.arange(lat.nx), indexing="ij")
-    Clearing(link, Z, area(x, y), ALLOWANCE, 1.6, climb, either, 0.05, 0.005).walk()
+    Clearing(link, Z, area(x, y), ALLOWANCE, 1.6, cut_direction, 0.05, 0.005).walk()
     return link
 
 
@@ -76,13 +76,13 @@ def left_over(link, x, y):
     return float(link.stock.top[i, j].max()) - Z
 
 
-@pytest.mark.parametrize("how", [{}, {"climb": False}, {"either": True}], ids=["climb", "conventional", "either"])
+@pytest.mark.parametrize("how", [{"cut_direction": way} for way in CutDirection], ids=list(CutDirection))
 def test_a_channel_is_emptied_under_the_limit_with_the_tool_down(how):
     link = channel(**how)
     assert 0.0 < link.worst <= MOST + CLOSE
     # rings after it take the rest along the walls
     assert left_over(link, (1.0, 23.0), (4.9, 11.1)) < 0.01
-    lifts = sum(t.motion is Motion.LIFT for t in link.trajectories)
+    lifts = sum(t.motion is TrajectoryKind.LIFT for t in link.trajectories)
     assert lifts <= 4 and not link.skipped  # both mouths are ways in
 
 
@@ -93,8 +93,9 @@ def test_climbing_has_the_stock_on_its_right(climb):
     On the level itself: skims above it go to and fro and have no side.
     """
     ways = []
-    for t in channel(climb=climb).trajectories:
-        if t.motion is Motion.CUT and (np.abs(t.points[:, 2] - Z) < 1e-9).all() and 5.0 < t.points[:, 1].mean() < 11.0:
+    for t in channel(cut_direction=CutDirection.CLIMB if climb else CutDirection.CONVENTIONAL).trajectories:
+        level = (np.abs(t.points[:, 2] - Z) < 1e-9).all()
+        if t.motion is TrajectoryKind.CUT and level and 5.0 < t.points[:, 1].mean() < 11.0:
             inwards = 1.0 if t.points[:, 0].mean() < 12.0 else -1.0
             ways.append(inwards * float(t.points[-1, 1] - t.points[0, 1]))
     long = [w for w in ways if abs(w) > 2.0]
@@ -107,7 +108,7 @@ def test_a_closed_pocket_is_opened_by_a_helix():
     # rings after it take what is left beside walls where ways end, no more than a line's distance, and in corners
     assert left_over(link, (5.2 + 1.6, 18.8 - 1.6), (8.0, 12.0)) < 0.01
     assert left_over(link, (8.0, 15.5), (5.2 + 1.0, 14.8 - 1.0)) < 0.01
-    first = next(t for t in link.trajectories if t.motion is Motion.CUT)
+    first = next(t for t in link.trajectories if t.motion is TrajectoryKind.CUT)
     turns = np.unwrap(np.arctan2(*(first.points[:, 1::-1] - first.points[:, 1::-1].mean(axis=0)).T))
     drop = np.diff(first.points[:, 2])
     assert abs(turns[-1] - turns[0]) > 10.0 * 2.0 * math.pi and (drop <= 1e-9).all()

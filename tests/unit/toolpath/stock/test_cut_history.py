@@ -14,7 +14,7 @@ from toolpath.planning import zone_finishing
 from toolpath.planning.zone_finishing import Finish, _Strategy
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked, still_to_walk
 from toolpath.stock.residual_map import ResidualMap
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import CutDirection, TrajectoryKind
 from verify.checks.repeated_passes import WINDOW
 from zones.lattice import Lattice
 
@@ -84,7 +84,7 @@ def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkey
     for seed, kind in ((1, "flat"), (7, "flat"), (5, "ball")):
         finishes.clear()
         c = plan_part(blocks(seed), [SHORT_TOOLS[kind]], near_net=False)
-        cuts = [(s.tool, t.points) for s in c.plan.steps for t in s.trajectories if t.motion is Motion.CUT]
+        cuts = [(s.tool, t.points) for s in c.plan.steps for t in s.trajectories if t.motion is TrajectoryKind.CUT]
         for f in finishes:
             true = ResidualMap(f.residual.points, f.checks.normals, margin=f.residual.margin)
             for body, points in cuts:
@@ -101,7 +101,7 @@ def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
         def __init__(self):
             self.field, self.walked = SimpleNamespace(tool=SHORT_TOOLS["flat"]), Walked()
             self.strategy = _Strategy("spiral", 1.0, None, True)
-            self.settings = SimpleNamespace(chordal_tolerance=0.01, ramp_angle=0.05, either_way=False, climb=True)
+            self.settings = SimpleNamespace(chordal_tolerance=0.01, ramp_angle=0.05, cut_direction=CutDirection.CLIMB)
             self.residual = SimpleNamespace(cut=lambda points, tool: None)
 
         def _add_one(self, linker, line, skin, slope, thin):

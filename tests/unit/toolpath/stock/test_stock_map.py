@@ -298,8 +298,9 @@ def test_how_far_stock_stands_above_a_cutter_is_that_of_every_node_in_the_disc(b
                     under = bottom(np.minimum(rho[disc], body.radius), body)
                     slow[k] = (stock.top[disc] - z - under).max()
             np.testing.assert_allclose(stock.overlap(tips, body, rim), slow, atol=1e-9)
-            np.testing.assert_allclose(stock.overlap(tips, body, rim, least=0.0), np.maximum(slow, 0.0), atol=1e-9)
+            np.testing.assert_allclose(stock.overlap(tips, body, rim, lower_bound=0.0), np.maximum(slow, 0.0),
+                                       atol=1e-9)
         held = stock.copied()
-        np.testing.assert_array_equal(stock.under_end(tips, body, least=0.0),
+        np.testing.assert_array_equal(stock.under_end(tips, body, lower_bound=0.0),
                                       np.maximum(held.under_end(tips, body), 0.0))
         assert (np.isfinite(slow) & (slow > 0.0)).sum() > 50 < (slow < 0.0).sum()

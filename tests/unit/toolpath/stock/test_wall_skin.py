@@ -11,8 +11,8 @@ from tests.hand_parts import ball, box_mesh, low_walls, plan_part
 from toolpath.five_axis.oriented_motion import LOADED, Surroundings, free_parts, in_turn
 from toolpath.five_axis.oriented_piece import Piece
 from toolpath.kernels.skins import near
-from toolpath.passes.pass_family import Target
-from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.passes.pass_family import FinishTarget
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.planning.zone_finishing import Finish
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.stock.stock_map import StockMap
@@ -25,7 +25,7 @@ TOOL = ball(1.5, neck=15.0, shank=4.0, stickout=31.0)  # flutes 3 mm, neck 1.425
 ABOVE = (9.5, 8.0, 6.0, 4.5, 3.5)  # tips of passes that cut the wall from 4.25 up, each with a free neck
 UPRIGHT = np.array([[0.0, 0.0, 1.0]])
 
-FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+FREE = RotaryAxes(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
                np.array([0.0, 0.0, 1.0]), -100.0)
 SETTINGS = PlanSettings(SCALLOP, 0.002, 0.0, 0.0, 20.0, 19.0, np.radians(5.0), turning=FREE)
 
@@ -162,7 +162,7 @@ def test_surroundings_become_those_of_a_copy():
 def test_a_zone_knows_its_skins_as_it_measured_them():
     c = plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")])
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
-    check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
+    check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     finish = Finish(zone, check, c.fields[zone.tool.id], CutData(10_000, 800, 200, 3000, 0.75), c.stock_before,
                     replace(c.settings, turning=FREE))
     finish.residual.residual[:7] = 0.001

@@ -13,12 +13,12 @@ from tests.unit.toolpath.five_axis.test_matched_passes import bowl, measured
 from toolpath.five_axis.oriented_motion import LAYER, THICK, Surroundings, _leads, lowered, with_ways
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
-from toolpath.plan_settings import CutData, PlanSettings, Turning
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.strategies.curvature_matched import matched, suits
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from zones.reach.assembly import Clearances
 
 SCALLOP, LIFT, FEED = 0.01, 0.003, 800.0
@@ -26,7 +26,7 @@ LOOP = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float)
 BULL = tool(12.0, 1.0)
 HOLLOW = slope_field(lambda x, y: x * x / 120.0 + y * y / 300.0, size=40.0, n=100)
 SURFACE = bowl(60.0, 150.0)
-FREE = Turning(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
+FREE = RotaryAxes(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tips, axes, np.zeros(len(tips) - 1)),
                np.array([0.0, 0.0, 1.0]), -100.0)
 
 
@@ -37,10 +37,10 @@ def settings_of(turning=FREE):
 def found(mesh=HOLLOW, margin=1.0, allowance=0.0, turning=FREE, body=BULL, most=1e9, part=None):
     tree = TriangleTree(mesh)
     samples = samples_of(HOLLOW, 2.0, {2})
-    target = Target(samples.points, samples.normals, samples.points, 0.7)
+    target = FinishTarget(samples.points, samples.normals, samples.points, 0.7)
     if part is not None:
         rows = part(samples.points)
-        target = Target(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
+        target = FinishTarget(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
     clear = Clearances()
     around = Surroundings(enters(tree, body, clear, allowance - LIFT), turning,
                           StockMap.around(tree, mesh.bounds, margin, 0.25), (), clear)
@@ -50,7 +50,7 @@ def found(mesh=HOLLOW, margin=1.0, allowance=0.0, turning=FREE, body=BULL, most=
 
 
 def cuts(runs):
-    return [(t.points, t.axes) for run in runs.runs for t in run if t.motion is Motion.CUT]
+    return [(t.points, t.axes) for run in runs.runs for t in run if t.motion is TrajectoryKind.CUT]
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +92,8 @@ def test_each_pass_comes_down_along_its_axis_the_last_skin_of_it_at_the_plunge_f
     runs, _ = whole
     for run in runs.runs:
         kinds = [t.motion for t in run]
-        assert kinds[0] is Motion.APPROACH and kinds[-1] is Motion.LIFT and Motion.CUT in kinds
-        ways = [t for t in run if t.motion is Motion.APPROACH]
+        assert kinds[0] is TrajectoryKind.APPROACH and kinds[-1] is TrajectoryKind.LIFT and TrajectoryKind.CUT in kinds
+        ways = [t for t in run if t.motion is TrajectoryKind.APPROACH]
         for t in ways:
             gone = np.diff(t.points, axis=0)
             assert np.linalg.norm(np.cross(gone, t.axes[0]), axis=1).max() < 1e-6
@@ -153,7 +153,7 @@ def come_down(corner, overlap):
     made = with_ways(Piece(way, axes, axes, 6.0, on_end=True), body, cut, settings_of(), around)
     if isinstance(made, str):
         return None
-    low = [t.feed for t in made if t.motion is Motion.APPROACH and t.points[:, 2].min() < 13.0 - corner]
+    low = [t.feed for t in made if t.motion is TrajectoryKind.APPROACH and t.points[:, 2].min() < 13.0 - corner]
     return max(low)
 
 

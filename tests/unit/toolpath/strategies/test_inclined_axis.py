@@ -24,21 +24,21 @@ from tests.unit.toolpath.strategies.test_curvature_matched import (
     cuts,
     settings_of,
 )
-from toolpath.five_axis.axis_smoothing import Limits
+from toolpath.five_axis.axis_smoothing import AxisLimits
 from toolpath.five_axis.oriented_motion import SKIMMED, Surroundings, free_parts
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
-from toolpath.plan_settings import CutData, Leaned
+from toolpath.plan_settings import CutData, ToolLean
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.strategies import inclined_axis
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from zones.machinable_area import AreaForm
 from zones.reach.assembly import Clearances
 
 BALL = ball(6.0)
-TILTED, LEADING = Leaned(0.0, np.radians(15.0)), Leaned(np.radians(10.0), 0.0)
+TILTED, LEADING = ToolLean(0.0, np.radians(15.0)), ToolLean(np.radians(10.0), 0.0)
 POST = joined(HOLLOW, box_mesh([4, 4, -1], [9, 9, 30]))
 
 
@@ -46,13 +46,15 @@ def found(leaned=TILTED, mesh=HOLLOW, allowance=0.0, turning=FREE, body=BALL, ma
     tree, clear = TriangleTree(mesh), Clearances()
     samples = samples_of(HOLLOW, 2.0, {2})
     rows = samples.points[:, 1] > beyond
-    target = Target(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
+    target = FinishTarget(samples.points[rows], samples.normals[rows], samples.points[rows], 0.7)
     around = Surroundings(enters(tree, body, clear, allowance - LIFT), turning,
                           StockMap.around(tree, HOLLOW.bounds, margin, 0.25), (), clear)
     wider = replace(clear, neck=clear.neck + inclined_axis.WARY, shank=clear.shank + inclined_axis.WARY)
     cut = CutData(10_000, FEED, 200, 3000, 3.6)
-    return inclined_axis.led([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target, SimpleNamespace(tool=body, allowance=allowance),
-                   cut, settings_of(turning), around, enters(tree, body, wider, allowance - LIFT), leaned), around
+    return inclined_axis.inclined_passes([TrimmedFace(2, SURFACE, (LOOP,), 1600.0)], target,
+                                         SimpleNamespace(tool=body, allowance=allowance),
+                                         cut, settings_of(turning), around,
+                                         enters(tree, body, wider, allowance - LIFT), leaned), around
 
 
 def normals_at(poses, radius):
@@ -124,9 +126,11 @@ def test_each_face_leans_to_its_own_freer_side_however_its_parameters_run():
     tree = TriangleTree(mesh)
     around = Surroundings(enters(tree, BALL, clear), FREE, StockMap.around(tree, mesh.bounds, 0.1, 0.5), (), clear)
     faces = [TrimmedFace(k, w, (LOOP,), 200.0) for k, w in enumerate(walls)]
-    runs = inclined_axis.led(faces, Target(points, normals, points, 1.0), SimpleNamespace(tool=BALL, allowance=0.0),
-                   CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around, enters(tree, BALL, clear),
-                   Leaned(0.0, np.radians(65.0), np.radians(65.0)))
+    runs = inclined_axis.inclined_passes(faces, FinishTarget(points, normals, points, 1.0),
+                                         SimpleNamespace(tool=BALL, allowance=0.0),
+                                         CutData(10_000, FEED, 200, 3000, 3.6), settings_of(), around,
+                                         enters(tree, BALL, clear),
+                   ToolLean(0.0, np.radians(65.0), np.radians(65.0)))
     tips, axes = (np.vstack(k) for k in zip(*cuts(runs), strict=True))
     centre = tips + BALL.radius * axes
     for side in (1.0, -1.0):
@@ -180,7 +184,7 @@ def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monk
         outside = np.maximum(np.abs(x - 6.5), np.abs(y - 6.5)).ravel() > 2.5 + BALL.radius
         return int((measured(SURFACE, BALL, cuts(runs))[outside] > SCALLOP).sum())
 
-    monkeypatch.setattr(inclined_axis, "LIMITS", Limits(1e-4, inclined_axis.LIMITS.per_mm))
+    monkeypatch.setattr(inclined_axis, "LIMITS", AxisLimits(1e-4, inclined_axis.LIMITS.per_mm))
     assert uncut(past_a_post[0]) < 0.5 * uncut(found(mesh=POST)[0])
 
 
@@ -190,13 +194,13 @@ def test_what_the_machine_cannot_take_is_left_with_the_reason():
 
 
 def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
-    asked = Leaned(0.1, 0.2, walls=1.0)
-    assert inclined_axis.asked(None, AreaForm.SHALLOW, BALL) is None
-    assert inclined_axis.asked(asked, AreaForm.LEVEL, BALL) is None
-    assert inclined_axis.asked(asked, AreaForm.SHALLOW, tool(6.0, 0.0)) is None
-    assert inclined_axis.asked(asked, AreaForm.SHALLOW, BALL) == asked
-    assert inclined_axis.asked(asked, AreaForm.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
-    assert inclined_axis.asked(TILTED, AreaForm.STEEP, BALL) is None
+    asked = ToolLean(0.1, 0.2, walls=1.0)
+    assert inclined_axis.requested_lean(None, AreaForm.SHALLOW, BALL) is None
+    assert inclined_axis.requested_lean(asked, AreaForm.LEVEL, BALL) is None
+    assert inclined_axis.requested_lean(asked, AreaForm.SHALLOW, tool(6.0, 0.0)) is None
+    assert inclined_axis.requested_lean(asked, AreaForm.SHALLOW, BALL) == asked
+    assert inclined_axis.requested_lean(asked, AreaForm.STEEP, BALL) == ToolLean(0.0, 1.0, 1.0)
+    assert inclined_axis.requested_lean(TILTED, AreaForm.STEEP, BALL) is None
 
 
 def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
@@ -207,7 +211,7 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
     def step(name, strategy, way=30.0):
         points = np.array([[0.0, 0, 0], [way, 0, 0], [way, 0, 9.0]])
         return SimpleNamespace(zone=name, strategy=strategy, trajectories=[
-            Trajectory(Motion.CUT, points[:2], FEED), Trajectory(Motion.LIFT, points[1:], FEED)])
+            Trajectory(TrajectoryKind.CUT, points[:2], FEED), Trajectory(TrajectoryKind.LIFT, points[1:], FEED)])
 
     zones = [zone("Z1", AreaForm.SHALLOW, "inclined_axis"),
              zone("Z2", AreaForm.SHALLOW, "zigzag", "a reason", "another"),
@@ -215,13 +219,14 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
              zone("Z5", AreaForm.SHALLOW, "zigzag"), zone("Z6", AreaForm.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
              zone("Z7", AreaForm.SHALLOW, "inclined_axis"), zone("Z8", AreaForm.SHALLOW, "curvature_matched", "too slow")]
     steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "depth_layers"]
-    steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
+    steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0),
+              step("Z8", "spiral", 90.0)]
     first, second, third, fourth = upright(TILTED, zones, steps)
     assert first.subjects == ("Z2", "T1") and "stays upright (a reason; another)" in first.message
     assert (first.measured, first.limit) == (30.0, 15.0)
     assert second.subjects == ("Z5", "T1") and "no pass lies on it" in second.message
     assert third.subjects == ("Z7", "T1") and "along 31 of 61 mm it cuts (no axis near is free there)" in third.message
     assert fourth.subjects == ("Z8", "T1") and "along 90 of 120 mm it cuts (too slow)" in fourth.message
-    asked = Leaned(0.0, 0.2, walls=1.0)
+    asked = ToolLean(0.0, 0.2, walls=1.0)
     assert [c.subjects[0] for c in upright(asked, zones, steps)] == ["Z2", "Z3", "Z5", "Z7", "Z8"]
     assert not upright(None, zones, steps)

@@ -11,7 +11,7 @@ from tests.hand_parts import ball, field_of, plan_part, slope_field, tool
 from toolpath.counterexamples import NONE
 from toolpath.lines import Line
 from toolpath.passes.isoparametric_passes import Flank
-from toolpath.passes.pass_family import Target
+from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import Pattern
 from toolpath.planning.zone_finishing import Finish, _Strategy
@@ -63,7 +63,7 @@ def test_passes_leave_no_more_than_the_scallop_and_never_gouge(a, b, allowance):
     (mesh, face), body = bowl(a, b), ball(3.0)
     field = field_of(mesh, body, allowance)
     points, normals = samples_on(mesh, face, everywhere)
-    target = Target(points, normals, points, 60.0**-0.5)
+    target = FinishTarget(points, normals, points, 60.0**-0.5)
     found = course([face], target, field, SCALLOP, CHORD, None)
     lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for line in group]
     left = left_by(lines, points, normals, body) - allowance
@@ -77,7 +77,7 @@ def test_passes_go_where_there_is_something_to_cut():
     (mesh, face), body = bowl(0.05, -0.03), ball(3.0)
     field = field_of(mesh, body)
     points, normals = samples_on(mesh, face, lambda x, y: x < -1.0)
-    target = Target(points, normals, points, 60.0**-0.5)
+    target = FinishTarget(points, normals, points, 60.0**-0.5)
     found = course([face], target, field, SCALLOP, CHORD, None)
     lines = [line for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for line in group]
     assert left_by(lines, points, normals, body).max() <= SCALLOP
@@ -89,7 +89,7 @@ def test_passes_on_a_wall_have_the_material_on_their_right():
     (mesh, face), body = bowl(0.0, 0.3), ball(2.0)  # steep where |y| is large
     field = field_of(mesh, body)
     points, normals = samples_on(mesh, face, lambda x, y: y > 4.0)
-    found = course([face], Target(points, normals, points, 60.0**-0.5), field, SCALLOP, CHORD, Flank(2.0, 10.0))
+    found = course([face], FinishTarget(points, normals, points, 60.0**-0.5), field, SCALLOP, CHORD, Flank(2.0, 10.0))
     assert found.groups
     for line in (one for group in laid(found, field, SCALLOP, CHORD, 0.002)[0] for one in group):
         assert np.ptp(line.points[:, 2]) < 0.01  # level: along x
@@ -99,7 +99,7 @@ def test_passes_on_a_wall_have_the_material_on_their_right():
 def test_what_folds_is_named():
     mesh, _ = bowl(0.05, -0.03)
     knot = TrimmedFace(7, bowl(0.05, -0.03)[1].surface, (np.array([[0.0, 0], [1, 1], [1, 0], [0, 1]]),), 144.0)
-    target = Target(np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.zeros((1, 3)), 0.1)
+    target = FinishTarget(np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.zeros((1, 3)), 0.1)
     found = course([knot], target, field_of(mesh, ball(3.0)), SCALLOP, CHORD, None)
     assert not found.groups and found.refused[0].startswith("F7: ")
 
@@ -151,7 +151,7 @@ def test_a_sharp_end_gets_none():
     ((0, 3), (10.4, 10.0), "waterline", "more samples are left above the scallop"),
     ((2, 2), (10.4, 10.0), "isoparametric", "takes longer at equal scallop, s"),
     ((0, 0), (10.0, 10.4), "waterline", "takes longer at equal scallop, s"),
-    ((4, 4), (None, 10.4), "isoparametric", "no pass is walked")])
+    ((4, 4), (None, 10.4), "isoparametric", "no pass can be cut")])
 def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_faster(left, seconds, kept, reason):
     ways = [Line(np.array([[0.0, y, 1.0], [5.0, y, 1.0]]), False) for y in (1.0, 2.0)]
 

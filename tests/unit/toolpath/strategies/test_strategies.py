@@ -94,7 +94,7 @@ def test_level_steps_by_corner_by_flank_and_their_limits():
     assert waterline.level_step(tool(4.0, 0.0), leaning(0.02), cusp, 9.0) == pytest.approx(0.5)
     # an upright wall is left clean by the flank: only the step down limits it
     assert waterline.level_step(ball(2 * r), leaning(0.0), cusp, 1.3) == 1.3
-    assert waterline.level_step(tool(4.0, 0.0), leaning(0.9), cusp, 9.0) == waterline.LEAST_STEP
+    assert waterline.level_step(tool(4.0, 0.0), leaning(0.9), cusp, 9.0) == waterline.MIN_STEP
     assert waterline.level_step(ball(4.0), np.zeros((0, 3)), cusp, 0.7) == 0.7
     # what a tenth of the area needs is kept, what a fiftieth needs is left to measuring
     flat_part, steep_part = leaning(0.95, 10), leaning(0.1, 90)
@@ -485,4 +485,4 @@ def test_touches_are_few_and_leave_out_what_has_no_free_direction():
     assert len(got) == 1 and got[0].points[-1].tolist() == top[0].tolist()
     assert len(touch_points.touches(field_of(mesh, ball(2.0)), pit)) == 1
     many = np.column_stack([np.linspace(0, 99, 600), np.full(600, 5.0), np.full(600, 9.0)])
-    assert len(touch_points.touches(field, many)) == touch_points.MOST
+    assert len(touch_points.touches(field, many)) == touch_points.MAX_PLACES

@@ -16,7 +16,7 @@ from output.stepnc.part21 import quoted
 from output.workplan import Ap238, StockBox
 from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
-from toolpath.workingsteps import Motion, Trajectory
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
@@ -72,7 +72,7 @@ def test_planned_points_feeds_and_tools_come_back(write):
         for t in s.trajectories:
             far = np.abs(ends[:, None] - t.points[None]).max(axis=2).min(axis=0)
             assert far[1:].max() < 0.51e-4
-            if t.motion is not Motion.RAPID:
+            if t.motion is not TrajectoryKind.RAPID:
                 assert np.isclose(m.feed[mine], t.feed, rtol=1e-9).any()
     assert [c.kind for c in m.cutters] == ["bull", "flat", "ball"] and set(m.speed[~m.rapid].tolist()) == {12000.0}
     assert [c.assembly_length for c in m.cutters] == [80.0, 70.0, 75.0] and m.coolant[~m.rapid].all()
@@ -128,7 +128,7 @@ def test_what_differs_is_found(write):
         "tool": plan(replace(good.steps[0], tool=replace(BALL, number=2))),
         "end": plan(replace(good.steps[0], trajectories=good.steps[0].trajectories[:3])),
         "more": plan(good.steps[0], replace(step(2, BALL, "planar_floor"), trajectories=(
-            line(Motion.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))),
+            line(TrajectoryKind.CUT, (0, 0, 5), (1, 0, 5), feed=600.0),))),
         "plane": replace(good, clearance_plane=26.0),
     }
     proved = nc_of(good)
@@ -141,9 +141,9 @@ def test_what_differs_is_found(write):
 
 def test_a_line_with_other_points_is_the_same_line():
     """Points left out of a straight pass are no difference; out of a bent one they are."""
-    ways = [line(Motion.CUT, (0, 0, 5), (4, 0, 5), (10, 0, 5), feed=600.0)]
-    bent = [line(Motion.CUT, (0, 0, 5), (4, 0.002, 5), (10, 0, 5), feed=600.0)]
-    short = [line(Motion.CUT, (0, 0, 5), (10, 0, 5), feed=600.0)]
+    ways = [line(TrajectoryKind.CUT, (0, 0, 5), (4, 0, 5), (10, 0, 5), feed=600.0)]
+    bent = [line(TrajectoryKind.CUT, (0, 0, 5), (4, 0.002, 5), (10, 0, 5), feed=600.0)]
+    short = [line(TrajectoryKind.CUT, (0, 0, 5), (10, 0, 5), feed=600.0)]
     jobs = [plan(step(1, BALL, "planar_floor", trajectories=tuple(w))) for w in (ways, bent, short)]
     read = [read_stepnc(write_stepnc_aim(j)) for j in jobs]
     check_agreement(nc_of(jobs[2]), read[0])
@@ -272,7 +272,8 @@ def pocket(lines):
     for k in range(begin, len(p)):
         rapid = bool(np.isnan(p.feed[k]))
         if np.abs(p.end[k] - p.start[k]).max() > 0.0:
-            ways.append(Trajectory(Motion.RAPID if rapid else Motion.CUT, np.array([p.start[k], p.end[k]]),
+            ways.append(Trajectory(TrajectoryKind.RAPID if rapid else TrajectoryKind.CUT,
+                                   np.array([p.start[k], p.end[k]]),
                                    0.0 if rapid else float(p.feed[k])))
     made = replace(step(1, TOOL, "depth_layers", trajectories=tuple(ways)), spindle_rpm=8000.0, feed=400.0)
     return plan(made, tools=(TOOL,), clearance_plane=20.0,

@@ -10,7 +10,7 @@ from geometry.surfaces.foot_points import foot_points
 from geometry.trimming.trim import trim_faces
 from tests.hand_parts import ball
 from toolpath.passes.cutter_locations import lifted
-from toolpath.passes.forward_step import Profile, steps
+from toolpath.passes.forward_step import PassProfile, steps
 from toolpath.passes.trimmed_faces import TrimmedFace
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
@@ -45,7 +45,7 @@ def test_passes_over_a_piece_between_cutting_planes(cut, piece):
     for one in pieces[piece]:
         for iso, etas in one.passes(1.0, SCALLOP - CHORD, None):
             for eta in etas.tolist():
-                profile = Profile.of(iso.curve(eta), CHORD, 1.0)
+                profile = PassProfile.of(iso.curve(eta), CHORD, 1.0)
                 lines += lifted(profile, steps(profile, 1.0, CHORD, SCALLOP), body,
                                 lambda xy: np.full(len(xy), -np.inf), CHORD)[0]
                 borders.append(profile.contact)

@@ -17,7 +17,7 @@ from output.linuxcnc import write_linuxcnc
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import clamped, long_plan, plan, tiny
-from toolpath.workingsteps import Motion
+from toolpath.workingsteps import TrajectoryKind
 from verify.comparison.program_equivalence import difference
 from verify.gcode.dialects import DIALECTS as READ
 from verify.gcode.dialects import dialect_of
@@ -63,7 +63,7 @@ def planned(work):
     for s in work.steps:
         turn = np.eye(3) if work.clamping is None else work.clamping.frames[s.access].rotation
         for t in s.trajectories:
-            if t.motion is Motion.RAPID:
+            if t.motion is TrajectoryKind.RAPID:
                 continue
             axes = np.tile([0.0, 0.0, 1.0], (len(t.points), 1)) if t.axes is None else t.axes
             p, a, n = t.points @ turn, axes @ turn, len(t.points) - 1
