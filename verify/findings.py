@@ -13,8 +13,8 @@ from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
 
-MOST = 200
-OF_A_KIND = MOST // len(FindingKind)
+MAX_FINDINGS = 200
+KEPT_OF_A_KIND = MAX_FINDINGS // len(FindingKind)
 NEAR = 5.0
 LINES_APART = 5
 BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "holder"}
@@ -86,15 +86,15 @@ def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_cleara
     if code == PLUNGE:
         return (FindingKind.PLUNGE, f"a descent steeper than the ramp angle takes {depth:.3f} mm of stock with the "
                 f"end of the tool (skin allowed {skin:.3f} mm)", skin)
-    body, what = BODY_NAMES[code % FIXTURE], "a fixture" if code >= FIXTURE else "stock or part"
+    body, obstacle = BODY_NAMES[code % FIXTURE], "a fixture" if code >= FIXTURE else "stock or part"
     gap = clearance - depth
     if not feed:
-        text = f"a rapid takes the {body} into {what}" if gap < 0 else \
-            f"a rapid brings the {body} to {gap:.3f} mm of {what} (clearance {rapid_clearance:g} mm)"
+        text = f"a rapid takes the {body} into {obstacle}" if gap < 0 else \
+            f"a rapid brings the {body} to {gap:.3f} mm of {obstacle} (clearance {rapid_clearance:g} mm)"
         return FindingKind.RAPID, text, rapid_clearance
     if gap < 0:
-        return FindingKind.COLLISION, f"the {body} enters {what} by {-gap:.3f} mm", 0.0
-    text = f"the {body} comes to {gap:.3f} mm of {what} (clearance {clearance:.3f} mm)"
+        return FindingKind.COLLISION, f"the {body} enters {obstacle} by {-gap:.3f} mm", 0.0
+    text = f"the {body} comes to {gap:.3f} mm of {obstacle} (clearance {clearance:.3f} mm)"
     return FindingKind.RUBBING, text, clearance
 
 
@@ -141,7 +141,7 @@ def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64,
 def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str, int]]:
     """200 findings, the gravest first, and how many there are of each kind.
 
-    The gravest ``OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times,
+    The gravest ``KEPT_OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times,
     and what says why is a single line.
     """
     rank = {kind: i for i, kind in enumerate(FindingKind)}
@@ -155,8 +155,8 @@ def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str,
     more: list[int] = []
     for k, f in enumerate(by_grade):
         seen[str(f.kind)] = seen.get(str(f.kind), 0) + 1
-        (sure if seen[str(f.kind)] <= OF_A_KIND else more).append(k)
-    kept = sorted(sure + more[:MOST - len(sure)])
+        (sure if seen[str(f.kind)] <= KEPT_OF_A_KIND else more).append(k)
+    kept = sorted(sure + more[:MAX_FINDINGS - len(sure)])
     return tuple(by_grade[k] for k in kept), dict(sorted(counts.items()))
 
 

@@ -48,10 +48,10 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
     Raises VerificationError where the flutes end below the corner of the cutting part.
     """
     for tool in tools:
-        least = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
-        if tool.flute_length < least:
+        corner_height = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
+        if tool.flute_length < corner_height:
             raise VerificationError(
                 f"{tool.id}: flute length {tool.flute_length} mm ends inside the corner of the cutting part",
-                code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=least,
+                code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
                 remedy="give the flute length from the tip")
     return np.array([[t.radius, min(t.corner_radius, t.radius), t.flute_length] for t in tools]).reshape(-1, 3)

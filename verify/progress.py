@@ -7,7 +7,7 @@ from collections.abc import Callable
 Report = Callable[[float], None]
 
 
-class Stages:
+class StageProgress:
     """Stages of a piece of work, each a span of 0 to 1.
 
     report : called with what is done, 0 to 1; what it raises ends the work. None where nobody listens

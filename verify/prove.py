@@ -13,7 +13,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
-from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
+from verify.checks.program_sequence import FramedProgram, Given, check_numbers, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
@@ -43,7 +43,7 @@ from verify.model import (
 from verify.moves import BOW, Moves
 from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.surface.guard_points import (
     CLOSER_SHARE,
     SURE,
@@ -58,7 +58,7 @@ from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
 
-LEAST_REACH = 1.0
+MIN_REACH = 1.0
 READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known
 
 
@@ -97,7 +97,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     """
     _check(tools, setup, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
     moves, source = moves_of(read, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
@@ -171,7 +171,7 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     normals = np.concatenate([s.normals, guard.normals, bisector])
     face = np.concatenate([s.face, guard.face, edge_face])
     area = np.concatenate([s.area, guard.area, np.zeros(len(edge))])
-    reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
+    reach = max(MIN_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
                                           progress=lambda f: tell(0.1 + 0.7 * f))
@@ -201,12 +201,12 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     return out
 
 
-def _program_findings(read: Sequence[Reading]) -> list[Finding]:
+def _program_findings(read: Sequence[FramedProgram]) -> list[Finding]:
     return [Finding(FindingKind.PROGRAM, p.program.name, r.line, None, None, None, 0.0, 0.0, r.message)
             for p in read for r in p.program.remarks]
 
 
-def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source: Source,
+def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, source: Source,
                    fine: Sequence[ToolBody]) -> list[Finding]:
     """A program whose feed moves never meet the stock: another zero, or inch for mm.
 
@@ -229,7 +229,7 @@ def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids
                              s.area[bad], zone_ids, setup.scallop_height)
 
 
-def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[Reading], moves: Moves,
+def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...], support: Support) -> Proof:
     read = [r.program for r in readings]

@@ -62,8 +62,8 @@ class ToolAxes:
 
 def square_to(axis: F64) -> F64:
     """(m, 3) float64 unit vectors square to (m, 3) unit vectors; X for +Z."""
-    least = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    out = least - np.einsum("ij,ij->i", least, axis)[:, None] * axis
+    seed = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    out = seed - np.einsum("ij,ij->i", seed, axis)[:, None] * axis
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 

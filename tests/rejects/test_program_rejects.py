@@ -7,7 +7,7 @@ import pytest
 from geometry.errors import ProgramError, VerificationError
 from verify.gcode.reader import read_program
 from verify.program import move_log
-from verify.program.move_log import MOST_MOVES_A_BLOCK
+from verify.program.move_log import MAX_MOVES_A_BLOCK
 
 HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"
@@ -188,13 +188,13 @@ def test_a_block_that_would_grow_without_bound_costs_no_memory(body):
     tracemalloc.stop()
     error = caught.value
     assert error.code == "program_too_long" and error.subjects == ("line 7",) and "line 7" in error.message
-    assert error.measured > error.limit == MOST_MOVES_A_BLOCK and error.remedy and peak < 5e6
+    assert error.measured > error.limit == MAX_MOVES_A_BLOCK and error.remedy and peak < 5e6
 
 
 @pytest.mark.parametrize("body, line", [("G1 F100\n" + "X1\nX2\n" * 60, 97), ("G2 I5 F100\n", 7)])
 def test_a_program_of_too_many_moves(body, line, monkeypatch):
     """Plain lines are counted whenever a chunk of them is packed, arcs before they are written out."""
-    monkeypatch.setattr(move_log, "MOST_MOVES", 90)
+    monkeypatch.setattr(move_log, "MAX_MOVES", 90)
     monkeypatch.setattr(move_log.Log, "full", 5)
     with pytest.raises(VerificationError) as caught:
         read_program(HEAD + body + TAIL)

@@ -19,7 +19,7 @@ from tests.synthetic_plan import clamped, shaped, tiny
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
 from verify.program.program import Program
-from verify.stepnc.part21 import Part21
+from verify.stepnc.part21 import Part21File
 from verify.stepnc.reader import ap238, iso14649, read_stepnc
 
 MACHINE = Kinematics("table-table-AC", None)
@@ -167,7 +167,7 @@ def same(a: Program, b: Program) -> bool:
 
 
 def entities(text):
-    file = Part21(text, "job")
+    file = Part21File(text, "job")
     return frozenset(" ".join(n for n, _ in file.records(k)) for of in file.entities().values() for k in of)
 
 

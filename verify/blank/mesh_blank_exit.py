@@ -10,7 +10,7 @@ from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 
 CLOSE = 1e-6  # mm: as near as this to the surface is on it
-MOST_STEPS = 200
+MAX_STEPS = 200
 
 
 def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: float, reach: float) -> F64:
@@ -32,7 +32,7 @@ def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: fl
     """
     out, normals = np.zeros(len(points)), tree.mesh.normals
     active = np.arange(len(points))
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         if not len(active):
             break
         at, way = points[active] + out[active, None] * directions[active], directions[active]

@@ -17,9 +17,9 @@ from verify.model import Finding, FindingKind, ProofSetup
 from verify.program.move_kinds import FEED
 from verify.program.program import Program
 
-LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
+MIN_BELOW = 0.01  # mm under the part that nobody need be told of
 HALF_A_TURN = 180.0 + 1e-6  # deg, and rounding
-LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
+MIN_ANGLE = 1e-6  # deg beyond a limit that are rounding
 RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from decimals
 
 
@@ -93,7 +93,7 @@ def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
             along = f"Z{at:.3f}, below the top of stock and fixtures (Z{top:.3f})" if stop.axis[2] == 1.0 else \
                 f"{at:.3f} mm along its axis, to which stock and fixtures reach {top:.3f} mm"
             yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - at, top,
-                          f"{stop.what} with T{stop.tool} at {along}: lift the tool first")
+                          f"{stop.event} with T{stop.tool} at {along}: lift the tool first")
 
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
@@ -159,11 +159,11 @@ def _angles(p: Program, setup: ProofSetup) -> Iterator[Finding]:
     beyond = np.maximum(low - turn, turn - high)
     for k, letter in enumerate(setup.kinematics.letters):
         m = int(np.argmax(beyond[:, k]))
-        if beyond[m, k] > LEAST_ANGLE:
+        if beyond[m, k] > MIN_ANGLE:
             limit = float(high[k] if turn[m, k] > high[k] else low[k])
             yield _finding(FindingKind.LIMIT, p, m, float(beyond[m, k]), limit,
                            f"{letter}{turn[m, k]:g} is beyond the {low[k]:g} to {high[k]:g} deg the machine turns "
-                           f"{letter} to", int((beyond[:, k] > LEAST_ANGLE).sum()))
+                           f"{letter} to", int((beyond[:, k] > MIN_ANGLE).sum()))
 
 
 def _rates(p: Program, setup: ProofSetup) -> Iterator[Finding]:
@@ -219,7 +219,7 @@ def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
     yield from (f"{p.name}, {note}" for note in p.notes)
     if p.assumed:
         yield f"{p.name} does not state {', '.join(p.assumed)} before its first move; it was read as if it did"
-    if len(p) and float(p.end[:, 2].min()) < bottom - LEAST_BELOW:
+    if len(p) and float(p.end[:, 2].min()) < bottom - MIN_BELOW:
         m = int(np.argmin(p.end[:, 2]))
         yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
                "part; what stands there is not known unless it is a fixture of the setup")

@@ -19,7 +19,7 @@ from verify.findings import Source
 from verify.gcode.reader import FEED, Program, read_program
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.stepnc.reader import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 
@@ -29,7 +29,7 @@ Given = NcProgram | tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class FramedProgram:
     """One program and what it is held against, all in its own frame.
 
     program : as read; turn : (3, 3) float64 from the frame of the proof to that of the program, None: the same
@@ -70,27 +70,27 @@ def check_numbers(tools: Sequence[ToolBody]) -> None:
 
 
 def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-             spindle_tool: int, report: Report) -> list[Reading]:
+             spindle_tool: int, report: Report) -> list[FramedProgram]:
     """Read programs in the order they run; a first descent that lacks only its height comes from above everything.
 
     programs, spindle_tool : as ``verify.prove.prove`` takes them, and errors as it raises them
     report   : called with the share read, 0 to 1
     """
     given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
-    stages, total, done = Stages(report), max(sum(len(p.text) for p in given), 1), 0
+    stages, total, done = StageProgress(report), max(sum(len(p.text) for p in given), 1), 0
     read = []
     for nc in given:
         own, bounds = _own(nc, part, setup)
         top = top_of_all(bounds, own)
-        told = stages.span(done / total, (done + len(nc.text)) / total)
+        share = stages.span(done / total, (done + len(nc.text)) / total)
         if is_stepnc(nc.text):
-            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=told)
+            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=share)
         else:
             program = read_program(
                 nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
                 blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=told, dialect=nc.dialect)
-        read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
+                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, dialect=nc.dialect)
+        read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read
 
@@ -113,7 +113,7 @@ def _box_round(box: F64, turn: F64) -> F64:
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
-def moves_of(read: Sequence[Reading], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
+def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
     """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them.
 
     tools : of the moves; ``Moves.tool`` is the place in it
@@ -137,7 +137,7 @@ def moves_of(read: Sequence[Reading], tools: Sequence[ToolBody]) -> tuple[Moves,
             Source(tuple(p.name for p in programs), which, line, number))
 
 
-def slides_of(read: Sequence[Reading], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
+def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
     """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them.
 
     None where they lie along the frame throughout, or no rapid asks for them.
@@ -153,13 +153,13 @@ def slides_of(read: Sequence[Reading], tools: Sequence[ToolBody], setup: ProofSe
     return np.concatenate(out)[_known(read, tools)]
 
 
-def _known(read: Sequence[Reading], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+def _known(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
     """(m,) bool: moves with a tool of the table in the spindle."""
     number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
     return np.isin(number, [t.number for t in tools])
 
 
-def _axes(r: Reading, at_start: bool) -> F64:
+def _axes(r: FramedProgram, at_start: bool) -> F64:
     """(m, 3) tool axes of a program at the start or the end of its moves, in the frame of the proof."""
     p = r.program
     if p.poses is None:

@@ -12,7 +12,7 @@ from verify.findings import Source
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
 
-LEAST_LINES = 4
+MIN_LINES = 4
 WINDOW = 8
 ROUND = 1e-6  # mm, rad: moves nearer than that are the same
 
@@ -29,7 +29,7 @@ def repeat_findings(moves: Moves, cut: NDArray[np.bool_], source: Source) -> lis
                     f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} run again what lines "
                     f"{source.line[a - shift]} to {source.line[b - shift]} ran, and take nothing off", b - a + 1)
             for a, b, shift in _runs(moves, cut)
-            if source.line[b] - source.line[a] + 1 >= LEAST_LINES and not _spring(moves, a, b, shift)]
+            if source.line[b] - source.line[a] + 1 >= MIN_LINES and not _spring(moves, a, b, shift)]
 
 
 def _spring(moves: Moves, a: int, b: int, shift: int) -> bool:

@@ -4,7 +4,7 @@ The lowest place of a disc of radius r at the height h of a tool with tip p and 
 s = sqrt(1 - a_z²). Cutting parts are rounded: a corner of radius c has its centres on the circle of radius R - c at
 the height c, so it reaches to p_z + c a_z - (R - c) s - c. All else is made of frusta, whose lowest place is on one of
 their two rims. Along a move the tip goes straight and the axis swings by a tenth of a radian at most
-(``dividing.MOST_TURN``), so what a rim at the distance q from the tip does between the ends of a move is within
+(``turn_subdivision.MAX_TURN``), so what a rim at the distance q from the tip does between the ends of a move is within
 q / 800 of the way between them; that is added where an axis swings.
 """
 
@@ -60,10 +60,10 @@ def lowest_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, *, l
     up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
     start, end = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
     swings = np.abs(start - end).max(axis=1) > UPRIGHT
-    asked = np.ones(len(p), np.bool_) if not leaning else np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT
+    counted = np.ones(len(p), np.bool_) if not leaning else np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT
     out = np.full(len(p), np.inf)
     for tool in tools:
-        mine = np.flatnonzero(asked & (p.tool == tool.number))
+        mine = np.flatnonzero(counted & (p.tool == tool.number))
         out[mine] = np.minimum(_lowest(tool, setup, p.start[mine], start[mine], swings[mine]),
                                _lowest(tool, setup, p.end[mine], end[mine], swings[mine]))
     return out

@@ -25,7 +25,7 @@ from verify.gcode.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
 from verify.program.arc_chords import CHORD
 from verify.program.program import Pause, Program
-from verify.progress import Report, Stages, silent
+from verify.progress import Report, StageProgress, silent
 
 TIP = 1e-3
 """mm between two tips that are one."""
@@ -76,33 +76,33 @@ def _careless(p: Program) -> str:
     """
     control, changes = CONTROLS.get(p.dialect), 0
     for pause in p.pauses:
-        least = 0 if pause.what in ("M0", "M1") else None if control is None else control.home_from
-        if least is not None and (changes >= least or pause.what != "tool change"):
+        first_home = 0 if pause.event in ("M0", "M1") else None if control is None else control.home_from
+        if first_home is not None and (changes >= first_home or pause.event != "tool change"):
             if not pause.home:
-                return f"line {pause.line} of {p.name}: {pause.what}, and the spindle was not sent home before"
+                return f"line {pause.line} of {p.name}: {pause.event}, and the spindle was not sent home before"
             if control is not None and control.gives_up_length and pause.counted:
-                return f"line {pause.line} of {p.name}: {pause.what}, and the length offset is not off"
-        changes += pause.what == "tool change"
+                return f"line {pause.line} of {p.name}: {pause.event}, and the length offset is not off"
+        changes += pause.event == "tool change"
     return ""
 
 
 def _paused(proved: Program, other: Program, mine: NDArray[np.int64], yours: NDArray[np.int64]) -> str:
     """The first pause that the programs do not make alike, after the same of the moves given; '' where none."""
-    def told(pause: Pause, moving: NDArray[np.int64]) -> tuple[object, ...]:
-        tool = pause.tool if pause.what == "tool change" else 0
-        return (pause.what, tool, int(np.searchsorted(moving, pause.moves)), pause.speed, pause.coolant, pause.tcp,
+    def state_at(pause: Pause, moving: NDArray[np.int64]) -> tuple[object, ...]:
+        tool = pause.tool if pause.event == "tool change" else 0
+        return (pause.event, tool, int(np.searchsorted(moving, pause.moves)), pause.speed, pause.coolant, pause.tcp,
                 pause.relative)
 
     # LinuxCNC puts the old tool away to take a fresh one by the same number
-    first, second = ([x for x in p.pauses if x.what != "tool change" or x.tool] for p in (proved, other))
+    first, second = ([x for x in p.pauses if x.event != "tool change" or x.tool] for p in (proved, other))
     for a, b in zip(first, second, strict=False):
-        if told(a, mine) != told(b, yours):
-            return (f"line {b.line} of {other.name} ({b.what}) and line {a.line} of {proved.name} ({a.what}) differ in "
+        if state_at(a, mine) != state_at(b, yours):
+            return (f"line {b.line} of {other.name} ({b.event}) and line {a.line} of {proved.name} ({a.event}) differ in "
                     "what is left running, or in where they stand")
     if len(first) != len(second):
         more, rest = (proved, first) if len(first) > len(second) else (other, second)
         pause = rest[min(len(first), len(second))]
-        return f"line {pause.line} of {more.name} ({pause.what}) has no counterpart"
+        return f"line {pause.line} of {more.name} ({pause.event}) has no counterpart"
     return ""
 
 
@@ -228,17 +228,17 @@ def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Se
     """
     if not twins:
         return []
-    stages, share, notes = Stages(report), 1.0 / (len(twins) + 1), []
+    stages, share, notes = StageProgress(report), 1.0 / (len(twins) + 1), []
     (first,) = read_all([proved], part, tools, setup, 0, stages.span(0.0, share))
     for k, twin in enumerate(twins, 1):
         try:
             (other,) = read_all([twin], part, tools, setup, 0, stages.span(k * share, (k + 1) * share))
-            told = difference(first.program, other.program)
+            problem = difference(first.program, other.program)
         except ProgramError as refusal:
-            told = refusal.message
-        if told:
-            raise InternalError(f"{twin.name} is not the program that was proved: {told}", code="programs_differ",
-                                subjects=(proved.name, twin.name), measured=told,
+            problem = refusal.message
+        if problem:
+            raise InternalError(f"{twin.name} is not the program that was proved: {problem}", code="programs_differ",
+                                subjects=(proved.name, twin.name), measured=problem,
                                 remedy="please report it with part and setup; nothing is delivered")
         if twin.dialect != proved.dialect:  # else the proof has noted them
             notes += [f"{twin.name}: {note}" for note in other.program.notes]

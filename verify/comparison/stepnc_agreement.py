@@ -208,8 +208,8 @@ def _abreast(points: F64, way: F64) -> float:
         return np.inf
     place = np.searchsorted(length, gone * (length[-1] / gone[-1])) - 1
     near = np.full(len(points), np.inf)
-    for beside in (-2, -1, 0, 1, 2):
-        k = np.clip(place + beside, 0, len(way) - 2)
+    for offset in (-2, -1, 0, 1, 2):
+        k = np.clip(place + offset, 0, len(way) - 2)
         d = way[k + 1] - way[k]
         share = np.clip(((points - way[k]) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-30), 0.0, 1.0)
         np.minimum(near, np.linalg.norm(points - way[k] - share[:, None] * d, axis=1), out=near)

@@ -8,17 +8,17 @@ import math
 import numpy as np
 
 from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
-from verify.gcode.drilling_cycles import Hole, Out, hole_moves
+from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
 from verify.gcode.rotary_words import between
 from verify.gcode.work_offsets import Origins
 from verify.program.arc_chords import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
 from verify.program.move_kinds import FEED, RAPID
-from verify.program.move_log import MOST_MOVES_A_BLOCK
+from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
 
-class Motion(Origins):
+class BlockMotion(Origins):
     """Moves of the blocks, written to the log; ``dwell`` is what they wait, s."""
 
     dwell = 0.0
@@ -199,7 +199,7 @@ class Motion(Origins):
             if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
                 return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
             points = arc_points(start, end, centre, s.motion == 2, axes, turns, self._arc_chord(turn),
-                                most=MOST_MOVES_A_BLOCK).tolist()
+                                max_points=MAX_MOVES_A_BLOCK).tolist()
         except ArcTooLong as problem:
             return self.log.room(problem.points)
         except ArcError as problem:
@@ -272,5 +272,5 @@ class Motion(Origins):
         if peck <= 0 and clear > bottom:
             self.log.error("a drilling cycle with Q0 never ends")
             return None
-        out = {85: Out.FEED_TO_CLEAR, 89: Out.FEED}.get(int(s.motion or 0), Out.RAPID)
+        out = {85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}.get(int(s.motion or 0), HoleExit.RAPID)
         return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)

@@ -14,7 +14,7 @@ MOVES_A_PECK = 3
 MOVES_A_HOLE = 5
 
 
-class Out(Enum):
+class HoleExit(Enum):
     """How a cycle leaves the bottom: at once, feeding to the R plane (G85), or feeding all the way (G89)."""
 
     RAPID = 0
@@ -39,7 +39,7 @@ class Hole:
     back: float
     peck: float
     lift: bool
-    out: Out = Out.RAPID
+    out: HoleExit = HoleExit.RAPID
 
     @property
     def pecks(self) -> float:
@@ -72,6 +72,6 @@ def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[
         yield at(hole.clear if hole.lift else depth + PECK_LIFT), RAPID
         if hole.lift:
             yield at(min(depth + PECK_LIFT, hole.clear)), RAPID
-    if hole.out is Out.FEED_TO_CLEAR:
+    if hole.out is HoleExit.FEED_TO_CLEAR:
         yield at(hole.clear), FEED
-    yield at(hole.back), FEED if hole.out is Out.FEED else RAPID
+    yield at(hole.back), FEED if hole.out is HoleExit.FEED else RAPID

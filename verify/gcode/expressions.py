@@ -17,7 +17,7 @@ from verify.gcode.parameters import Parameters
 
 Value = Callable[[Parameters], float]
 
-MOST_BRACKETS = 40
+MAX_BRACKETS = 40
 EQUAL = 1e-5
 
 _NUMBER = re.compile(NUMBER)
@@ -29,7 +29,7 @@ _PRECEDENCE = {"**": 5, "*": 4, "/": 4, "mod": 4, "+": 3, "-": 3, "eq": 2, "ne":
 
 
 @dataclass(frozen=True)
-class Target:
+class ParameterReference:
     """A parameter as it is written: its name, or what its number comes from."""
 
     name: str
@@ -40,7 +40,7 @@ class Target:
         return scope.named(self.name) if self.number is None else scope.numbered(self.number(scope))
 
 
-class Reading:
+class ExpressionReader:
     """One left-to-right reading of the text of a line, which has no blanks and is in lower case."""
 
     def __init__(self, text: str) -> None:
@@ -60,8 +60,8 @@ class Reading:
     def value(self) -> Value:
         """A number, a parameter, a function, an expression in brackets, or one of these with a sign."""
         self._depth += 1
-        if self._depth > MOST_BRACKETS:
-            raise BlockError(f"more than {MOST_BRACKETS} brackets, signs or # in one another")
+        if self._depth > MAX_BRACKETS:
+            raise BlockError(f"more than {MAX_BRACKETS} brackets, signs or # in one another")
         found = self._value()
         self._depth -= 1
         return found
@@ -98,18 +98,18 @@ class Reading:
             return result
         return checked
 
-    def target(self) -> Target:
+    def target(self) -> ParameterReference:
         """The parameter behind a # sign."""
         self.take("#")
         if name := _NAME.match(self.text, self.at):
             self.at = name.end()
-            return Target(name.group(1), None)
-        return Target("", self.value())
+            return ParameterReference(name.group(1), None)
+        return ParameterReference("", self.value())
 
-    def _joined(self, least: int) -> Value:
+    def _joined(self, min_precedence: int) -> Value:
         """Values joined by operators of at least this precedence."""
         left = self.value()
-        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= least:
+        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= min_precedence:
             self.at = sign.end()
             left = _join(_OPERATIONS[sign.group()], left, self._joined(_PRECEDENCE[sign.group()] + 1))
         return left
@@ -162,11 +162,11 @@ def _small_enough(name: str, compute: Callable[[], float]) -> float:
         raise BlockError(f"{name} is no finite number") from None
 
 
-def _within(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[[float], float]:
-    """``function`` of a number from ``least`` to ``most``; any other is refused with the name."""
+def _within(name: str, function: Callable[[float], float], low: float, high: float) -> Callable[[float], float]:
+    """``function`` of a number from ``low`` to ``high``; any other number is refused."""
     def applied(number: float) -> float:
-        if not least <= number <= most:
-            raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {least:g} to {most:g}")
+        if not low <= number <= high:
+            raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {low:g} to {high:g}")
         return function(number)
     return applied
 

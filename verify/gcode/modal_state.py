@@ -12,7 +12,7 @@ from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
 from verify.program.move_log import Log
-from verify.program.program import NAN, Pause, Stop
+from verify.program.program import NAN, Pause, StopPoint
 
 INCH = 25.4
 
@@ -138,7 +138,7 @@ class Modes(Rotary):
         words.extend(f"{letter}0" for letter in self.rotary if letter not in self.stated_axes)
         self.assumed = tuple(words)
 
-    def stop(self, what: str) -> None:
+    def stop(self, event: str) -> None:
         """Note where the program stops, if its height, or off the axis Z its place, is known."""
         s = self.s
         x, y, z = self._tip()
@@ -146,13 +146,13 @@ class Modes(Rotary):
         if s.tilted and self.machine is not None:
             up = tuple(self.machine.axis(np.radians([s.turn]))[0].tolist())
         if s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z):
-            self.log.stops.append(Stop(self.log.line, what, s.tool, (x, y, z), up))
+            self.log.stops.append(StopPoint(self.log.line, event, s.tool, (x, y, z), up))
 
-    def pause(self, what: str, tool: int) -> None:
+    def pause(self, event: str, tool: int) -> None:
         """Note how the program leaves the machine where it waits, or ends."""
         s, log = self.s, self.log
         counted = s.offset is not None or self.stated.isdisjoint({43, 43.4, 49})
-        log.pauses.append(Pause(log.line, what, tool, log.count, s.speed if s.turning else 0.0, s.coolant, s.tcp,
+        log.pauses.append(Pause(log.line, event, tool, log.count, s.speed if s.turning else 0.0, s.coolant, s.tcp,
                                 s.relative, s.home, counted))
 
     def _motion(self, g: float) -> None:

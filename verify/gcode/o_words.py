@@ -13,7 +13,7 @@ _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "re
 
 
 @dataclass
-class Step:
+class OWordStep:
     """An O-word in its place; lines are numbered from 0.
 
     word  : the O-word
@@ -40,8 +40,8 @@ class Structure:
     again : by line, whether a loop or call may run it more than once
     """
 
-    steps: dict[int, Step] = field(default_factory=dict)
-    subs: dict[str, Step] = field(default_factory=dict)
+    steps: dict[int, OWordStep] = field(default_factory=dict)
+    subs: dict[str, OWordStep] = field(default_factory=dict)
     plain: list[bool] = field(default_factory=list)
     again: list[bool] = field(default_factory=list)
 
@@ -73,7 +73,7 @@ def find_structure(lines: Sequence[str]) -> Structure:
         try:
             word = read_o_word(raw)
             if word is not None:
-                pairing.place(Step(word, at))
+                pairing.place(OWordStep(word, at))
         except BlockError as problem:
             raise StructureError(str(problem), at + 1) from None
     pairing.finish()
@@ -85,12 +85,12 @@ class _Pairing:
 
     def __init__(self, found: Structure) -> None:
         self.found = found
-        self.open: list[Step] = []
-        self.last: list[Step] = []  # the latest branch of each open step
-        self.members: list[list[Step]] = []
+        self.open: list[OWordStep] = []
+        self.last: list[OWordStep] = []  # the latest branch of each open step
+        self.members: list[list[OWordStep]] = []
         self.labels: set[tuple[str, str]] = set()
 
-    def place(self, step: Step) -> None:
+    def place(self, step: OWordStep) -> None:
         word = step.word
         self.found.steps[step.at] = step
         top = self.open[-1] if self.open else None
@@ -113,7 +113,7 @@ class _Pairing:
             step = self.open[-1]
             raise StructureError(f"{_name(step)} is never closed", step.at + 1)
 
-    def _open(self, step: Step) -> None:
+    def _open(self, step: OWordStep) -> None:
         word = step.word
         sub = self.open[0].word.label if self.open and self.open[0].kind == "sub" else ""
         if word.keyword == "sub" and self.open:
@@ -130,7 +130,7 @@ class _Pairing:
         self.last.append(step)
         self.members.append([step])
 
-    def _close(self, step: Step) -> None:
+    def _close(self, step: OWordStep) -> None:
         first, members = self.open.pop(), self.members.pop()
         last = self.last.pop()
         if last.word.keyword != "else":
@@ -141,7 +141,7 @@ class _Pairing:
         for member in [*members, step]:
             member.start, member.end = first.at, step.at
 
-    def _branch(self, step: Step) -> None:
+    def _branch(self, step: OWordStep) -> None:
         first = self._needs(step, "if")
         if self.last[-1].word.keyword == "else":
             raise BlockError(f"{_name(step)} after else of {_name(first)}")
@@ -150,7 +150,7 @@ class _Pairing:
         self.last[-1] = step
         self.members[-1].append(step)
 
-    def _leave(self, step: Step) -> None:
+    def _leave(self, step: OWordStep) -> None:
         for k in range(len(self.open) - 1, -1, -1):
             loop = self.open[k]
             if loop.kind in ("while", "do", "repeat") and loop.word.label == step.word.label:
@@ -164,7 +164,7 @@ class _Pairing:
                 return
         raise BlockError(f"{_name(step)} is in no loop of that label")
 
-    def _needs(self, step: Step, kind: str) -> Step:
+    def _needs(self, step: OWordStep, kind: str) -> OWordStep:
         top = self.open[-1] if self.open else None
         if top is None or top.kind != kind or top.word.label != step.word.label:
             inside = f"inside {_name(top)} of line {top.at + 1}" if top else "with nothing open"
@@ -172,6 +172,6 @@ class _Pairing:
         return top
 
 
-def _name(step: Step) -> str:
+def _name(step: OWordStep) -> str:
     label = step.word.label
     return f"O{label if label.isdigit() else f'<{label}>'} {step.word.keyword}"

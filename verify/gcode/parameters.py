@@ -20,7 +20,7 @@ MESSAGES = 5599
 
 
 @dataclass
-class Frame:
+class CallFrame:
     """What one call, or the main program, has of its own: its parameters and how often its loops still run."""
 
     numbers: dict[int, float] = field(default_factory=dict)
@@ -36,13 +36,13 @@ class Parameters:
 
     def __init__(self, served: Callable[[int | str], float]) -> None:
         self._served = served
-        self.frames = [Frame()]
+        self.frames = [CallFrame()]
         self._numbers: dict[int, float] = {}
         self._names: dict[str, float] = {}
         self.returned: tuple[float, float] = (0.0, 0.0)
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> CallFrame:
         """What belongs to the call being run."""
         return self.frames[-1]
 

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from verify.gcode.block_words import BlockError, bare
-from verify.gcode.expressions import Reading, Target, Value
+from verify.gcode.expressions import ExpressionReader, ParameterReference, Value
 from verify.gcode.parameters import Parameters
 
 _O_WORD = re.compile(r"(/?)(?:n[0-9]+\.?[0-9]*)?o(?:<([^<>]*)>|([0-9]+)(?![0-9])|(?=[\[#]))(?=.)")
 _KEYWORD = re.compile(r"endsub|endif|endwhile|endrepeat|elseif|else|sub|return|call|if|while|do|break|continue|repeat")
 _CONDITIONS = frozenset({"if", "elseif", "while", "repeat"})
-_MOST_VALUES = {"call": 30, "return": 1, "endsub": 1, "if": 1, "elseif": 1, "while": 1, "repeat": 1}
+_MAX_VALUES = {"call": 30, "return": 1, "endsub": 1, "if": 1, "elseif": 1, "while": 1, "repeat": 1}
 _WHOLE = frozenset("MTDHL")
-MOST_CHARACTERS = 255
+MAX_CHARACTERS = 255
 """What LinuxCNC reads of a line; it also bounds how deep an expression can be."""
 
 
 @dataclass(frozen=True)
-class Line:
+class ParametricLine:
     """Words and assignments of a line.
 
     deleted  : whether it begins with /
@@ -32,7 +32,7 @@ class Line:
 
     deleted: bool
     words: tuple[tuple[str, Value], ...]
-    assigned: tuple[tuple[Target, Value], ...]
+    assigned: tuple[tuple[ParameterReference, Value], ...]
 
     def run(self, scope: Parameters) -> str:
         """Work the line out, make its assignments, and return the plain block that is left, '' for none."""
@@ -68,14 +68,14 @@ def is_plain(raw: str) -> bool:
     return "#" not in text and "[" not in text and not _O_WORD.match(text)
 
 
-def read_line(raw: str) -> Line:
+def read_line(raw: str) -> ParametricLine:
     """Words and assignments of a line that is not plain; BlockError where it cannot be read."""
     text = _compact(raw)
     reading = _reading(raw, text)
     deleted = text.startswith("/")
     reading.at = int(deleted)
     words: list[tuple[str, Value]] = []
-    assigned: list[tuple[Target, Value]] = []
+    assigned: list[tuple[ParameterReference, Value]] = []
     while reading.rest:
         letter = text[reading.at]
         if letter == "#":
@@ -89,7 +89,7 @@ def read_line(raw: str) -> Line:
             words.append((letter.upper(), reading.value()))
         else:
             raise BlockError(f"cannot read '{reading.rest}'")
-    return Line(deleted, tuple(words), tuple(assigned))
+    return ParametricLine(deleted, tuple(words), tuple(assigned))
 
 
 def read_o_word(raw: str) -> OWord | None:
@@ -117,17 +117,17 @@ def read_o_word(raw: str) -> OWord | None:
     values: list[Value] = []
     while reading.rest:
         values.append(reading.bracket())
-    most = _MOST_VALUES.get(keyword, 0)
-    if len(values) > most or (keyword in _CONDITIONS and not values):
-        raise BlockError(f"{keyword} takes {most or 'no'} values in brackets, and {len(values)} stand there")
+    limit = _MAX_VALUES.get(keyword, 0)
+    if len(values) > limit or (keyword in _CONDITIONS and not values):
+        raise BlockError(f"{keyword} takes {limit or 'no'} values in brackets, and {len(values)} stand there")
     return OWord(label, computed, keyword, tuple(values))
 
 
-def _reading(raw: str, text: str) -> Reading:
-    if len(raw.rstrip()) > MOST_CHARACTERS:
+def _reading(raw: str, text: str) -> ExpressionReader:
+    if len(raw.rstrip()) > MAX_CHARACTERS:
         raise BlockError(f"a line with parameters, expressions or O-words has {len(raw.rstrip())} characters, and "
-                         f"LinuxCNC reads {MOST_CHARACTERS}: split it")
-    return Reading(text)
+                         f"LinuxCNC reads {MAX_CHARACTERS}: split it")
+    return ExpressionReader(text)
 
 
 def _compact(raw: str) -> str:

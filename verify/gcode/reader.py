@@ -21,10 +21,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
-from verify.gcode.block_motion import Motion
+from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.control_flow import Flow, has_flow
-from verify.gcode.dialects import DIALECTS, LINUXCNC, spelt
+from verify.gcode.dialects import DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -36,7 +36,7 @@ BLEND_LIMIT = 0.01
 TOLD = 4096  # lines between two reports of how far the reading is
 
 
-class Reader(Motion):
+class Reader(BlockMotion):
     """One reading of one program; use ``read_program``."""
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
@@ -44,7 +44,7 @@ class Reader(Motion):
         log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
-            blocks = spelt(lines, dialect, log)
+            blocks = translated_blocks(lines, dialect, log)
         elif has_flow(text):
             blocks = Flow(lines, self).blocks()
         percents = self._scan(_told(blocks, len(lines), report))

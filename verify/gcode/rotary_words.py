@@ -3,7 +3,7 @@
 With tool centre point control (G43.4, M428) X, Y, Z are the tip in the setup frame, which goes straight whatever the
 axes do; without, they are the linear joints, and the tip of a turning block goes along a curve that the pivots give.
 In both cases every word of a block goes evenly from its start to its end. Turning blocks are written out in pieces
-(``dividing``).
+(``verify.program.turn_subdivision``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from verify.program.turn_subdivision import axis_pieces, tip_pieces
 
 TURNED = 8
 """Added to the unknown axes of a move whose rotary axes turn or stand off 0."""
-_LEAST = 1e-9  # mm, a block that moves X, Y, Z by less is one that only turns
+_STILL = 1e-9  # mm, a block that moves X, Y, Z by less is one that only turns
 
 
 class Rotary:
@@ -115,7 +115,7 @@ class Rotary:
             return rate, NAN
         if s.feed_mode == 93:
             return rate, 1.0 / feed
-        if length > _LEAST:
+        if length > _STILL:
             return rate, length / feed
         return 0.0, math.dist(turn, s.turn) * s.scale / feed
 

@@ -20,7 +20,7 @@ from verify.tool_bodies import Bodies
 
 FIXTURE_SPACING = 0.25
 DIP = 0.005  # mm a ball may be in a fixture, between its points, before it meets one
-MOST_FIXTURE_POINTS = 1_500_000
+MAX_FIXTURE_POINTS = 1_500_000
 
 
 def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> tuple[F64, float]:
@@ -52,9 +52,9 @@ def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence
 def _fixture_spacing(boxes: Sequence[tuple[F64, F64, float]], radii: Sequence[float]) -> float:
     """mm between the points of ``fixture_points``; boxes as ``_near_boxes`` gives them."""
     area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in (high - low for low, high, _ in boxes))
-    least = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
+    finest = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
                 default=FIXTURE_SPACING)
-    return max(min(FIXTURE_SPACING, least), (area / MOST_FIXTURE_POINTS) ** 0.5)
+    return max(min(FIXTURE_SPACING, finest), (area / MAX_FIXTURE_POINTS) ** 0.5)
 
 
 def _dip(radius: float, spacing: float) -> float:

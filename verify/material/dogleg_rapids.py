@@ -19,7 +19,7 @@ from verify.tool_axes import ToolAxes
 
 STILL = 1e-9
 SHARE = 4.0
-MOST_SWEEPS = 20_000
+MAX_SWEEPS = 20_000
 
 
 def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple[Moves, NDArray[np.int64]]:
@@ -40,7 +40,7 @@ def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple
     go up the tool, so none is taken for a lift.
     """
     boxed, parts = _boxed(moves, slides, clear)
-    chosen = np.flatnonzero(boxed & (_sweep_counts(parts, radius) <= MOST_SWEEPS))
+    chosen = np.flatnonzero(boxed & (_sweep_counts(parts, radius) <= MAX_SWEEPS))
     if len(chosen) == 0:
         return moves, np.arange(len(moves), dtype=np.int64)
     starts, ends, origin = [], [], []
@@ -70,7 +70,7 @@ def box_findings(moves: Moves, slides: F64 | None, radius: F64, clear: float, so
                     tuple(round(float(v), 6) for v in moves.end[m]), 0.0, 0.0,  # type: ignore[arg-type]
                     f"T{source.tool[m]}: the box of this rapid ({np.abs(parts[m]).max():.0f} mm long, rapid_motion "
                     "dogleg) is too large to be looked through with so thin a tool: move Z alone, or X and Y alone")
-            for m in np.flatnonzero(boxed & (counts > MOST_SWEEPS)).tolist()]
+            for m in np.flatnonzero(boxed & (counts > MAX_SWEEPS)).tolist()]
 
 
 def _boxed(moves: Moves, slides: F64 | None, clear: float) -> tuple[NDArray[np.bool_], F64]:

@@ -16,17 +16,17 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_bounds
-from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all
+from verify.checks.program_sequence import FramedProgram, Given, check_numbers, moves_of, read_all
 from verify.material.material import machined
-from verify.material.stock_field import Field, run_field, stock_field
+from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.model import ProofSetup, StockKind
 from verify.moves import BOW
 from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of
-from verify.progress import Stages
+from verify.progress import StageProgress
 
-LEAST_STEP = 0.002
-MOST_STEP = 5.0
+MIN_STEP = 0.002
+MAX_STEP = 5.0
 READ = 0.1  # share of the work done when the programs are read
 LEVELS = 127  # of a distance as a whole number: the band, either way
 
@@ -35,7 +35,7 @@ LEVELS = 127  # of a distance as a whole number: the band, either way
 class StockInTime:
     """A field of stock on its way from the blank to what is left, in whole numbers of a 127th of the band.
 
-    origin, step : of ``Field``, mm
+    origin, step : of ``DistanceField``, mm
     first  : (nx, ny, nz) int8, the blank; above zero where stock stands
     part   : (nx, ny, nz) int8, the part on the same nodes
     ended  : (k,) float64, s from the start of the job, at which each stretch of it ends
@@ -52,15 +52,15 @@ class StockInTime:
     node: NDArray[np.int64]
     value: NDArray[np.int8]
 
-    def after(self, stretches: int) -> Field:
+    def after(self, stretches: int) -> DistanceField:
         """The stock after so many stretches, 0 for the blank."""
         values = self.first.ravel().copy()
         upto = self.begins[stretches]
         values[self.node[:upto]] = self.value[:upto]  # the last of several counts
-        return Field(self.origin, self.step, values.reshape(self.first.shape) * np.float32(self.step / LEVELS))
+        return DistanceField(self.origin, self.step, values.reshape(self.first.shape) * np.float32(self.step / LEVELS))
 
 
-def stock_in_time(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, *,
+def stock_in_time(read: Sequence[FramedProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, *,
                   stretches: int, nodes: int, threads: int | None = None) -> StockInTime:
     """The stock from the blank on, stretch by stretch of the programs, to be looked at.
 
@@ -91,47 +91,47 @@ def stock_in_time(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody]
     took = np.concatenate([np.zeros(0), *(60.0 * minutes_of(r.program, r.setup) for r in read)])
     clock = np.cumsum(took)[np.isin(number, [t.number for t in tools])]
     ends = _stretches(clock, stretches)
-    now = first = _levels(field)
+    levels = first = _levels(field)
     node, value = [np.zeros(0, np.int64)], [np.zeros(0, np.int8)]
     for a, b in pairwise([0, *ends]):
         chosen = moves.feed.copy()
         chosen[:a] = chosen[b:] = False
         run_field(field, moves.only(chosen), tools, setup, bare=True, threads=threads)
-        before, now = now, _levels(field)
-        node.append(np.flatnonzero(now != before))
-        value.append(now.ravel()[node[-1]])
+        before, levels = levels, _levels(field)
+        node.append(np.flatnonzero(levels != before))
+        value.append(levels.ravel()[node[-1]])
     return StockInTime(field.origin, field.step, first, _levels(solid), clock[np.array(ends, np.int64) - 1],
                        np.cumsum([len(x) for x in node]), np.concatenate(node), np.concatenate(value))
 
 
-def _levels(field: Field) -> NDArray[np.int8]:
+def _levels(field: DistanceField) -> NDArray[np.int8]:
     return np.rint(field.values * (LEVELS / field.band)).astype(np.int8)
 
 
-def _stretches(clock: F64, most: int) -> list[int]:
+def _stretches(clock: F64, wanted: int) -> list[int]:
     """Where stretches of moves end; ``clock`` (m,) float64 is the time at which each move does."""
     count = len(clock)
     if not count:
         return []
     done = 0.5 * clock / max(float(clock[-1]), 1e-9) + 0.5 * np.arange(1, count + 1) / count
-    ends = np.searchsorted(done, np.arange(1, most) / most)
+    ends = np.searchsorted(done, np.arange(1, wanted) / wanted)
     return sorted({*(int(e) for e in ends if e > 0), count})
 
 
 def machined_stock(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                    step: float, *, box: F64 | None = None, spindle_tool: int = 0, threads: int | None = None,
-                   progress: Callable[[float], None] | None = None) -> Field:
+                   progress: Callable[[float], None] | None = None) -> DistanceField:
     """What stands when all programs have run, one after the other, on one blank.
 
     programs, part, tools, setup, spindle_tool : as ``verify.prove.prove`` takes them, mm, setup frame
-    step     : mm between nodes, 0.002 to 5; wider where that would take over 24 million of them (``Field.step`` says)
+    step     : mm between nodes, 0.002 to 5; wider where that would take over 24 million of them (``DistanceField.step`` says)
     box      : (2, 3) float64, mm, a window: what stands in it and nothing else; all of the stock where None
     threads  : 2 where None, at most the cores; the answer has the same bytes for any number
     progress : called with 0..1, never less than before; an exception from it ends the work at once
 
     Returns
     -------
-    Field
+    DistanceField
         ``surface()`` is closed, along the borders of the window too.
 
     Raises
@@ -150,7 +150,7 @@ def machined_stock(programs: Sequence[Given], part: Part, tools: Sequence[ToolBo
     check_numbers(tools)
     if box is not None:
         box = _window(box, stock_bounds(part.mesh.bounds, setup))
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     moves, _ = moves_of(read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ)), tools)
     field = machined(part.mesh, moves, tools, setup, step, box=box,
                      threads=threads or min(2, os.cpu_count() or 1), progress=stages.span(READ, 1.0))
@@ -158,7 +158,7 @@ def machined_stock(programs: Sequence[Given], part: Part, tools: Sequence[ToolBo
 
 
 def surface_error(step: float, turning: bool = True) -> float:
-    """How far a corner of ``Field.surface`` may be from what the tools leave, mm.
+    """How far a corner of ``DistanceField.surface`` may be from what the tools leave, mm.
 
     step : mm between nodes; turning : whether tools turn while they move, which is followed in pieces
 
@@ -170,12 +170,12 @@ def surface_error(step: float, turning: bool = True) -> float:
 
 def check_step(step: float) -> None:
     """Refuse a distance of nodes, mm, that is no number from 0.002 to 5 (InputError, bad_mesh_step)."""
-    if not LEAST_STEP <= step <= MOST_STEP:
+    if not MIN_STEP <= step <= MAX_STEP:
         raise InputError(f"nodes of the machined part {step:g} mm apart", code="bad_mesh_step", measured=step,
-                         limit=[LEAST_STEP, MOST_STEP], remedy=f"give {LEAST_STEP:g} to {MOST_STEP:g} mm")
+                         limit=[MIN_STEP, MAX_STEP], remedy=f"give {MIN_STEP:g} to {MAX_STEP:g} mm")
 
 
-def clipped(field: Field, box: F64) -> Field:
+def clipped(field: DistanceField, box: F64) -> DistanceField:
     """The field with nothing standing outside a window.
 
     box : (2, 3) float64, mm
@@ -185,7 +185,7 @@ def clipped(field: Field, box: F64) -> Field:
     values = np.minimum(field.values, x.astype(np.float32)[:, None, None])
     np.minimum(values, y.astype(np.float32)[None, :, None], out=values)
     np.minimum(values, z.astype(np.float32)[None, None, :], out=values)
-    return Field(field.origin, field.step, np.maximum(values, np.float32(-field.step)))
+    return DistanceField(field.origin, field.step, np.maximum(values, np.float32(-field.step)))
 
 
 def _window(box: F64, stock: F64) -> F64:

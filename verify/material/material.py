@@ -15,19 +15,19 @@ from verify.checks.clear_height import top_of_all
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
-from verify.material.stock_field import Field, run_field, stock_field
+from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
 from verify.material.stock_pass import StockPass, end_radii, free_rapids, parts
 from verify.model import ProofSetup
 from verify.moves import Moves
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.tool_axes import ToolAxes
 
 LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class MaterialContacts:
     """What one pass over the stock and the points of the part found.
 
     run     : StockPass; its events hold those of the part as well, the deeper first
@@ -43,7 +43,7 @@ class Contacts:
 
 
 def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
-             slides: F64 | None, threads: int, progress: Callable[[float], None]) -> Contacts:
+             slides: F64 | None, threads: int, progress: Callable[[float], None]) -> MaterialContacts:
     """Run all moves through the stock and past the part.
 
     mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
@@ -52,7 +52,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     Lines of one height serve tools along Z, a field of distances those that lean (``verify.material.stock_lines``, ``verify.material.stock_field``)
     and those whose flutes cut under what stands.
     """
-    stages, given, origin = Stages(progress), moves, None
+    stages, given, origin = StageProgress(progress), moves, None
     spacing = stock_spacing(setup, moves, tools)
     if setup.dogleg:
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
@@ -78,14 +78,14 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
-    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
+    return MaterialContacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
                     spacing, upright, dip)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
            threads: int, progress: Report) -> tuple[StockPass, float]:
     """The pass over lines of one height, and mm between them."""
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.2))
     return run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.2, 1.0)), lines.step
 
@@ -116,8 +116,8 @@ def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) ->
 
 def unseen(tools: Sequence[ToolBody], spacing: float, upright: bool) -> list[ToolBody]:
     """The tools whose end may come down between lines or nodes of the stock that are ``spacing`` mm apart."""
-    least = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
-    return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < least]
+    min_radius = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
+    return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < min_radius]
 
 
 def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:
@@ -155,14 +155,14 @@ def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64]
 
 
 def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,
-             box: F64 | None = None, threads: int = 2, progress: Callable[[float], None] | None = None) -> Field:
+             box: F64 | None = None, threads: int = 2, progress: Callable[[float], None] | None = None) -> DistanceField:
     """The stock after all feed moves, as fine as asked.
 
     step : mm between nodes, wider where that would take over 24 million of them
     box  : (2, 3) float64, mm, the piece of space looked at, a few steps wider; all of the stock where None
     progress : called with 0..1, never less than before; an exception from it ends the work at once
     """
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     field = stock_field(mesh, setup, step, box=box, threads=threads, progress=stages.span(0.0, 0.2))
     run_field(field, moves.only(moves.feed), tools, setup, bare=True, threads=threads, progress=stages.span(0.2, 1.0))
     return field

@@ -40,14 +40,14 @@ from verify.tool_axes import ToolAxes, sector_frames
 from verify.tool_bodies import Bodies
 
 F32 = NDArray[np.float32]
-MOST_NODES = 24_000_000
+MAX_NODES = 24_000_000
 TILE = 64
-WHOLE, LEAST_NODES = 0.85, 4.0  # of the end, and nodes: what stands on stock is known no better
+WHOLE, MIN_NODES = 0.85, 4.0  # of the end, and nodes: what stands on stock is known no better
 SLAB = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class DistanceField:
     """Node (i, j, k) at origin + (i, j, k) step: distance into the stock, cut off at ``band`` either way.
 
     origin : (3,) float64, mm; values : (nx, ny, nz) float32, mm, above zero where stock stands
@@ -80,14 +80,14 @@ class Field:
 
 
 def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 | None = None,
-                threads: int = 2, progress: Progress | None = None) -> Field:
+                threads: int = 2, progress: Progress | None = None) -> DistanceField:
     """The stock before the first cut.
 
     mesh : of the part, mm; step : mm between nodes, wider where that would take over 24 million
     box  : (2, 3) float64, mm, the piece of space wanted; all of the stock where None
     """
     lower, upper = stock_bounds(mesh.bounds, setup) if box is None else np.asarray(box, dtype=np.float64)
-    step = max(step, float(np.cbrt((upper - lower + 4 * step).prod() / MOST_NODES)))
+    step = max(step, float(np.cbrt((upper - lower + 4 * step).prod() / MAX_NODES)))
     counts = np.ceil((upper - lower) / step).astype(int) + 4
     origin = 0.5 * (lower + upper) - 0.5 * step * (counts - 1)
     values = np.empty(tuple(counts.tolist()), np.float32)
@@ -97,7 +97,7 @@ def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 
         _grown(values, origin, step, blank_mesh(setup), setup.uncertainty, threads, progress)
     else:
         _simple(values, origin, step, mesh.bounds, setup)
-    return Field(origin, step, values)
+    return DistanceField(origin, step, values)
 
 
 def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetup) -> None:
@@ -145,12 +145,12 @@ def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float
     values[:] = step
     for size in (4, 2):
         half = 0.5 * math.sqrt(3.0) * (size - 1) * step
-        asked = np.logical_or.reduceat(unsure, np.arange(0, unsure.shape[0], size), axis=0)
+        lookup = np.logical_or.reduceat(unsure, np.arange(0, unsure.shape[0], size), axis=0)
         for axis in (1, 2):
-            asked = np.logical_or.reduceat(asked, np.arange(0, unsure.shape[axis], size), axis=axis)
-        gap = np.full(asked.shape, reach)
-        centres = (np.argwhere(asked) * size + 0.5 * (size - 1)) * step + origin
-        gap[asked] = nearest(tree, centres, reach + step + half)[0]
+            lookup = np.logical_or.reduceat(lookup, np.arange(0, unsure.shape[axis], size), axis=axis)
+        gap = np.full(lookup.shape, reach)
+        centres = (np.argwhere(lookup) * size + 0.5 * (size - 1)) * step + origin
+        gap[lookup] = nearest(tree, centres, reach + step + half)[0]
         for axis, count in enumerate(unsure.shape):
             gap = np.repeat(gap, size, axis=axis).take(np.arange(count), axis=axis)
         values[unsure & ~inside & (gap > reach + step + half)] = -step
@@ -159,7 +159,7 @@ def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float
     values[unsure] = np.clip(np.where(inside[unsure], reach + gap, reach - gap), -step, step)
 
 
-def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
+def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
               threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> StockPass:
     """Run all moves through the stock, in place, and collect what touches.
 
@@ -205,7 +205,7 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     over = (np.pi * end**2 + 2.0 * end * aside)
     stands = taken[:, 3] / VOLUME_UNITS
     # straight down beside an edge only what stands on stock has dug; a few nodes alone do not say how much that is
-    partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > LEAST_NODES * field.step**2)
+    partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > MIN_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end, earned,
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))

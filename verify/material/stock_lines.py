@@ -48,7 +48,7 @@ from verify.material.stock_pass import (
 from verify.material.tiles import CellGrid, run_tiles
 from verify.model import ProofSetup, StockKind
 from verify.moves import Moves, Progress, cutter_table
-from verify.progress import Stages
+from verify.progress import StageProgress
 from verify.tool_bodies import Bodies
 
 MAX_LINES = 6_000_000
@@ -57,7 +57,7 @@ NEVER = -1e30
 
 
 @dataclass(frozen=True, eq=False)
-class StockField:
+class StockLines:
     """Vertical lines: line (i, j) stands at origin + ((i, j) + 0.5) step.
 
     origin : (2,) float64, mm; height : (nx, ny) float64, mm, top of the stock
@@ -69,7 +69,7 @@ class StockField:
 
 
 def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int = 2,
-          progress: Progress | None = None) -> StockField:
+          progress: Progress | None = None) -> StockLines:
     """The stock before the first cut, never below the part; lines are spacing mm apart, or wider to be six million.
 
     Exact on every line: an offset blank, or a mesh grown, is the union of spheres on the surface, by facets, edges and
@@ -89,12 +89,12 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
     elif setup.stock_kind == StockKind.CYLINDER:
         tops = blank_cylinder(mesh.bounds, setup).tops(*np.meshgrid(x, y, indexing="ij"))
         np.copyto(height, tops, where=np.isfinite(tops))
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     if setup.stock_kind == StockKind.STEP:
         _raise(height, origin, step, blank_mesh(setup), setup.uncertainty, threads, stages.span(0.0, 0.5))
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
     _raise(height, origin, step, mesh, reach, threads, stages.span(0.5, 1.0))
-    return StockField(origin, step, height)
+    return StockLines(origin, step, height)
 
 
 def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
@@ -111,7 +111,7 @@ def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: flo
     run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads, progress)
 
 
-def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
+def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
               progress: Progress | None = None) -> StockPass:
     """Run all moves through the stock, in place, and collect what touches.
 

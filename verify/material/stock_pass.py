@@ -62,10 +62,10 @@ def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
     Feed moves of a tool that does not turn have parts of half a radius at most, so that what is met at one end of a
     long move is not put together with what is met at the other; the rest are one each.
     """
-    most = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    part_length = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     length = np.linalg.norm(moves.end - moves.start, axis=1)
     whole = ~moves.feed if moves.axes is None else ~moves.feed | (moves.axes.angle > 0.0)
-    count = np.where(whole, 1, np.maximum(np.ceil(length / np.maximum(most, 1e-9) - 1e-9), 1)).astype(np.int64)
+    count = np.where(whole, 1, np.maximum(np.ceil(length / np.maximum(part_length, 1e-9) - 1e-9), 1)).astype(np.int64)
     return np.concatenate([[0], np.cumsum(count)])
 
 

@@ -45,17 +45,17 @@ def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axe
 
 
 def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1,
-               chord: float = CHORD, most: int = 200_000) -> F64:
+               chord: float = CHORD, max_points: int = 200_000) -> F64:
     """Points of an arc or helix after its start.
 
     start, end : (3,) float64, mm; centre : (2,) float64, mm, in plane axes
     turns      : as the P word: full turns begun
     chord      : mm, largest distance of the polyline from the arc; the points lie on it
-    most       : points at most
+    max_points : largest number of points
 
     Returns (k, 3) float64, mm, the last row equal to ``end``. Equal ends in the plane make a full circle.
     Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %, or 0.5 mm; ArcTooLong, before any
-    memory is taken, where ``most`` would not do.
+    memory is taken, where ``max_points`` are too few.
     """
     i, j, k = axes
     u, v = start[[i, j]] - centre, end[[i, j]] - centre
@@ -74,7 +74,7 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     # 4 asin(sqrt(c / 2r)) is 2 acos(1 - c / r) without its loss of digits on large radii
     step = 4 * math.asin(math.sqrt(min(chord / max(r0, r1), 0.5) / 2))
     n = max(1, math.ceil(abs(sweep) / step))
-    if n > most:
+    if n > max_points:
         raise ArcTooLong(n)
     f = np.arange(1, n + 1) / n
     radius = r0 + (r1 - r0) * f

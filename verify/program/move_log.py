@@ -11,12 +11,12 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.program.axis_log import TurnLog
 from verify.program.move_kinds import FEED
-from verify.program.program import Pause, Remark, Stop
+from verify.program.program import Pause, Remark, StopPoint
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
-MOST_MOVES = 5_000_000
-MOST_MOVES_A_BLOCK = 200_000
+MAX_MOVES = 5_000_000
+MAX_MOVES_A_BLOCK = 200_000
 _CHUNK = 65_536
 Row = tuple[float, float, float, float, float, float, int, float, int, int]
 
@@ -45,7 +45,7 @@ class Log:
         self._feeds = False
         self.speeds: dict[int, tuple[float, int]] = {}
         self.unknown: list[tuple[int, int]] = []
-        self.stops: list[Stop] = []
+        self.stops: list[StopPoint] = []
         self.blend = self.leaves = 0.0
         self.changes = 0
         self.unbounded = False
@@ -123,18 +123,18 @@ class Log:
         VerificationError
             Code program_too_long: over 200 000 moves in the block or 5 000 000 in the program.
         """
-        if moves > MOST_MOVES_A_BLOCK:
-            self._too_long(f"one block makes {moves:.6g} moves", moves, MOST_MOVES_A_BLOCK, self.line)
-        if self.count + moves > MOST_MOVES:
-            self._too_long("the program makes too many moves", self.count + moves, MOST_MOVES, self.line)
+        if moves > MAX_MOVES_A_BLOCK:
+            self._too_long(f"one block makes {moves:.6g} moves", moves, MAX_MOVES_A_BLOCK, self.line)
+        if self.count + moves > MAX_MOVES:
+            self._too_long("the program makes too many moves", self.count + moves, MAX_MOVES, self.line)
 
     def flush(self) -> None:
         """Pack the latest moves; refuses the program as ``room`` does where they are too many by now."""
         if not self.rows:
             return
-        if self.count > MOST_MOVES:
-            self._too_long("the program makes too many moves", self.count, MOST_MOVES,
-                           self.rows[MOST_MOVES - self._moves][9])
+        if self.count > MAX_MOVES:
+            self._too_long("the program makes too many moves", self.count, MAX_MOVES,
+                           self.rows[MAX_MOVES - self._moves][9])
         self._moves += len(self.rows)
         chunk = np.array(self.rows, dtype=np.float64)
         self._feeds |= bool((chunk[:, 6] == FEED).any())
@@ -163,8 +163,8 @@ class Log:
                            subjects=tuple(f"line {n}" for n, _ in errors), measured=[m for _, m in errors],
                            remedy=self._remedy or "correct the lines named, or leave out what the reader does not know")
 
-    def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:
-        raise VerificationError(f"{self.name}, line {line}: {what}, and {limit} are allowed", code="program_too_long",
+    def _too_long(self, problem: str, moves: float, limit: int, line: int) -> None:
+        raise VerificationError(f"{self.name}, line {line}: {problem}, and {limit} are allowed", code="program_too_long",
                                 subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
                                 remedy="correct the turns, radius, peck, repeats or rotary words of the line, or split "
                                        "the program")

@@ -22,14 +22,14 @@ class Remark:
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopPoint:
     """Where the program stops to change the tool, or ends: line, what it is, tool in the spindle, its tip and its axis.
 
     tip, axis : (3,) mm and unit, tip to spindle, setup frame; X and Y of the tip may be nan where the axis is +Z
     """
 
     line: int
-    what: str
+    event: str
     tool: int
     tip: tuple[float, float, float]
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -39,7 +39,7 @@ class Stop:
 class Pause:
     """How a program leaves the machine where it changes a tool, waits for somebody (M0, M1) or ends.
 
-    what    : 'tool change', 'M0', 'M1' or 'end of the program'
+    event   : 'tool change', 'M0', 'M1' or 'end of the program'
     tool    : T number that is put in, 0 for none; of other pauses the one in the spindle
     moves   : that were made before it
     speed   : 1/min, 0 where the spindle stands;  coolant, tcp : whether it runs, whether the control keeps the tip
@@ -49,7 +49,7 @@ class Pause:
     """
 
     line: int
-    what: str
+    event: str
     tool: int
     moves: int
     speed: float
@@ -65,7 +65,7 @@ class Poses:
     """How the tool stands on the part, move by move.
 
     start_axis, end_axis : (m, 3) float64 unit vectors, tip to spindle, setup frame; between them the axis goes along
-        the shorter great circle, within ``dividing.TURN`` rad of what the control does
+        the shorter great circle, within ``turn_subdivision.TURN`` rad of what the control does
     start_turn, end_turn : (m, 2) float64, rad, the rotary axes, the tilting one first
     """
 
@@ -118,7 +118,7 @@ class Program:
     lines: int
     remarks: tuple[Remark, ...]
     unknown: NDArray[np.int64]
-    stops: tuple[Stop, ...]
+    stops: tuple[StopPoint, ...]
     assumed: tuple[str, ...]
     blend: float
     minutes: F64

@@ -7,7 +7,7 @@ Tool axis. It is a point on the unit sphere at the tilt u from the pole and at t
 u' = a, v' = b. Its acceleration on the sphere is (-b² sin u cos u, 2 a b cos u), no longer than
 |b| cos u sqrt(b² sin² u + 4 a²). Great circles take the place of straight lines; over an arc l they answer an
 acceleration with (1 / cos(l / 2) - 1) / (l² / 8) times as much deviation, at most 1.003 where no piece turns an axis
-by more than ``MOST_TURN``.
+by more than ``MAX_TURN``.
 
 Tip without tool centre point control. The joints go even, and each frame that turns at the rate w adds to the second
 derivative of a point at distance r with speed s at most 2 w s + w² r.
@@ -24,7 +24,7 @@ TURN = 2e-5
 """rad, the most by which a tool axis may leave the great circle of its piece."""
 TIP = 0.5e-3
 """mm, the most by which a tip may leave the chord of its piece; as much again is left for the chords of an arc."""
-MOST_TURN = 0.1
+MAX_TURN = 0.1
 """rad, the most a piece turns an axis: what joints do between its ends is then within 1/800 of their radius."""
 _CURVED = 1.01  # the 1.003 above, and the sphere's own share of higher order
 
@@ -37,11 +37,11 @@ def axis_pieces(start: Sequence[float], end: Sequence[float]) -> int:
     Returns at least 1.
     """
     a, b = abs(end[0] - start[0]), abs(end[1] - start[1])
-    if max(a, b) <= MOST_TURN and _CURVED * b * math.hypot(b, 2 * a) <= 8 * TURN:
+    if max(a, b) <= MAX_TURN and _CURVED * b * math.hypot(b, 2 * a) <= 8 * TURN:
         return 1  # wherever the axis points
     cosine, sine = _most_cosine(start[0], end[0]), _most_cosine(start[0] - math.pi / 2, end[0] - math.pi / 2)
     bend = b * cosine * math.hypot(b * sine, 2 * a)
-    return max(1, math.ceil(max(a, b) / MOST_TURN), math.ceil(math.sqrt(_CURVED * bend / (8 * TURN))))
+    return max(1, math.ceil(max(a, b) / MAX_TURN), math.ceil(math.sqrt(_CURVED * bend / (8 * TURN))))
 
 
 def tip_pieces(machine: Kinematics, start: Sequence[float], end: Sequence[float], turns: tuple[float, float],

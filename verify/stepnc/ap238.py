@@ -19,15 +19,15 @@ from verify.stepnc.ap238_attributes import EXECUTABLES, RECORDS, REPRESENTATIONS
 from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
 from verify.stepnc.curves import curve_points
 from verify.stepnc.iso14649 import sane_rates, shape_of, tool_number
-from verify.stepnc.part21 import Part21, Ref, Typed
-from verify.stepnc.tool_motion import MOST_DWELL, Course, Cutter
+from verify.stepnc.part21 import Part21File, Ref, Typed
+from verify.stepnc.tool_motion import MAX_DWELL, CutterRecord, MotionRecorder
 
 SCHEMAS = frozenset({"MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA", "INTEGRATED_CNC_SCHEMA"})
 _PREFIX = {None: 1.0, "KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3,
            "MICRO": 1e-6, "NANO": 1e-9}
 _BASE = {"METRE": ("length", 1000.0), "SECOND": ("time", 1.0 / 60.0), "RADIAN": ("angle", 1.0),
          "STERADIAN": ("solid angle", 1.0)}  # mm and min
-_SMALLEST, _LARGEST, _MOST_POWER = 1e-12, 1e12, 3.0  # of units, and of one in another; those in use are far within
+_SMALLEST, _LARGEST, _MAX_POWER = 1e-12, 1e12, 3.0  # of units, and of one in another; those in use are far within
 _FEED, _SPEED = {"length": 1.0, "time": -1.0}, {"turn": 1.0, "time": -1.0}
 _SYMBOLS = {
     "priority": ("required", "suggested"),
@@ -62,8 +62,8 @@ _ITEMS = ("effective cutting diameter", "maximum depth of cut", "overall assembl
           "number of effective teeth", "edge radius", "coolant through tool", "functional length")
 
 
-def read_aim(file: Part21, course: Course) -> None:
-    """Tell a course what the main workplan of a file makes the tool do.
+def read_ap238(file: Part21File, recorder: MotionRecorder) -> None:
+    """Tell a recorder what the main workplan of a file makes the tool do.
 
     Raises
     ------
@@ -71,14 +71,14 @@ def read_aim(file: Part21, course: Course) -> None:
         An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
         read.
     """
-    _Aim(file, course).run()
+    Ap238Reader(file, recorder).run()
 
 
-class _Aim:
+class Ap238Reader:
     """One reading; look-ups of what refers to what."""
 
-    def __init__(self, file: Part21, course: Course) -> None:
-        self.file, self.course = file, course
+    def __init__(self, file: Part21File, recorder: MotionRecorder) -> None:
+        self.file, self.recorder = file, recorder
         self.data = Checked(file, TABLE, RECORDS)
         self.properties = self._properties("ACTION_PROPERTY", "definition")
         self._check_properties()
@@ -86,11 +86,11 @@ class _Aim:
         self.scales: dict[int, float] = {}
         self.secure = self._security_plane()
         self.rates: dict[int, tuple[float, float]] = {}
-        self.cutters: dict[int, Cutter] = {}
+        self.cutters: dict[int, CutterRecord] = {}
         self.tools = self._tools_by_operation()
         self.below = {entity: self._ordered(entity) for entity in (
             "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP", "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP")}
-        self.beside = {entity: self._related(entity) for entity in (
+        self.related_methods = {entity: self._related(entity) for entity in (
             "MACHINING_OPERATION_RELATIONSHIP", "MACHINING_TECHNOLOGY_RELATIONSHIP", "MACHINING_FUNCTIONS_RELATIONSHIP",
             "MACHINING_FEATURE_RELATIONSHIP")}
         self.placements = self._placements()
@@ -156,7 +156,7 @@ class _Aim:
         self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
         return self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", allowed)
 
-    def _told(self, owner: int, name: str) -> str | None:
+    def _setting(self, owner: int, name: str) -> str | None:
         found = self.properties.get(owner, {}).get(name)
         return None if found is None else self._symbol(found[1], _SYMBOLS[name])
 
@@ -176,8 +176,8 @@ class _Aim:
             rows[above][place] = self.data.ref(n, entity, "related_method")
         return {above: [found[k] for k in sorted(found)] for above, found in rows.items()}
 
-    def _one_beside(self, entity: str, number: int) -> int:
-        found = self.beside[entity].get(number, [])
+    def _only_related(self, entity: str, number: int) -> int:
+        found = self.related_methods[entity].get(number, [])
         if len(found) != 1:
             raise self.file.error(number, f"has {len(found)} {entity}, one is due")
         return found[0]
@@ -195,32 +195,32 @@ class _Aim:
                 self._execute(element)
         elif entity == "MACHINING_NC_FUNCTION":
             if self._word(number, entity, "description", (*_NC_STOPS, *_NC_QUIET)) in _NC_STOPS:
-                self.course.stop("program stop", self.file.line(number))
+                self.recorder.stop("program stop", self.file.line(number))
         elif entity == "MACHINING_PROCESS_EXECUTABLE":
             self._word(number, entity, "description", ("setup instructions",))
         else:
             self._workingstep(number)
 
     def _workingstep(self, number: int) -> None:
-        operation = self._one_beside("MACHINING_OPERATION_RELATIONSHIP", number)
+        operation = self._only_related("MACHINING_OPERATION_RELATIONSHIP", number)
         line = self.file.line(number)
         if self.secure is not None:
-            self.course.over(*self.secure, line)
+            self.recorder.over(*self.secure, line)
         tool = self.tools.get(operation)
         if tool is None:
             raise self.file.error(operation, "has no tool: a MACHINING_TOOL whose usage holds it is due")
-        self.course.take(self._cutter(tool), line)
-        technology = self._one_beside("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
-        functions = self._one_beside("MACHINING_FUNCTIONS_RELATIONSHIP", operation)
-        coolant = self._told(functions, "coolant")
+        self.recorder.take(self._cutter(tool), line)
+        technology = self._only_related("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
+        functions = self._only_related("MACHINING_FUNCTIONS_RELATIONSHIP", operation)
+        coolant = self._setting(functions, "coolant")
         if coolant is None:
             raise self.file.error(functions, "has no 'coolant': an ACTION_PROPERTY of that name is due")
-        self.course.coolant = coolant == "coolant on"
+        self.recorder.coolant = coolant == "coolant on"
         paths = self.below["MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP"].get(operation)
         if paths is None:
             raise self.file.error(operation, "has no tool path: strategies without one are not read")
         place = np.eye(4)
-        for process in self.beside["MACHINING_FEATURE_RELATIONSHIP"].get(number, []):
+        for process in self.related_methods["MACHINING_FEATURE_RELATIONSHIP"].get(number, []):
             place = self.placements.get(process, place)
         for path in paths:
             self._path(path, place, technology)
@@ -228,12 +228,12 @@ class _Aim:
     def _path(self, number: int, place: F64, technology: int) -> None:
         kind = self._word(number, "MACHINING_TOOLPATH", "description", ("cutter location trajectory", "feedstop"))
         named = self.properties.get(number, {})
-        own = self.beside["MACHINING_TECHNOLOGY_RELATIONSHIP"].get(number, [])
+        own = self.related_methods["MACHINING_TECHNOLOGY_RELATIONSHIP"].get(number, [])
         if len(own) > 1:
             raise self.file.error(number, f"has {len(own)} MACHINING_TECHNOLOGY_RELATIONSHIP, one at most is due")
         if kind == "feedstop":
             dwell = 60.0 * self._measure(number, "dwell", {"time": 1.0})
-            self.course.dwell += self.data.within(number, "'dwell', s", dwell, 0.0, MOST_DWELL)
+            self.recorder.dwell += self.data.within(number, "'dwell', s", dwell, 0.0, MAX_DWELL)
             return
         tips, lines = self._curve(number, "basic curve", lengths=True)
         if "tool axis" in named:
@@ -241,11 +241,11 @@ class _Aim:
             axes = self.data.unit_axes(number, "'tool axis'", axes, len(tips))
         else:
             axes = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
-        if self._told(number, "direction") == "end to beginning":
+        if self._setting(number, "direction") == "end to beginning":
             tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
-        rapid = self._told(number, "speed profile") is not None
+        rapid = self._setting(number, "speed profile") is not None
         feed, speed = self._rates(own[0] if own else technology)
-        self.course.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
+        self.recorder.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
                            speed=speed, lines=lines)
 
     def _curve(self, number: int, name: str, *, lengths: bool) -> tuple[F64, F64]:
@@ -295,7 +295,7 @@ class _Aim:
             for element in self.data.refs(number, entity, "elements"):
                 inner, size = self._unit(self.data.ref(element, "DERIVED_UNIT_ELEMENT", "unit"))
                 exponent = self.data.real(element, "DERIVED_UNIT_ELEMENT", "exponent") or 0.0
-                self.data.within(element, "exponent", exponent, -_MOST_POWER, _MOST_POWER)
+                self.data.within(element, "exponent", exponent, -_MAX_POWER, _MAX_POWER)
                 for dimension, power in inner.items():
                     dimensions[dimension] = dimensions.get(dimension, 0.0) + power * exponent
                 factor *= size**exponent
@@ -342,12 +342,12 @@ class _Aim:
                 out[operation] = tool
         return out
 
-    def _cutter(self, tool: int) -> Cutter:
+    def _cutter(self, tool: int) -> CutterRecord:
         if tool not in self.cutters:
             self.cutters[tool] = self._body(tool)
         return self.cutters[tool]
 
-    def _body(self, tool: int) -> Cutter:
+    def _body(self, tool: int) -> CutterRecord:
         bodies = [n for n in self.data.of("RESOURCE_PROPERTY")
                   if self.data.ref(n, "RESOURCE_PROPERTY", "resource") == tool
                   and self._word(n, "RESOURCE_PROPERTY", "name", ("tool body",)) == "tool body"]
@@ -380,7 +380,7 @@ class _Aim:
             raise self.file.error(shown_by[0], f", items: an 'edge radius' that suits a {kind} of {diameter:g} mm "
                                                f"expected, not {given}")
         name = str(self.data.one(tool, "MACHINING_TOOL", "name"))
-        return Cutter(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
+        return CutterRecord(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
                       sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool)
 
     def _item_name(self, item: int) -> str:
@@ -445,4 +445,4 @@ class _Aim:
         return {process: placed[feature] for process, feature in feature_of.items()}
 
 
-__all__ = ["SCHEMAS", "read_aim"]
+__all__ = ["SCHEMAS", "read_ap238"]

@@ -14,62 +14,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from verify.stepnc.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
+from verify.stepnc.part21 import DERIVED, EnumItem, Part21File, Record, Ref, Typed, Value
 
 FARTHEST = 1e6  # mm, of the coordinates of a path and the sizes of a tool
 UNIT = 1e-3  # what the length of a tool axis may be off one
 LONGEST_VECTOR = 1e9  # of ratios of a direction; squares of much more have no place in a float
 
 
-class Kind:
+class AttributeKind:
     """What a value has to be; ``problem`` says what it is instead, or None where it is right."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         """Words for the error, or None."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Text(Kind):
+class Text(AttributeKind):
     """A string."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
-        right = isinstance(value, str) and not isinstance(value, Word)
+    def problem(self, value: Value, file: Part21File) -> str | None:
+        right = isinstance(value, str) and not isinstance(value, EnumItem)
         return None if right else f"a string expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class Real(Kind):
+class Real(AttributeKind):
     """A real number, with a decimal point; over ``above`` and up to ``most`` where they say so."""
 
     above: float = -math.inf
-    most: float = math.inf
+    limit: float = math.inf
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if not isinstance(value, float) or not math.isfinite(value):
             return f"a real number expected, not {shown(value)}"
-        if value > self.most:
-            return f"a number up to {self.most:g} expected, not {value:g}"
+        if value > self.limit:
+            return f"a number up to {self.limit:g} expected, not {value:g}"
         return None if value > self.above else f"a number over {self.above:g} expected, not {value:g}"
 
 
 @dataclass(frozen=True)
-class Whole(Kind):
+class Whole(AttributeKind):
     """A whole number."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         right = isinstance(value, int) and not isinstance(value, Ref | bool)
         return None if right else f"a whole number expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class OneOf(Kind):
+class OneOf(AttributeKind):
     """An enumeration item of a few."""
 
     items: tuple[str, ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
-        if isinstance(value, Word) and value in self.items:
+    def problem(self, value: Value, file: Part21File) -> str | None:
+        if isinstance(value, EnumItem) and value in self.items:
             return None
         return f"one of {', '.join(f'.{i}.' for i in self.items)} expected, not {shown(value)}"
 
@@ -79,12 +79,12 @@ LOGICAL = OneOf(("T", "F", "U"))
 
 
 @dataclass(frozen=True)
-class To(Kind):
+class To(AttributeKind):
     """A reference to an instance of one of some entities; of any where none is named."""
 
     entities: tuple[str, ...] = ()
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if isinstance(value, Ref) and file.has(value):
             names = file.names(value)
             if not self.entities or any(name in self.entities for name in names):
@@ -98,39 +98,39 @@ class To(Kind):
 
 
 @dataclass(frozen=True)
-class Many(Kind):
+class Many(AttributeKind):
     """A list of values of one kind, from ``least`` to ``most`` of them."""
 
-    of: Kind
-    least: int = 0
-    most: int | None = None
+    of: AttributeKind
+    min_count: int = 0
+    max_count: int | None = None
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if not isinstance(value, list):
             return f"a list expected, not {shown(value)}"
-        if len(value) < self.least or (self.most is not None and len(value) > self.most):
-            return f"a list of {self.least} or more expected, not of {len(value)}" if self.most is None else \
-                f"a list of {self.least} to {self.most} expected, not of {len(value)}"
+        if len(value) < self.min_count or (self.max_count is not None and len(value) > self.max_count):
+            return f"a list of {self.min_count} or more expected, not of {len(value)}" if self.max_count is None else \
+                f"a list of {self.min_count} to {self.max_count} expected, not of {len(value)}"
         return next((p for v in value if (p := self.of.problem(v, file)) is not None), None)
 
 
 @dataclass(frozen=True)
-class Maybe(Kind):
+class Maybe(AttributeKind):
     """A value that may be left out."""
 
-    of: Kind
+    of: AttributeKind
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         return None if value is None else self.of.problem(value, file)
 
 
 @dataclass(frozen=True)
-class Named(Kind):
+class Named(AttributeKind):
     """A value with the name of its type before it."""
 
-    types: tuple[tuple[str, Kind], ...]
+    types: tuple[tuple[str, AttributeKind], ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         wanted = " or ".join(f"{name}(...)" for name, _ in self.types)
         if not isinstance(value, Typed) or value.name not in dict(self.types):
             return f"{wanted} expected, not {shown(value)}"
@@ -138,25 +138,25 @@ class Named(Kind):
 
 
 @dataclass(frozen=True)
-class Nothing(Kind):
+class Nothing(AttributeKind):
     """``*``: the value follows from others."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         return None if value is DERIVED else f"* expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class Either(Kind):
+class Either(AttributeKind):
     """Whatever suits one of several kinds."""
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[AttributeKind, ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         problems = [kind.problem(value, file) for kind in self.kinds]
         return None if None in problems else problems[0]
 
 
-Attributes = tuple[tuple[str, Kind], ...]
+Attributes = tuple[tuple[str, AttributeKind], ...]
 Table = Mapping[str, Attributes]
 
 
@@ -177,7 +177,7 @@ class Checked:
         Subjects name the instance: one whose values are not what the tables say.
     """
 
-    def __init__(self, file: Part21, table: Table, records: Table | None = None) -> None:
+    def __init__(self, file: Part21File, table: Table, records: Table | None = None) -> None:
         self.file, self._table, self._records = file, table, records or {}
         self._columns = {many: {entity: {name: k for k, (name, _) in enumerate(kinds)}
                                   for entity, kinds in these.items()}
@@ -235,10 +235,10 @@ class Checked:
         value = self.one(number, entity, attribute)
         return value if isinstance(value, float) else None
 
-    def within(self, number: int, what: str, value: float, least: float, most: float) -> float:
+    def within(self, number: int, label: str, value: float, low: float, high: float) -> float:
         """The value, which has a sane size; ProgramError, naming the instance, where it has none."""
-        if not least <= value <= most:  # nor where it is nan
-            raise self.file.error(number, f", {what}: {least:g} to {most:g} expected, not {value:g}")
+        if not low <= value <= high:  # nor where it is nan
+            raise self.file.error(number, f", {label}: {low:g} to {high:g} expected, not {value:g}")
         return value
 
     def placement(self, number: int, scale: float = 1.0) -> F64:
@@ -325,6 +325,6 @@ class Checked:
                 raise self.file.error(number, f", {name}: {problem}")
 
 
-def attributes(**kinds: Kind) -> Attributes:
+def attributes(**kinds: AttributeKind) -> Attributes:
     """The attributes of an entity, in order."""
     return tuple(kinds.items())

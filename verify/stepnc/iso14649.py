@@ -32,8 +32,8 @@ from verify.stepnc.attribute_checks import (
     attributes,
 )
 from verify.stepnc.curves import CURVE_TABLE, CURVES, curve_points
-from verify.stepnc.part21 import Part21, Ref, Typed, Value
-from verify.stepnc.tool_motion import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
+from verify.stepnc.part21 import Part21File, Ref, Typed, Value
+from verify.stepnc.tool_motion import MAX_DWELL, MAX_FEED, MAX_SPEED, MIN_FEED, CutterRecord, MotionRecorder
 
 SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
 MM_MIN = 60_000.0  # of one m/s
@@ -112,7 +112,7 @@ TABLE: Table = {
     "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(CURVES),
                                              its_toolaxis=Maybe(To(("POLYLINE",))),
                                              surface_normal=Maybe(To(("POLYLINE",)))),
-    "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MOST_DWELL)),
+    "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MAX_DWELL)),
     "MILLING_TECHNOLOGY": attributes(
         feedrate=Maybe(Real(0.0)), feedrate_reference=OneOf(("TCP", "CCP")), cutspeed=Maybe(Real(0.0)),
         spindle=Maybe(Real()), feedrate_per_tooth=Maybe(Real(0.0)), synchronize_spindle_with_feed=FLAG,
@@ -160,8 +160,8 @@ RECORDS: Table = {
 }
 
 
-def read_arm(file: Part21, course: Course) -> None:
-    """Tell a course what the main workplan of a file makes the tool do.
+def read_iso14649(file: Part21File, recorder: MotionRecorder) -> None:
+    """Tell a recorder what the main workplan of a file makes the tool do.
 
     Raises
     ------
@@ -169,14 +169,14 @@ def read_arm(file: Part21, course: Course) -> None:
         An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
         read.
     """
-    _Arm(file, course).run()
+    Iso14649Reader(file, recorder).run()
 
 
-class _Arm:
+class Iso14649Reader:
     """One reading: where workpieces stand, and what stands in force."""
 
-    def __init__(self, file: Part21, course: Course) -> None:
-        self.file, self.course = file, course
+    def __init__(self, file: Part21File, recorder: MotionRecorder) -> None:
+        self.file, self.recorder = file, recorder
         self.data = Checked(file, TABLE, RECORDS)
         self.place = np.eye(4)
         self.elements: list[tuple[int, F64]] = []
@@ -219,9 +219,9 @@ class _Arm:
     def _execute(self, place: int, number: int) -> None:
         entity, line = self.data.get(number, *_EXECUTABLES)[0], self.file.line(number)
         if entity in ("PROGRAM_STOP", "OPTIONAL_STOP"):
-            self.course.stop("program stop", line)
+            self.recorder.stop("program stop", line)
         elif entity == "RETURN_HOME":
-            self.course.stop("return to home", line)
+            self.recorder.stop("return to home", line)
         elif entity == "RAPID_MOVEMENT":
             self._rapid(place, number, line)
         elif entity == "MACHINING_WORKINGSTEP":
@@ -236,7 +236,7 @@ class _Arm:
             self._paths(paths, np.eye(4), self._direction(number, entity), number, None, rapid=True)
             return
         point, normal = self._plane(self.data.ref(number, entity, "its_secplane"))
-        self.course.over(point, normal, line)
+        self.recorder.over(point, normal, line)
         for later, _ in self.elements[place + 1:]:
             if self.data.get(later, *_EXECUTABLES)[0] == "MACHINING_WORKINGSTEP":
                 operation = self.data.ref(later, "MACHINING_WORKINGSTEP", "its_operation")
@@ -244,7 +244,7 @@ class _Arm:
                 return
 
     def _take(self, tool: int, line: int) -> None:
-        self.course.take(self._cutter(tool), line)
+        self.recorder.take(self._cutter(tool), line)
 
     def _feature(self, number: int, operation: int) -> F64:
         """(4, 4): from the feature, which has to list the operation on it, to the workpiece."""
@@ -270,7 +270,7 @@ class _Arm:
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
         functions = self.data.ref(number, entity, "its_machine_functions")
-        self.course.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
+        self.recorder.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
         self._paths(paths, place, self._direction(number, entity), number, technology,
                     rapid=False)
 
@@ -291,7 +291,7 @@ class _Arm:
         """Follow a list of paths; direction is the tool axis where they have none, as their owner says it."""
         for path in self.data.refs(number, "TOOLPATH_LIST", "its_list"):
             if self.data.get(path, "CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")[0] == "FEEDSTOP":
-                self.course.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
+                self.recorder.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
             else:
                 self._trajectory(path, place, direction, owner, technology, rapid)
 
@@ -314,7 +314,7 @@ class _Arm:
         own = self.data.maybe(number, entity, "its_technology")
         feed, speed = self._rates(number, own if own is not None else technology, fast)
         turn = self.place @ place
-        self.course.follow(tips @ turn[:3, :3].T + turn[:3, 3], axes @ turn[:3, :3].T, rapid=fast, feed=feed,
+        self.recorder.follow(tips @ turn[:3, :3].T + turn[:3, 3], axes @ turn[:3, :3].T, rapid=fast, feed=feed,
                            speed=speed, lines=lines)
 
     def _rates(self, path: int, technology: int | None, rapid: bool) -> tuple[float, float]:
@@ -333,7 +333,7 @@ class _Arm:
             raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
         return sane_rates(self.data, technology, math.nan if feed is None else feed * MM_MIN, -RPM * spindle)
 
-    def _cutter(self, number: int) -> Cutter:
+    def _cutter(self, number: int) -> CutterRecord:
         name = str(self.data.one(number, "MILLING_CUTTING_TOOL", "its_id"))
         body = self.data.ref(number, "MILLING_CUTTING_TOOL", "its_tool_body")
         kind = self.data.get(body, *_CUTTERS)[0]
@@ -351,7 +351,7 @@ class _Arm:
         if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
             raise self.file.error(size, f", edge_radius: {0.5 * wide:g} expected, half of the diameter, or less on a "
                                         f"bull nose, not {edge}")
-        return Cutter(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
+        return CutterRecord(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
                       self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number)
 
     def _plane(self, number: int) -> tuple[F64, F64]:
@@ -369,8 +369,8 @@ def tool_number(name: str) -> int | None:
 def sane_rates(data: Checked, technology: int, feed: float, speed: float) -> tuple[float, float]:
     """Feed, mm/min, nan where none is said, and speed, 1/min; ProgramError where one is of a size no machine has."""
     if not math.isnan(feed):
-        data.within(technology, "feedrate in mm/min", feed, LEAST_FEED, MOST_FEED)
-    return feed, data.within(technology, "spindle in 1/min", speed, -MOST_SPEED, MOST_SPEED)
+        data.within(technology, "feedrate in mm/min", feed, MIN_FEED, MAX_FEED)
+    return feed, data.within(technology, "spindle in 1/min", speed, -MAX_SPEED, MAX_SPEED)
 
 
 def shape_of(diameter: float, corner: float) -> str:
@@ -380,4 +380,4 @@ def shape_of(diameter: float, corner: float) -> str:
     return "ball" if corner >= 0.5 * diameter - 1e-6 else "bull"
 
 
-__all__ = ["SCHEMAS", "read_arm", "sane_rates", "shape_of", "tool_number"]
+__all__ = ["SCHEMAS", "read_iso14649", "sane_rates", "shape_of", "tool_number"]

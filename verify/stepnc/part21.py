@@ -62,7 +62,7 @@ class Ref(int):
         return f"#{int(self)}"
 
 
-class Word(str):
+class EnumItem(str):
     """An enumeration item, without its dots."""
 
     __slots__ = ()
@@ -88,11 +88,11 @@ class Derived:
 
 DERIVED = Derived()
 Value = object
-"""float, int, str, Word, Ref, Typed, DERIVED, None for ``$``, or a list of these."""
+"""float, int, str, EnumItem, Ref, Typed, DERIVED, None for ``$``, or a list of these."""
 Record = tuple[str, list[Value]]
 
 
-class Part21:
+class Part21File:
     """An exchange file.
 
     name    : of the file, for errors
@@ -417,7 +417,7 @@ class _Tokens:
         if kind == "text":
             return decoded(word)
         if kind == "word":
-            return Word(word)
+            return EnumItem(word)
         if kind == "bits":
             return Typed("BINARY", word)
         if kind == "name":

@@ -10,8 +10,8 @@ from verify.kinematics import Kinematics
 from verify.program.program import Program, Remark
 from verify.progress import Report, silent
 from verify.stepnc import ap238, iso14649
-from verify.stepnc.part21 import Part21, is_exchange_file
-from verify.stepnc.tool_motion import Course, Cutter, CutterMoves
+from verify.stepnc.part21 import Part21File, is_exchange_file
+from verify.stepnc.tool_motion import CutterMoves, CutterRecord, MotionRecorder
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
 
@@ -21,7 +21,7 @@ is_stepnc = is_exchange_file
 
 def read_moves(text: str, *, name: str = "program") -> CutterMoves:
     """What a STEP-NC file makes the tool do, in the setup frame; errors as of ``read_stepnc``."""
-    return _course(text, name).moves()
+    return _recorder(text, name).moves()
 
 
 def read_stepnc(text: str, *, name: str = "program", tools: Sequence[ToolBody] | None = None,
@@ -46,60 +46,60 @@ def read_stepnc(text: str, *, name: str = "program", tools: Sequence[ToolBody] |
     VerificationError
         Code program_too_long: more than 5 000 000 moves.
     """
-    course = _course(text, name)
+    recorder = _recorder(text, name)
     report(0.9)
     numbers = []
-    for place, cutter in enumerate(course.cutters):
+    for place, cutter in enumerate(recorder.cutters):
         if tools is None:
             numbers.append(cutter.number if cutter.number is not None else place + 1)
         else:
-            numbers.append(_known(course, cutter, tools))
-    program = course.program(numbers, kinematics)
+            numbers.append(_known(recorder, cutter, tools))
+    program = recorder.program(numbers, kinematics)
     report(1.0)
     return program
 
 
-def _course(text: str, name: str) -> Course:
-    file = Part21(text.removeprefix("\ufeff"), name)
-    course = Course(name, file.lines)
-    readers: list[tuple[frozenset[str], Callable[[Part21, Course], None]]] = [
-        (iso14649.SCHEMAS, iso14649.read_arm), (ap238.SCHEMAS, ap238.read_aim)]
+def _recorder(text: str, name: str) -> MotionRecorder:
+    file = Part21File(text.removeprefix("\ufeff"), name)
+    recorder = MotionRecorder(name, file.lines)
+    readers: list[tuple[frozenset[str], Callable[[Part21File, MotionRecorder], None]]] = [
+        (iso14649.SCHEMAS, iso14649.read_iso14649), (ap238.SCHEMAS, ap238.read_ap238)]
     for schemas, read in readers:
         if schemas & set(file.schemas):
             try:
-                read(file, course)
+                read(file, recorder)
             except RecursionError:
                 raise ProgramError(f"{name}: workplans or units hold themselves, or are too many in each other",
                                    remedy="send a file whose references come to an end") from None
-            return course
+            return recorder
     known = sorted(iso14649.SCHEMAS | ap238.SCHEMAS)
     raise ProgramError(f"{name} is a STEP file of schema {', '.join(file.schemas) or 'none'}, which is not STEP-NC",
                        subjects=("FILE_SCHEMA",), measured=list(file.schemas), limit=known,
                        remedy="send the program as NC code, AP238 or ISO 14649")
 
 
-def _known(course: Course, cutter: Cutter, tools: Sequence[ToolBody]) -> int:
+def _known(recorder: MotionRecorder, cutter: CutterRecord, tools: Sequence[ToolBody]) -> int:
     """T number of a tool of the file."""
     body = next((t for t in tools if t.number == cutter.number), None)
     if cutter.number is None:
         alike = [t for t in tools if not _differs(cutter, t)]
         if len(alike) == 1:
-            course.notes.append(f"tool '{cutter.name}', #{cutter.instance}, has no number; by its size it is "
+            recorder.notes.append(f"tool '{cutter.name}', #{cutter.instance}, has no number; by its size it is "
                                 f"T{alike[0].number}")
             return alike[0].number
     if body is None:
-        raise ProgramError(f"{course.name}, #{cutter.instance}: tool '{cutter.name}', {cutter.kind} of "
+        raise ProgramError(f"{recorder.name}, #{cutter.instance}: tool '{cutter.name}', {cutter.kind} of "
                            f"{cutter.diameter:g} mm, is none of the setup's, or of several sizes alike",
                            subjects=(f"#{cutter.instance}",), measured=cutter.number,
                            limit=sorted(t.number for t in tools),
                            remedy="let the id of the tool open with its number, and give the setup that tool")
-    if what := _differs(cutter, body):
-        course.remarks.append(Remark(0, f"T{body.number}, #{cutter.instance}, has {what}: set up the tool the file was "
+    if difference := _differs(cutter, body):
+        recorder.remarks.append(Remark(0, f"T{body.number}, #{cutter.instance}, has {difference}: set up the tool the file was "
                                         "made for"))
     return body.number
 
 
-def _differs(cutter: Cutter, body: ToolBody) -> str:
+def _differs(cutter: CutterRecord, body: ToolBody) -> str:
     """Words for what a tool of the file has other than one of the setup; '' where they are alike."""
     pairs = (("diameter", cutter.diameter, body.diameter), ("corner radius", cutter.corner_radius, body.corner_radius),
              ("flute length", cutter.flute_length, body.flute_length))

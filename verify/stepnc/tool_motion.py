@@ -1,6 +1,6 @@
 """What a STEP-NC file makes the tool do, whatever form it is in: moves of the tip with axis, feed, speed and cutter.
 
-The readers of both forms tell a ``Course`` what they come upon, in order; ``moves`` gives it as plain values and
+The readers of both forms tell a ``MotionRecorder`` what they come upon, in order; ``moves`` gives it as plain values and
 ``program`` as a program for the proof. STEP-NC says where the tool stands on the part and not how the rotary axes of a
 machine get it there: for the limits of a machine they are put where they turn least from move to move.
 """
@@ -18,14 +18,14 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64, I32
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
-from verify.program.move_log import MOST_MOVES
-from verify.program.program import Poses, Program, Remark, Stop
-from verify.program.turn_subdivision import MOST_TURN
+from verify.program.move_log import MAX_MOVES
+from verify.program.program import Poses, Program, Remark, StopPoint
+from verify.program.turn_subdivision import MAX_TURN
 
 SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
-LEAST_FEED, MOST_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for
-MOST_SPEED = 1e7  # 1/min
-MOST_DWELL = 1e7  # s
+MIN_FEED, MAX_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for
+MAX_SPEED = 1e7  # 1/min
+MAX_DWELL = 1e7  # s
 HALF_TURN = math.pi - 1e-4  # rad: a move that turns the tool as far does not say which way
 EVERY = 7  # X, Y and Z of ``Program.unknown``
 TURNED = 8
@@ -33,7 +33,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Cutter:
+class CutterRecord:
     """A tool as a file describes it; None where it does not say.
 
     number        : of the magazine place, from the id where it opens with one
@@ -77,7 +77,7 @@ class CutterMoves:
     cutter: I32
     line: I32
     arrival: NDArray[np.bool_]
-    cutters: tuple[Cutter, ...]
+    cutters: tuple[CutterRecord, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class _Chunk:
     line: I32
 
 
-class Course:
+class MotionRecorder:
     """What was come upon so far.
 
     name : of the file; lines : how many it has
@@ -103,7 +103,7 @@ class Course:
 
     def __init__(self, name: str, lines: int) -> None:
         self.name, self._lines = name, lines
-        self.cutters: list[Cutter] = []
+        self.cutters: list[CutterRecord] = []
         self._chunks: list[_Chunk] = []
         self._count = 0
         self._here: F64 | None = None  # (6,) tip and axis
@@ -116,7 +116,7 @@ class Course:
         self.notes: list[str] = []
         self.remarks: list[Remark] = []
 
-    def take(self, cutter: Cutter, line: int) -> int:
+    def take(self, cutter: CutterRecord, line: int) -> int:
         """The place of a tool among the cutters; where it is not the one in the spindle it is changed."""
         place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
         if place is None:
@@ -127,9 +127,9 @@ class Course:
         self._tool = place
         return place
 
-    def stop(self, what: str, line: int) -> None:
+    def stop(self, event: str, line: int) -> None:
         """The program stops; afterwards the tool comes from elsewhere."""
-        self._change(what, line)
+        self._change(event, line)
 
     def over(self, point: F64, normal: F64, line: int) -> None:
         """The next path is got to over a plane; point (3,) mm and unit normal (3,) say which, setup frame."""
@@ -199,26 +199,26 @@ class Course:
             mine = np.flatnonzero(tool == number)
             k = int(mine[np.argmax(m.speed[mine])])
             speeds[number] = float(m.speed[k]), int(m.line[k])
-        stops = tuple(Stop(line, what, int(table[place]), _three(at[:3]), _three(at[3:]))
-                      for line, what, place, at in (*self._stops, *self._last()))
+        stops = tuple(StopPoint(line, event, int(table[place]), _three(at[:3]), _three(at[3:]))
+                      for line, event, place, at in (*self._stops, *self._last()))
         return Program(
             name=self.name, start=m.start, end=m.end, kind=np.where(m.rapid, RAPID, FEED).astype(np.int8), feed=m.feed,
             tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
             unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
             poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
-            changes=sum(what == "tool change" for _, what, _, _ in self._stops))
+            changes=sum(event == "tool change" for _, event, _, _ in self._stops))
 
     def _last(self) -> list[tuple[int, str, int, F64]]:
         if self._here is None or self._tool is None:
             return []
         return [(self._line, "end of the program", self._tool, self._here)]
 
-    def _change(self, what: str, line: int) -> None:
+    def _change(self, event: str, line: int) -> None:
         """The tool is put away: over the plane, where one was said, or from where it stands."""
         if self._over is not None and self._here is not None:
             self._lift(self._over)
         if self._here is not None and self._tool is not None:
-            self._stops.append((line, what, self._tool, self._here))
+            self._stops.append((line, event, self._tool, self._here))
         self._here = None
 
     def _lift(self, over: tuple[F64, F64, int]) -> None:
@@ -264,16 +264,16 @@ class Course:
             raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn, which says "
                                "no way round", subjects=(f"line {at}",),
                                remedy="give the path points with axes between")
-        pieces = np.maximum(np.ceil(angle / MOST_TURN), 1.0).astype(np.int64)
+        pieces = np.maximum(np.ceil(angle / MAX_TURN), 1.0).astype(np.int64)
         if (pieces > 1).any():
             which = np.repeat(np.arange(len(start)), pieces)
             step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
             start, end = (_between(start[which], end[which], (step + k) / pieces[which]) for k in (0, 1))
             lines = lines[which]
         self._count += len(start)
-        if self._count > MOST_MOVES:
-            raise VerificationError(f"{self.name} makes too many moves, {MOST_MOVES} are allowed",
-                                    code="program_too_long", measured=self._count, limit=MOST_MOVES,
+        if self._count > MAX_MOVES:
+            raise VerificationError(f"{self.name} makes too many moves, {MAX_MOVES} are allowed",
+                                    code="program_too_long", measured=self._count, limit=MAX_MOVES,
                                     remedy="split the job")
         upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
         axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())

@@ -16,13 +16,13 @@ from verify.kernels.depth import deepest
 from verify.progress import Report, silent
 
 GUARD_SPACING = 0.18
-GUARD_MOST = 1_000_000
+MAX_GUARD_SAMPLES = 1_000_000
 EDGE_SPACING = 0.1
 INSET = 1e-3  # mm, of the ends of edges
 SHARP = math.radians(20.0)
 DEPTH_BATCH = 2048  # rays between two reports
 CLOSER_REACH, CLOSER_STEP = 0.15, 0.02
-MOST_SEEDS, MOST_DEEP, DEEP_A_MOVE = 4500, 1500, 4
+MAX_SEEDS, MAX_DEEP, DEEP_A_MOVE = 4500, 1500, 4
 SURE = 5.0  # gouge tolerances: what is deeper is found without a closer look
 CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper are looked round
 ASIDE = np.array([0.3571, 0.2833, 0.8901]) / np.linalg.norm([0.3571, 0.2833, 0.8901])  # no edge or face lies along it
@@ -35,7 +35,7 @@ def guard_spacing(mesh: TriangleMesh) -> float:
 
     A ball of radius R that gouges deeper than (0.87 spacing)² / 2R + 0.4 of the tolerance is seen by one of them.
     """
-    return max(GUARD_SPACING, (float(mesh.areas.sum()) / GUARD_MOST) ** 0.5)
+    return max(GUARD_SPACING, (float(mesh.areas.sum()) / MAX_GUARD_SAMPLES) ** 0.5)
 
 
 def guard_samples(mesh: TriangleMesh) -> SurfaceSamples:
@@ -133,8 +133,8 @@ def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F
     nth = np.empty(len(deep), np.int64)
     nth[by_move] = np.arange(len(deep)) - np.repeat(begin, count)
     deep = deep[nth < DEEP_A_MOVE]
-    out = np.concatenate([deep[:MOST_DEEP], shallow[:MOST_SEEDS]])
-    return points[out], max(len(deep) - MOST_DEEP, 0) + max(len(shallow) - MOST_SEEDS, 0)
+    out = np.concatenate([deep[:MAX_DEEP], shallow[:MAX_SEEDS]])
+    return points[out], max(len(deep) - MAX_DEEP, 0) + max(len(shallow) - MAX_SEEDS, 0)
 
 
 def closer_points(tree: TriangleTree, seeds: F64) -> tuple[F64, F64, NDArray[np.int64]]:

@@ -58,7 +58,7 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
         return _turned(points, normals, residual, moves, moves.axes, tools, threads, progress, bow)
     grid = CellGrid.build(points)
     pts, nrm = np.ascontiguousarray(points[grid.order]), np.ascontiguousarray(normals[grid.order])
-    work, who = residual[grid.order], np.full(n, -1, np.int32)
+    work, mover_of = residual[grid.order], np.full(n, -1, np.int32)
     counts = np.diff(grid.first)
     left = np.zeros(len(counts))
     full = np.flatnonzero(counts)
@@ -67,11 +67,11 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
-        return lambda: cut_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, nrm, work, who, left,
+        return lambda: cut_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, nrm, work, mover_of, left,
                                 start, end, moves.feed, moves.tool, cutters)
 
     run_tiles([job(t) for t in grid.tiles()], threads, progress)
-    residual[grid.order], mover[grid.order] = work, who
+    residual[grid.order], mover[grid.order] = work, mover_of
     return residual, mover
 
 
@@ -80,16 +80,16 @@ def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAx
     """``residual_on_normals`` for tools that lean or turn."""
     tree = PointTree.build(points)
     pts, nrm = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(normals[tree.order])
-    work, who = residual[tree.order], np.full(len(points), -1, np.int32)
+    work, mover_of = residual[tree.order], np.full(len(points), -1, np.int32)
     cutters = cutter_table(tools)
     reach = np.hypot(cutters[:, 0], cutters[:, 2])
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
 
     def job(chunk: int) -> Callable[[], object]:
-        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, who, start, end, axes.axis, axes.about,
+        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, mover_of, start, end, axes.axis, axes.about,
                                  axes.angle, moves.feed, moves.tool, cutters, reach, bow)
 
     run_tiles([job(c) for c in range(tree.chunks)], threads, progress)
     mover = np.empty(len(points), np.int32)
-    residual[tree.order], mover[tree.order] = work, who
+    residual[tree.order], mover[tree.order] = work, mover_of
     return residual, mover

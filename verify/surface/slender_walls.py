@@ -28,8 +28,8 @@ HELD = 2.0
 """Times as thick as it was on the way there: what holds a sheet. Stiffness goes with the cube, so that is 8 times."""
 STEP = 0.5
 """Of the thickness: way between two looks across a sheet."""
-MOST_ASKED = 120_000  # samples that rays are sent from
-MOST_PLACES = 8000  # of all thin walls, one a cell
+MAX_SAMPLES = 120_000  # samples that rays are sent from
+MAX_PLACES = 8000  # of all thin walls, one a cell
 A_CELL = 4.0  # samples on the square of a cell, at least: so one in fifty has none
 SKIN_SHARE = 1e-7  # of the size of the part: rays do not meet the triangle they start on
 BOOL = NDArray[np.bool_]
@@ -86,13 +86,13 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
     """
     size = tree.mesh.bounds[1] - tree.mesh.bounds[0]
     skin = SKIN_SHARE * float(np.linalg.norm(size))
-    stride = max(1, -(-len(samples) // MOST_ASKED))
-    asked = np.arange(0, len(samples), stride)
-    asked = asked[np.abs(samples.normals[asked, 2]) < math.cos(math.radians(30.0))]
-    far, hit = first_hits(tree, samples.points[asked], -samples.normals[asked], t_min=skin)
+    stride = max(1, -(-len(samples) // MAX_SAMPLES))
+    tried = np.arange(0, len(samples), stride)
+    tried = tried[np.abs(samples.normals[tried, 2]) < math.cos(math.radians(30.0))]
+    far, hit = first_hits(tree, samples.points[tried], -samples.normals[tried], t_min=skin)
     beyond = tree.mesh.normals[np.maximum(hit, 0)]
-    sheet = (hit >= 0) & ((beyond * samples.normals[asked]).sum(axis=1) < FACING)
-    row, far, beyond = asked[sheet], far[sheet], beyond[sheet]
+    sheet = (hit >= 0) & ((beyond * samples.normals[tried]).sum(axis=1) < FACING)
+    row, far, beyond = tried[sheet], far[sheet], beyond[sheet]
     high = _high(tree, samples.points[row], samples.normals[row], far, ratio)
     if not high.any():
         return _none()
@@ -100,7 +100,7 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
     row, far, beyond = row[like], far[like], beyond[like]
     points = samples.points[row]
     cell = max(float(np.median(far)) * STEP, math.sqrt(A_CELL * stride * float(samples.area[row].mean())))
-    while len(one := _one_a_cell(points, cell)) > MOST_PLACES:
+    while len(one := _one_a_cell(points, cell)) > MAX_PLACES:
         cell *= 1.25
     row, far, beyond, points = row[one], far[one], beyond[one], points[one]
     normals = samples.normals[row]

@@ -29,7 +29,7 @@ from verify.surface.sample_scores import RAY_ERROR
 from verify.surface.slender_walls import ThinWalls, thin_walls
 
 PARTS = 256
-"""Parts of the program that times are told in: what happens in one of them counts as at once, and as in order."""
+"""Parts of the program that times are reported in: what happens in one of them counts as at once, and as in order."""
 REST = 2.0  # scallops that may be left at a place that is done: later skims of that little do not bend a wall
 HOLDS = 0.5  # of what the blank has before a place, at most, that has to stand for it to hold the wall
 ROOM = 2.0  # of the distance of places: the highest that stands may lie so much below where stock begins to stand
@@ -39,7 +39,7 @@ NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, eq=False)
-class Times:
+class CutTimes:
     """When places were done and what held them was gone, n places.
 
     gone : (n,) int64, part of the program in which the stock before it stopped to hold, -1 before the first cut
@@ -51,9 +51,9 @@ class Times:
     done: INT
     mover: INT
 
-    def part(self, rows: slice) -> Times:
+    def part(self, rows: slice) -> CutTimes:
         """Of some of the places."""
-        return Times(self.gone[rows], self.done[rows], self.mover[rows])
+        return CutTimes(self.gone[rows], self.done[rows], self.mover[rows])
 
 
 def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody],
@@ -90,11 +90,11 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
 
 
 def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofSetup, moves: Moves,
-           tools: Sequence[ToolBody], threads: int, report: Report) -> Times:
+           tools: Sequence[ToolBody], threads: int, report: Report) -> CutTimes:
     """When places (n, 3), mm, of walls ``thickness`` (n,) mm thick were cut."""
     left = np.minimum(stock_on_normals(points, normals, bounds, setup, float(thickness.max())), thickness)
     rest = REST * setup.scallop_height + RAY_ERROR
-    enough, told = setup.stock_allowance + rest, left.copy()
+    enough, reported = setup.stock_allowance + rest, left.copy()
     holds = np.minimum(thickness, HOLDS * stock_on_normals(points, normals, bounds, setup, np.inf))
     gone = np.where((left >= holds) & (holds > enough), NEVER, -1)
     done, mover = np.where(left <= enough, -1, NEVER), np.full(len(points), -1, np.int64)
@@ -103,20 +103,20 @@ def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofS
     for k, rows in enumerate(np.array_split(near, parts)):
         chosen = np.zeros(len(moves), np.bool_)
         chosen[rows] = True
-        asked = np.flatnonzero(_met(moves, rows, tools, points, thickness))
-        if len(asked) and len(rows):
-            after, by = residual_on_normals(points[asked], normals[asked], left[asked], moves.only(chosen), tools,
+        tried = np.flatnonzero(_met(moves, rows, tools, points, thickness))
+        if len(tried) and len(rows):
+            after, by = residual_on_normals(points[tried], normals[tried], left[tried], moves.only(chosen), tools,
                                             threads=threads)
             cut = by >= 0
-            fell = asked[(gone[asked] == NEVER) & cut & (after < holds[asked] - RAY_ERROR)]
+            fell = tried[(gone[tried] == NEVER) & cut & (after < holds[tried] - RAY_ERROR)]
             gone[fell] = k
             # one that is never cut that far was done with the last cut that took more off it than is let pass elsewhere
-            ends = cut & (done[asked] != -1) & (told[asked] > enough)
-            ends &= (after <= enough) | (told[asked] - after > rest)
-            done[asked[ends]], mover[asked[ends]], told[asked[ends]] = k, rows[by[ends]], after[ends]
-            left[asked] = after
+            ends = cut & (done[tried] != -1) & (reported[tried] > enough)
+            ends &= (after <= enough) | (reported[tried] - after > rest)
+            done[tried[ends]], mover[tried[ends]], reported[tried[ends]] = k, rows[by[ends]], after[ends]
+            left[tried] = after
         report((k + 1) / parts)
-    return Times(gone, done, mover)
+    return CutTimes(gone, done, mover)
 
 
 def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> tuple[F64, F64]:
@@ -144,7 +144,7 @@ def _met(moves: Moves, rows: INT, tools: Sequence[ToolBody], points: F64, room: 
     return np.asarray(((points >= low.min(axis=0)) & (points <= high.max(axis=0))).all(axis=1))
 
 
-def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray[np.bool_]]:
+def _free_ways(walls: ThinWalls, one: CutTimes, other: CutTimes) -> tuple[F64, NDArray[np.bool_]]:
     """(n,) mm how far each place is from what held its wall when both its sides were done, and (n,) which count."""
     middle = 0.5 * (walls.points + walls.across)
     stands = np.minimum(one.gone, other.gone)
@@ -153,10 +153,10 @@ def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray
     free = np.zeros(len(walls))
     for number in np.unique(walls.wall[judged]).tolist():
         own = np.flatnonzero(walls.wall == number)
-        asked = own[judged[own]]
+        tried = own[judged[own]]
         # what is held in the finished part is so within its own limit
         held = np.where(walls.free[own], np.inf, walls.limit[own])
-        for rows in np.array_split(asked, -(-len(asked) // BLOCK)):
+        for rows in np.array_split(tried, -(-len(tried) // BLOCK)):
             way = cdist(middle[rows], middle[own])
             by_stock = np.where(stands[own] >= done[rows][:, None], way, np.inf).min(axis=1)
             free[rows] = np.minimum(by_stock, (way + held).min(axis=1))
@@ -164,7 +164,7 @@ def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray
     return np.where(np.isfinite(free), free, 2.0 * walls.limit), judged
 
 
-def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[Times], setup: ProofSetup,
+def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[CutTimes], setup: ProofSetup,
               scored: ScoredSamples, source: Source, zone_ids: Sequence[str]) -> list[Finding]:
     """A finding for each wall and program, where its places (k,) ``over`` the limit are worst."""
     last = np.where(times[0].done >= times[1].done, times[0].mover, times[1].mover)

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import Control
-from verify.gcode.dialects.fanuc import Fanuc
-from verify.gcode.dialects.haas import Haas
-from verify.gcode.dialects.heidenhain import Heidenhain, is_conversational
-from verify.gcode.dialects.siemens import Siemens, is_siemens
+from verify.gcode.dialects.base import DialectReader
+from verify.gcode.dialects.fanuc import FanucReader
+from verify.gcode.dialects.haas import HaasReader
+from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
+from verify.gcode.dialects.siemens import SiemensReader, is_siemens
 from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
-CONTROLS: dict[str, type[Control]] = {"fanuc": Fanuc, "haas": Haas, "siemens": Siemens, "heidenhain": Heidenhain}
+CONTROLS: dict[str, type[DialectReader]] = {"fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """By name; ``LINUXCNC`` needs none."""
 
 DIALECTS = (LINUXCNC, *CONTROLS)
@@ -28,7 +28,7 @@ ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": 
 """Of file names, without the point and in small letters, and whose programs they may be."""
 
 
-def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
+def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
     """Blocks with the numbers of their lines, from 1; what cannot be read becomes an error of the log."""
     control = CONTROLS[dialect]()
     for number, raw in enumerate(lines, 1):
@@ -74,4 +74,4 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
 
 
-__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "spelt"]
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "translated_blocks"]

@@ -8,7 +8,7 @@ ZEROS = tuple(WORK_OFFSETS.values())
 """The zeros of a control from the first on, as setups name them."""
 
 
-class Control:
+class DialectReader:
     """One control, asked line by line; what it keeps is what later lines depend on.
 
     notes   : what was understood and should be known; whoever asks takes them away
@@ -50,4 +50,4 @@ def zero_word(number: int, said: str) -> str:
     return ZEROS[number - 1]
 
 
-__all__ = ["NUMBER", "ZEROS", "BlockError", "Control", "zero_word"]
+__all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "zero_word"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 
 from verify.gcode.block_words import bare
-from verify.gcode.dialects.base import NUMBER, BlockError, Control, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, zero_word
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
@@ -20,10 +20,10 @@ ROUNDING = "how far the control rounds corners is said by parameters of the mach
 _PLACES = "XYZABCIJKR"
 
 
-class Fanuc(Control):
+class FanucReader(DialectReader):
     """Fanuc 0i, 30i and their kin."""
 
-    title = "Fanuc"
+    title = "FanucReader"
     further = 54.1
     bounds_path = False
     home_from, gives_up_length = 0, True

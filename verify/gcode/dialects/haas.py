@@ -7,13 +7,13 @@ length of the tool up.
 from __future__ import annotations
 
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.fanuc import Fanuc
+from verify.gcode.dialects.fanuc import FanucReader
 
 
-class Haas(Fanuc):
+class HaasReader(FanucReader):
     """Haas mills, Next Generation Control."""
 
-    title = "Haas"
+    title = "HaasReader"
     further = 154.0
     bounds_path = True
 

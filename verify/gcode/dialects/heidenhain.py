@@ -13,7 +13,7 @@ import math
 import re
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, BlockError, Control, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, zero_word
 from verify.gcode.dialects.tilted_planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
@@ -39,7 +39,7 @@ def is_conversational(text: str) -> bool:
     return re.match(r"\s*(?:[0-9]+\s+)?BEGIN PGM\b", text.upper()) is not None
 
 
-class Heidenhain(Control):
+class HeidenhainReader(DialectReader):
     """TNC 320 to 640, iTNC 530, TNC7."""
 
     home_from = 1

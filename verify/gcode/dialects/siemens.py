@@ -13,7 +13,7 @@ import math
 import re
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Control, zero_word
+from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, DialectReader, zero_word
 from verify.gcode.dialects.tilted_planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
@@ -44,7 +44,7 @@ def is_siemens(text: str) -> bool:
     return bool(_MARKS.search(text.upper()))
 
 
-class Siemens(Control):
+class SiemensReader(DialectReader):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
@@ -117,9 +117,9 @@ class Siemens(Control):
     def _follow(self, out: list[str]) -> None:
         """Keep where the tool is, and what a plane rests on."""
         if self.plane is not None:
-            told = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
-            if told:
-                raise BlockError(f"{told[0]} in a plane of CYCLE800", "end it with CYCLE800() before")
+            barred = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
+            if barred:
+                raise BlockError(f"{barred[0]} in a plane of CYCLE800", "end it with CYCLE800() before")
             return
         if self.relative or not _LOSING.isdisjoint(out):
             self.trail.append("XNAN YNAN ZNAN")

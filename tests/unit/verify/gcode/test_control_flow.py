@@ -191,7 +191,7 @@ def test_the_stage_before_changes_nothing_of_plain_blocks():
 
 
 def test_a_loop_without_end(monkeypatch):
-    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 1000)
+    monkeypatch.setattr(control_flow, "MAX_BLOCKS", 1000)
     with pytest.raises(VerificationError) as caught:
         read("o1 while [1]\no1 endwhile\n")
     error = caught.value
@@ -213,7 +213,7 @@ def test_structure_pairs_what_belongs_together():
 
 def test_any_pieces_give_a_program_or_an_error_with_a_line(monkeypatch):
     """A reading of random pieces ends in finite moves or names a line; nothing else escapes."""
-    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 2000)
+    monkeypatch.setattr(control_flow, "MAX_BLOCKS", 2000)
     r = random.Random(5)
     pieces = ("# [ ] #1 #2 #<a> #<_x> 1 2 -3 0.5 + - * / ** MOD EQ AND = = o1 o2 o<f> sub endsub if else endif while "
               "do endwhile repeat endrepeat call return break continue [1] [0] [#1] X Y1 G1 G0 F50 ATAN SIN[ LN "

@@ -9,7 +9,7 @@ from geometry.errors import CamError, ProgramError
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.kinematics import Kinematics
 from verify.program.arc_chords import CHORD
-from verify.program.turn_subdivision import MOST_TURN, TURN, axis_pieces
+from verify.program.turn_subdivision import MAX_TURN, TURN, axis_pieces
 
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),
           "head-table-BC": ((0.0, 0.0, 60.0), (12.0, -5.0, 3.0)), "head-head-BC": ((0.0, 0.0, 60.0),)}
@@ -67,12 +67,12 @@ def test_pieces_stay_as_near_as_promised_to_what_the_control_does(kind, tcp, sta
     np.testing.assert_allclose(np.abs(np.diff(np.concatenate([p.poses.start_turn[rows], p.poses.end_turn[rows[-1:]]]),
                                               axis=0)).max(), np.radians(np.abs(b - a)[3:].max()) / len(rows))
     np.testing.assert_allclose(p.start[rows[1:]], p.end[rows[:-1]], atol=1e-12)
-    assert np.radians(np.abs(b - a)[3:]).max() / len(rows) <= MOST_TURN
+    assert np.radians(np.abs(b - a)[3:]).max() / len(rows) <= MAX_TURN
 
 
 def test_pieces_are_no_more_than_needed():
     """A pure tilt is a great circle, a turn at the pole moves no axis, a circle at 45 degrees meets the bound."""
-    assert axis_pieces((0, 0), (1.5, 0)) == math.ceil(1.5 / MOST_TURN) == axis_pieces((0, 0), (0, 1.5))
+    assert axis_pieces((0, 0), (1.5, 0)) == math.ceil(1.5 / MAX_TURN) == axis_pieces((0, 0), (0, 1.5))
     n = axis_pieces((math.pi / 4, 0), (math.pi / 4, math.tau))
     machine = Kinematics("table-table-AC")
     f = np.linspace(0, 1, 41)[:, None]
