@@ -1,4 +1,7 @@
-"""Programs one after the other, each in its own frame: read, started from above, and as one list of moves."""
+"""Programs one after the other, each in its own frame: read, started from above, and joined to one list of moves.
+
+Arrays are float64, mm or dimensionless for directions.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +26,18 @@ from verify.progress import Report, StageProgress
 from verify.stepnc.reader import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 
-BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
-BLEND_SHARE = 0.1
+BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
+BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
 Given = NcProgram | tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
 class FramedProgram:
-    """One program and what it is held against, all in its own frame.
+    """One program with setup and bounds of the part, all in the frame of the program.
 
-    program : as read; turn : (3, 3) float64 from the frame of the proof to that of the program, None: the same
-    setup   : of the proof, blank and fixtures as boxes round them where the frame is turned
+    program : as read
+    turn    : (3, 3) float64, rotation from the frame of the proof to that of the program; None: the same frame
+    setup   : of the proof; where the frame is turned, boxes round blank and fixtures stand in for them
     bounds  : (2, 3) float64, mm, of the part
     """
 
@@ -43,7 +47,7 @@ class FramedProgram:
     bounds: F64
 
     def findings(self, tools: Sequence[ToolBody]) -> list[Finding]:
-        """Limits of the machine and ways that cannot be simulated, places in the frame of the proof."""
+        """Findings of machine limits and of moves that cannot be simulated; points are in the frame of the proof."""
         found = [*limit_findings([self.program], self.setup),
                  *way_findings(self.program, self.bounds, tools, self.setup)]
         if self.turn is None:
@@ -52,16 +56,27 @@ class FramedProgram:
                 for f in found]
 
     def notes(self) -> list[str]:
-        """What is no finding and should be known."""
+        """Notes that are not findings."""
         return list(notes_on(self.program, float(self.bounds[0, 2]), self.setup))
 
     def here(self, vectors: F64) -> F64:
-        """Places or directions (..., 3) of the program in the frame of the proof."""
+        """Turn places or directions of the program into the frame of the proof.
+
+        vectors : (n, 3) or (n, 3, 3) float64, mm or dimensionless, frame of the program
+
+        Returns the same shape, frame of the proof.
+        """
         return vectors if self.turn is None else np.asarray(vectors @ self.turn)
 
 
 def check_numbers(tools: Sequence[ToolBody]) -> None:
-    """Refuse two tools of one T number (VerificationError, code tool_number_twice)."""
+    """Refuse two tools of one T number.
+
+    Raises
+    ------
+    VerificationError
+        Code tool_number_twice.
+    """
     numbers = [t.number for t in tools]
     if len(set(numbers)) != len(numbers):
         raise VerificationError("two tools share a T number", code="tool_number_twice",
@@ -71,9 +86,9 @@ def check_numbers(tools: Sequence[ToolBody]) -> None:
 
 def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
              spindle_tool: int, report: Report) -> list[FramedProgram]:
-    """Read programs in the order they run; a first descent that lacks only its height comes from above everything.
+    """Read programs in the order they run; a descent of unknown start height comes from above everything.
 
-    programs, spindle_tool : as ``verify.prove.prove`` takes them, and errors as it raises them
+    programs, spindle_tool : as ``verify.prove.prove`` takes them; it also names the errors
     report   : called with the share read, 0 to 1
     """
     given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
@@ -96,7 +111,7 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
 
 
 def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]:
-    """Setup and bounds of the part, (2, 3) mm, as one program sees them."""
+    """Setup and bounds of the part, (2, 3) mm, in the frame of one program."""
     offset = nc.work_offset or setup.work_offset
     if nc.turn is None:
         return replace(setup, work_offset=offset), part.mesh.bounds
@@ -114,9 +129,9 @@ def _box_round(box: F64, turn: F64) -> F64:
 
 
 def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
-    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them.
+    """Moves of all programs, one after the other. Moves without a tool are left out; the reader remarks them.
 
-    tools : of the moves; ``Moves.tool`` is the place in it
+    tools : of the moves; ``Moves.tool`` is the place in this sequence
     """
     programs = [r.program for r in read]
     row = {t.number: i for i, t in enumerate(tools)}
@@ -138,9 +153,10 @@ def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[
 
 
 def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
-    """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them.
+    """Directions of the linear axes for each move of ``moves_of``.
 
-    None where they lie along the frame throughout, or no rapid asks for them.
+    Returns (m, 3, 3) float64, dimensionless, rows in the frame of the proof. None where the axes lie along the frame
+    throughout, or rapids are straight.
     """
     if not setup.dogleg or all(r.turn is None and r.program.poses is None for r in read):
         return None
@@ -154,7 +170,7 @@ def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: P
 
 
 def _known(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
-    """(m,) bool: moves with a tool of the table in the spindle."""
+    """(m,) bool: moves with one of the tools in the spindle."""
     number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
     return np.isin(number, [t.number for t in tools])
 

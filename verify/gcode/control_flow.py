@@ -1,7 +1,7 @@
-"""The stage before the blocks: parameters worked out, subroutines, conditions and loops run, plain blocks handed on.
+"""The stage before the blocks: it evaluates parameters, runs subroutines, conditions and loops, and yields plain blocks.
 
-A program without any of these never comes here. Every block keeps the line number of its text. An error in a parameter
-or an O-word ends the reading: where the program would go from there is not known.
+A program without any of these skips this stage. Every block keeps the line number of its text. An error in a parameter
+or an O-word ends the reading, since the next line of the program is then unknown.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from verify.program.move_log import Log
 
 MAX_BLOCKS = 5_000_000
 MAX_CALLS = 9
-"""Calls within one another that LinuxCNC runs."""
+"""Nested calls that LinuxCNC runs."""
 MAX_KEPT = 20_000
 _O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
 
 
 def has_flow(text: str) -> bool:
-    """Whether a program has parameters, expressions or O-words; True also where only a comment looks so."""
+    """Whether a program has parameters, expressions or O-words; also True where only a comment seems to have them."""
     if "#" in text or "[" in text:
         return True
     for letter in "oO":
@@ -39,7 +39,7 @@ def has_flow(text: str) -> bool:
 
 
 class FlowReader(Protocol):
-    """What the flow needs of the reader."""
+    """The part of the reader that the flow needs."""
 
     log: Log
 
@@ -54,10 +54,10 @@ class FlowReader(Protocol):
 
 
 class Flow:
-    """One run of a program.
+    """One run of a program: parameters, O-words and calls as in LinuxCNC, whose language extends [Kramer2000].
 
     lines   : its text
-    machine : the reader, asked for its state and told of calls
+    machine : the reader; it gives its state and hears of calls
     """
 
     def __init__(self, lines: Sequence[str], machine: FlowReader) -> None:
@@ -89,8 +89,7 @@ class Flow:
         at, runs = 0, 0
         plain, steps = self.structure.plain, self.structure.steps
         if not all(plain):
-            self.machine.log.note("parameters, expressions and O-words were read as LinuxCNC reads them; other "
-                                  "controls differ")
+            self.machine.log.note("parameters, expressions and O-words are read as in LinuxCNC; other controls differ")
         while at < len(plain):
             runs += 1
             if runs > MAX_BLOCKS:
@@ -115,7 +114,7 @@ class Flow:
         return None
 
     def _line(self, at: int) -> ParametricLine:
-        """The line as read; kept only where it comes again, as keeping them all slows the collector of garbage."""
+        """The parsed line; it is cached only where it can run again, as caching all lines slows garbage collection."""
         line = self._kept.get(at)
         if line is None:
             line = read_line(self.lines[at])
@@ -125,7 +124,7 @@ class Flow:
 
     def _endless(self, line: int) -> None:
         log = self.machine.log
-        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MAX_BLOCKS} lines, so a loop "
+        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MAX_BLOCKS} lines; a loop "
                                 "may have no end", code="program_too_long", subjects=(f"line {line}",),
                                 measured=MAX_BLOCKS + 1, limit=MAX_BLOCKS,
                                 remedy="correct the condition of the loop, or split the program")
@@ -134,7 +133,7 @@ class Flow:
         return step.word.values[0](self.scope) != 0
 
     def _if(self, step: OWordStep) -> int:
-        """Go from branch to branch until one holds."""
+        """Line of the first branch whose condition holds."""
         while step.word.keyword in ("if", "elseif") and not self._holds(step):
             step = self.structure.steps[step.other]
             self.machine.log.line = step.at + 1
@@ -159,10 +158,10 @@ class Flow:
         label = word.label if word.computed is None else _label(word.computed, self.scope)
         sub = self.structure.subs.get(label)
         if sub is None:
-            raise BlockError(f"the subroutine '{label}' is not in the program: it would be in the file {label}.ngc; "
-                             "put it into the program")
+            raise BlockError(f"the subroutine '{label}' is not in the program (LinuxCNC reads it from {label}.ngc): "
+                             "copy it into the program")
         if len(self._back) >= MAX_CALLS:
-            raise BlockError(f"more than {MAX_CALLS} calls in one another, which is all LinuxCNC runs")
+            raise BlockError(f"more than {MAX_CALLS} nested calls; LinuxCNC runs no more")
         numbers = dict.fromkeys(range(1, LOCAL + 1), 0.0)
         numbers.update(enumerate((value(self.scope) for value in word.values), 1))
         self.scope.frames.append(CallFrame(numbers))
@@ -181,5 +180,5 @@ class Flow:
 def _label(computed: Value, scope: Parameters) -> str:
     number = computed(scope)
     if number < 0 or number != round(number):
-        raise BlockError(f"O{number:g} is no label")
+        raise BlockError(f"O{number:g} is not a label")
     return str(int(number))

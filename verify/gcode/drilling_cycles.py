@@ -1,4 +1,4 @@
-"""Drilling cycles written out as rapids and feeds."""
+"""Drilling cycles as rapids and feeds."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class HoleExit(Enum):
 
 @dataclass(frozen=True)
 class Hole:
-    """One hole along the axis across the plane.
+    """One hole along the axis perpendicular to the plane.
 
     clear  : mm, the R plane
-    bottom : mm, depth of the tip
-    back   : mm, height left to afterwards
-    peck   : mm a peck takes, > 0; the whole depth for G81 and G82
-    lift   : whether each peck goes back to ``clear`` (G83) or lifts 0.254 mm to break the chip
-    out    : how it leaves the bottom
+    bottom : mm, height of the tip at the bottom
+    back   : mm, height after the retract
+    peck   : mm, depth of a peck, > 0; the whole depth for G81 and G82
+    lift   : True: each peck retracts to ``clear`` (G83); False: it lifts 0.254 mm to break the chip
+    out    : how the tool leaves the bottom
     """
 
     clear: float
@@ -57,7 +57,13 @@ class Hole:
 def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[float], int]]:
     """Targets (x, y, z) in mm and kinds of the moves over the hole, down, and back.
 
-    over : (3,) mm, above the hole at the height the tip goes across, not below ``hole.clear`` along ``axis``
+    over : (3,) mm, place above the hole where the tip arrives, not below ``hole.clear`` along ``axis``
+    axis : 0, 1 or 2, the drilling axis
+
+    Notes
+    -----
+    The order of moves is that of the canned cycles G81, G82, G83, G85, G86 and G89 of RS274/NGC [Kramer2000]; G73 is as
+    in LinuxCNC.
     """
     def at(height: float) -> list[float]:
         return [height if k == axis else p for k, p in enumerate(over)]

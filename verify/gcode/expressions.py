@@ -1,7 +1,7 @@
-"""Numbers, parameters and expressions of LinuxCNC: read once, worked out whenever their line is run.
+"""Numbers, parameters and expressions of LinuxCNC: parsed once, evaluated whenever their line runs.
 
-Precedence, from the closest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. All of them run from left to right,
-and a sign belongs to the value behind it. Angles are degrees. Numbers nearer than 1e-5 are equal for EQ and NE.
+Precedence, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level run from left
+to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within 1e-5 as equal.
 """
 
 from __future__ import annotations
@@ -30,38 +30,50 @@ _PRECEDENCE = {"**": 5, "*": 4, "/": 4, "mod": 4, "+": 3, "-": 3, "eq": 2, "ne":
 
 @dataclass(frozen=True)
 class ParameterReference:
-    """A parameter as it is written: its name, or what its number comes from."""
+    """A parameter as it is written: its name, or the expression of its number."""
 
     name: str
     number: Value | None
 
     def read(self, scope: Parameters) -> float:
-        """Its value now."""
+        """Its present value."""
         return scope.named(self.name) if self.number is None else scope.numbered(self.number(scope))
 
 
 class ExpressionReader:
-    """One left-to-right reading of the text of a line, which has no blanks and is in lower case."""
+    """Parser of one line from left to right; the text is without blanks and in lower case."""
 
     def __init__(self, text: str) -> None:
         self.text, self.at, self._depth = text, 0, 0
 
     @property
     def rest(self) -> str:
-        """What is still to read, for messages."""
+        """The text still to read, for messages."""
         return self.text[self.at:self.at + 40]
 
     def take(self, sign: str) -> None:
-        """Pass over ``sign``; BlockError where it is not there."""
+        """Skip ``sign``.
+
+        Raises
+        ------
+        BlockError
+            The text does not continue with it.
+        """
         if not self.text.startswith(sign, self.at):
             raise BlockError(f"'{sign}' is missing before '{self.rest}'")
         self.at += len(sign)
 
     def value(self) -> Value:
-        """A number, a parameter, a function, an expression in brackets, or one of these with a sign."""
+        """A number, a parameter, a function, an expression in brackets, or one of these with a sign [Kramer2000].
+
+        Raises
+        ------
+        BlockError
+            More than 40 nested brackets, signs or #.
+        """
         self._depth += 1
         if self._depth > MAX_BRACKETS:
-            raise BlockError(f"more than {MAX_BRACKETS} brackets, signs or # in one another")
+            raise BlockError(f"more than {MAX_BRACKETS} nested brackets, signs or #")
         found = self._value()
         self._depth -= 1
         return found
@@ -94,7 +106,7 @@ class ExpressionReader:
         def checked(scope: Parameters) -> float:
             result = inside(scope)
             if not math.isfinite(result):
-                raise BlockError("an expression whose value is no finite number")
+                raise BlockError("the value of an expression is not a finite number")
             return result
         return checked
 
@@ -120,7 +132,7 @@ class ExpressionReader:
             target = self.target()
             self.take("]")
             if target.number is not None:
-                raise BlockError("EXISTS of a numbered parameter: it takes a name, such as EXISTS[#<depth>]")
+                raise BlockError("EXISTS takes a named parameter, such as EXISTS[#<depth>], not a numbered one")
             return lambda scope: float(scope.exists(target.name))
         first = self.bracket()
         if name == "atan":
@@ -149,7 +161,7 @@ def _modulo(left: float, right: float) -> float:
 
 def _power(left: float, right: float) -> float:
     if left < 0 and right != math.floor(right):
-        raise BlockError(f"{left:g} ** {right:g}: a negative number has whole powers only")
+        raise BlockError(f"{left:g} ** {right:g} has no value: a negative number has whole powers only")
     if left == 0 and right < 0:
         raise BlockError(f"0 ** {right:g} has no value")
     return _small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
@@ -159,7 +171,7 @@ def _small_enough(name: str, compute: Callable[[], float]) -> float:
     try:
         return compute()
     except OverflowError:
-        raise BlockError(f"{name} is no finite number") from None
+        raise BlockError(f"{name} is not a finite number") from None
 
 
 def _within(name: str, function: Callable[[float], float], low: float, high: float) -> Callable[[float], float]:

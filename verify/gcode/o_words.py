@@ -1,4 +1,4 @@
-"""How the O-words of a program belong together, found before it is run."""
+"""Pairs the O-words of a program before it runs."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "re
 
 @dataclass
 class OWordStep:
-    """An O-word in its place; lines are numbered from 0.
+    """An O-word and the O-words it belongs to; lines are numbered from 0.
 
     word  : the O-word
     at    : its line
-    start : line that opens what it belongs to (of break and continue: the loop)
-    end   : line that closes it
-    other : of if and elseif, the line to look at where the condition does not hold
-    kind  : what the opening line says: sub, if, while, do, repeat
+    start : line of the opening O-word (for break and continue: of the loop)
+    end   : line of the closing O-word
+    other : for if and elseif, the next line where the condition does not hold
+    kind  : keyword of the opening O-word: sub, if, while, do, repeat
     """
 
     word: OWord
@@ -36,7 +36,7 @@ class OWordStep:
 class Structure:
     """Steps by line and subroutines by label, with lines numbered from 0.
 
-    plain : by line, whether it needs no stage before the blocks
+    plain : by line, whether it skips the stage before the blocks
     again : by line, whether a loop or call may run it more than once
     """
 
@@ -47,7 +47,7 @@ class Structure:
 
 
 class StructureError(BlockError):
-    """O-words that do not belong together; ``line`` is numbered from 1."""
+    """An O-word without its counterpart; ``line`` is numbered from 1."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -57,8 +57,8 @@ class StructureError(BlockError):
 def find_structure(lines: Sequence[str]) -> Structure:
     """Pair the O-words of a program up to its closing %.
 
-    Raises StructureError with the line: an O-word that closes or goes on with nothing, one that is never closed, a
-    label that stands twice, a subroutine within something else.
+    Raises StructureError with the line: an O-word that closes or continues nothing, one that is never closed, a label
+    that appears twice, a subroutine inside another O-word.
     """
     found, percents = Structure(), 0
     pairing = _Pairing(found)
@@ -81,7 +81,7 @@ def find_structure(lines: Sequence[str]) -> Structure:
 
 
 class _Pairing:
-    """What is open while lines are gone through."""
+    """The open O-words while the lines are scanned."""
 
     def __init__(self, found: Structure) -> None:
         self.found = found
@@ -117,10 +117,10 @@ class _Pairing:
         word = step.word
         sub = self.open[0].word.label if self.open and self.open[0].kind == "sub" else ""
         if word.keyword == "sub" and self.open:
-            raise BlockError(f"{_name(step)} within {_name(self.open[-1])}")
+            raise BlockError(f"{_name(step)} inside {_name(self.open[-1])}")
         key = ("", word.label) if word.keyword == "sub" else (sub + "#", word.label)
         if key in self.labels:
-            raise BlockError(f"the label of {_name(step)} stands twice: each loop, condition and subroutine "
+            raise BlockError(f"the label of {_name(step)} appears twice: each loop, condition and subroutine "
                              "needs its own")
         self.labels.add(key)
         step.kind, step.start = word.keyword, step.at
@@ -155,19 +155,19 @@ class _Pairing:
             loop = self.open[k]
             if loop.kind in ("while", "do", "repeat") and loop.word.label == step.word.label:
                 if loop.kind == "repeat":
-                    raise BlockError(f"{_name(step)} of a repeat, which LinuxCNC does not run: use while and endwhile")
+                    raise BlockError(f"{_name(step)} in a repeat: LinuxCNC does not run it; use while and endwhile")
                 if loop.kind == "do" and step.word.keyword == "continue":
-                    raise BlockError(f"{_name(step)} of do and while, which LinuxCNC takes for the end of the loop: "
+                    raise BlockError(f"{_name(step)} in do and while: LinuxCNC takes it for the end of the loop; "
                                      "use while and endwhile")
                 step.kind = loop.kind
                 self.members[k].append(step)
                 return
-        raise BlockError(f"{_name(step)} is in no loop of that label")
+        raise BlockError(f"{_name(step)} is not in a loop of that label")
 
     def _needs(self, step: OWordStep, kind: str) -> OWordStep:
         top = self.open[-1] if self.open else None
         if top is None or top.kind != kind or top.word.label != step.word.label:
-            inside = f"inside {_name(top)} of line {top.at + 1}" if top else "with nothing open"
+            inside = f"inside {_name(top)} of line {top.at + 1}" if top else "without an open O-word"
             raise BlockError(f"{_name(step)} {inside}: it belongs to {kind} of the same label")
         return top
 

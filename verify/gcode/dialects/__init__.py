@@ -1,8 +1,8 @@
-"""Programs of other controls, block by block in the words the one reader knows.
+"""Translates programs of other controls, block by block, into the words of the one reader.
 
-``verify.gcode.reader`` runs one modal machine, whose words are those of LinuxCNC. A control with other words has a file here
-that spells each of its blocks in them, and refuses by name what it does not know or what would be read in two ways:
-nothing is dropped but what has no effect on a move. Lines keep their numbers.
+``verify.gcode.reader`` runs one modal machine with the words of LinuxCNC. A control with other words has a file here
+that translates its blocks. It refuses by name a word that it does not know or that could be read in two ways, and drops
+only words without effect on a move. Lines keep their numbers.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
 CONTROLS: dict[str, type[DialectReader]] = {"fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
-"""By name; ``LINUXCNC`` needs none."""
+"""Readers by dialect; ``LINUXCNC`` needs none."""
 
 DIALECTS = (LINUXCNC, *CONTROLS)
-"""All that can be read."""
+"""All dialects that can be read."""
 
 ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
-"""Of file names, without the point and in small letters, and whose programs they may be."""
+"""Extensions of file names, without the point and in lower case, and the dialects that use them."""
 
 
 def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
-    """Blocks with the numbers of their lines, from 1; what cannot be read becomes an error of the log."""
+    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log."""
     control = CONTROLS[dialect]()
     for number, raw in enumerate(lines, 1):
         try:
@@ -51,10 +51,10 @@ def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[
 
 
 def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:
-    """Whose program a text is, where nobody says: by its own marks, its file name, or the controls of the machine.
+    """Dialect of a text: by its own marks, its file name, or the controls of the machine.
 
-    ending : of the file name, without the point, '' where there is none
-    wanted : controls of the machine, likeliest first
+    ending : extension of the file name, without the point, '' where there is none
+    wanted : controls of the machine, the likeliest first
 
     >>> dialect_of("0 BEGIN PGM PART MM")
     'heidenhain'
@@ -68,7 +68,7 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     if is_siemens(text):
         return "siemens"
     may = ENDINGS.get(ending.lower().removeprefix("."), DIALECTS)
-    # a text without its marks is no Siemens or Heidenhain program, unless its name says so
+    # a text without their marks is not a Siemens or Heidenhain program, unless its name says so
     plain = [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
     named = [d for d in wanted if d in plain]
     return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
