@@ -250,7 +250,8 @@ class Proof:
 
     findings : the gravest first, at most 200, the 20 gravest of each kind among them; counts : all of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
-    line     : (n,) int32, index, line of the move that left it, 0 where none; program : (n,) int32, index, -1 where none
+    line     : (n,) int32, index, line of the move that left it, 0 where none
+    program  : (n,) int32, index, its program, -1 where none
     proved   : (n,) bool, inside the budget
     zones    : by zone id; faces : by face number, of every face with scored samples
     spent    : time of feeds, rapids and dwells; cutting_length : mm of feed moves that removed stock

@@ -122,8 +122,8 @@ class BlockMotion(Origins):
                 self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g}; "
                                 "the proof does not know that path: send Z home first", self.log.line)
             if turn is not None and turn != s.turn:
-                self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine from "
-                                f"Z{s.position[2]:g}; the proof does not know that path: send Z home first",
+                self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine "
+                                f"from Z{s.position[2]:g}; the proof does not know that path: send Z home first",
                                 self.log.line)
         self._leave(named)
         s.parked |= named[0] or named[1]
@@ -263,7 +263,7 @@ class BlockMotion(Origins):
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
         if top > clear and self.stated.isdisjoint((98, 99)):
-            self.log.note("neither G98 nor G99 is stated: drilling cycles are read with G98 (return to the start height)")
+            self.log.note("neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)")
         if bottom > clear:
             self.log.error(f"the drilling depth {'XYZ'[k]} is above R")
             return None

@@ -1,4 +1,4 @@
-"""The stage before the blocks: it evaluates parameters, runs subroutines, conditions and loops, and yields plain blocks.
+"""The stage before the blocks: evaluates parameters, runs subroutines, conditions and loops, and yields plain blocks.
 
 A program without any of these skips this stage. Every block keeps the line number of its text. An error in a parameter
 or an O-word ends the reading, since the next line of the program is then unknown.

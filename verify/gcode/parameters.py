@@ -106,8 +106,8 @@ class Parameters:
         """
         n = _index(number)
         if n > LAST and n != MESSAGES:
-            raise BlockError(f"#{n} is a parameter of the control (offsets, probing, position); the proof does not know "
-                             "the effect of setting it")
+            raise BlockError(f"#{n} is a parameter of the control (offsets, probing, position); the proof does not "
+                             "know the effect of setting it")
         (self.frame.numbers if n <= LOCAL else self._numbers)[n] = value
 
     def put_name(self, name: str, value: float) -> None:

@@ -1,7 +1,8 @@
-"""What attributes of instances have to be, and the words in which one that is not is refused.
+"""Checks attributes of instances, and words the errors.
 
-A form of STEP-NC is read with a table: by entity its attributes in order, each with the kind of its value. Every
-instance of the table is held against it before anything is made of it, so that a reader may take what it finds.
+A form of STEP-NC has a table: by entity its attributes in order, each with the kind of its value. Every instance of an
+entity of the table is checked before use, so a reader can rely on the values. Arrays of coordinates are float64, mm, in
+the frame of the file.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from geometry.mesh import F64
 from verify.stepnc.part21 import DERIVED, EnumItem, Part21File, Record, Ref, Typed, Value
 
 FARTHEST = 1e6  # mm, of the coordinates of a path and the sizes of a tool
-UNIT = 1e-3  # what the length of a tool axis may be off one
-LONGEST_VECTOR = 1e9  # of ratios of a direction; squares of much more have no place in a float
+UNIT = 1e-3  # largest deviation of the length of a tool axis from one
+LONGEST_VECTOR = 1e9  # largest ratio of a direction; squares of much larger ones overflow
 
 
 class AttributeKind:
-    """What a value has to be; ``problem`` says what it is instead, or None where it is right."""
+    """Kind of a value; ``problem`` words the error of a wrong value, or gives None."""
 
     def problem(self, value: Value, file: Part21File) -> str | None:
         """Words for the error, or None."""
@@ -40,7 +41,7 @@ class Text(AttributeKind):
 
 @dataclass(frozen=True)
 class Real(AttributeKind):
-    """A real number, with a decimal point; over ``above`` and up to ``most`` where they say so."""
+    """A real number, with a decimal point, above ``above`` and up to ``limit``."""
 
     above: float = -math.inf
     limit: float = math.inf
@@ -64,7 +65,7 @@ class Whole(AttributeKind):
 
 @dataclass(frozen=True)
 class OneOf(AttributeKind):
-    """An enumeration item of a few."""
+    """One of some enumeration items."""
 
     items: tuple[str, ...]
 
@@ -93,13 +94,13 @@ class To(AttributeKind):
         if not isinstance(value, Ref):
             return f"a reference to {wanted} expected, not {shown(value)}"
         if not file.has(value):
-            return f"{value!r}, to be {wanted}, is not in the file"
+            return f"{value!r}, which must be {wanted}, is not in the file"
         return f"a reference to {wanted} expected, but {value!r} is {' '.join(names)}"
 
 
 @dataclass(frozen=True)
 class Many(AttributeKind):
-    """A list of values of one kind, from ``least`` to ``most`` of them."""
+    """A list of values of one kind, from ``min_count`` to ``max_count`` of them."""
 
     of: AttributeKind
     min_count: int = 0
@@ -147,7 +148,7 @@ class Nothing(AttributeKind):
 
 @dataclass(frozen=True)
 class Either(AttributeKind):
-    """Whatever suits one of several kinds."""
+    """A value of one of several kinds."""
 
     kinds: tuple[AttributeKind, ...]
 
@@ -161,20 +162,21 @@ Table = Mapping[str, Attributes]
 
 
 def shown(value: Value) -> str:
-    """A value for an error, cut short."""
+    """A value for an error message, shortened."""
     text = "$, nothing," if value is None else repr(value)
     return text if len(text) <= 50 else text[:47] + "..."
 
 
 class Checked:
-    """The instances of a file, each held against the tables of its form.
+    """The instances of a file, each checked against the tables of its form.
 
-    table   : by entity; records : by the names of the records of complex instances, which hold no inherited attributes
+    table   : by entity
+    records : by the names of the records of complex instances, which hold no inherited attributes
 
     Raises
     ------
     ProgramError
-        Subjects name the instance: one whose values are not what the tables say.
+        An instance has values of wrong kinds; the subjects name it.
     """
 
     def __init__(self, file: Part21File, table: Table, records: Table | None = None) -> None:
@@ -195,19 +197,19 @@ class Checked:
         return self.file.of(entity)
 
     def get(self, number: int, *entities: str) -> Record:
-        """Name and values of an instance, which is of one of some entities; ProgramError where it is of none.
+        """Name and values of an instance of one of some entities; ProgramError where it is of none.
 
-        An entity that its form writes alone is refused among the records of a complex instance, and the other way
-        round: its values were held against no table.
+        An entity that its form writes alone is refused among the records of a complex instance, and vice versa: no
+        table checks its values there.
         """
         records = self.file.records(number)
         for record in records:
             if record[0] in entities:
                 if record[0] not in (self._records if len(records) > 1 else self._table):
                     raise self.file.error(number, f"has {record[0]} {'among' if len(records) > 1 else 'without'} "
-                                                  "other records, as its form does not write it")
+                                                  "other records, which its form does not allow")
                 return record
-        raise self.file.error(number, f"is to be {' or '.join(entities)}")
+        raise self.file.error(number, f"must be {' or '.join(entities)}")
 
     def one(self, number: int, entity: str, attribute: str) -> Value:
         """One attribute of an instance."""
@@ -226,7 +228,7 @@ class Checked:
         return None if self.one(number, entity, attribute) is None else self.ref(number, entity, attribute)
 
     def refs(self, number: int, entity: str, attribute: str) -> list[int]:
-        """The numbers a list refers to."""
+        """The numbers of the instances that a list refers to."""
         value = self.one(number, entity, attribute)
         return [int(v) for v in value if isinstance(v, Ref)] if isinstance(value, list) else []
 
@@ -236,13 +238,18 @@ class Checked:
         return value if isinstance(value, float) else None
 
     def within(self, number: int, label: str, value: float, low: float, high: float) -> float:
-        """The value, which has a sane size; ProgramError, naming the instance, where it has none."""
+        """The value, which must lie from ``low`` to ``high``; ProgramError names the instance where it does not."""
         if not low <= value <= high:  # nor where it is nan
             raise self.file.error(number, f", {label}: {low:g} to {high:g} expected, not {value:g}")
         return value
 
     def placement(self, number: int, scale: float = 1.0) -> F64:
-        """(4, 4) float64, mm: from an AXIS2_PLACEMENT_3D to what it is placed in; ``scale`` is mm in its unit."""
+        """Transformation of an AXIS2_PLACEMENT_3D to the frame that it is placed in.
+
+        scale : mm in the unit of the file
+
+        Returns (4, 4) float64: a rotation, dimensionless, and an origin, mm.
+        """
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
         out[:3, 3] = self._places(number, np.array([self.ref(number, entity, "location")], np.int64), scale)[0]
@@ -257,7 +264,7 @@ class Checked:
         return out
 
     def vector(self, number: int) -> F64:
-        """(3,) float64, unit: a DIRECTION."""
+        """(3,) float64, dimensionless, frame of the file: a DIRECTION of length one."""
         ratios = self.one(number, "DIRECTION", "direction_ratios")
         out = np.array([v for v in ratios if isinstance(v, float)] if isinstance(ratios, list) else [])
         length = float(np.linalg.norm(out)) if len(out) and np.abs(out).max() <= LONGEST_VECTOR else 0.0
@@ -267,9 +274,16 @@ class Checked:
         return out / length
 
     def unit_axes(self, number: int, words: str, axes: F64, count: int) -> F64:
-        """Tool axes (n, 3) of a path of ``count`` points made exactly unit; ProgramError where they cannot be axes."""
+        """Tool axes of a path made exactly unit; ProgramError where they cannot be axes.
+
+        words : name of the attribute, for the error
+        axes  : (n, 3) float64, dimensionless, frame of the file
+        count : number of points of the path
+
+        Returns (n, 3) float64, dimensionless, same frame.
+        """
         if len(axes) != count:
-            raise self.file.error(number, f", {words}: {count} points expected, as the path has, not {len(axes)}")
+            raise self.file.error(number, f", {words}: {count} points expected as in the path, not {len(axes)}")
         size = np.linalg.norm(axes, axis=1)
         if (bad := np.flatnonzero(np.abs(size - 1.0) > UNIT)).size:
             raise self.file.error(number, f", {words}: unit vectors expected, but point {bad[0] + 1} has length "
@@ -277,7 +291,12 @@ class Checked:
         return axes / size[:, None]
 
     def curve(self, number: int, scale: float = 1.0) -> tuple[F64, F64]:
-        """Points (n, 3) of a polyline, times ``scale``, and the lines (n,) of the file they stand in, as floats."""
+        """Points of a polyline and their lines in the file.
+
+        scale : mm in the unit of the file
+
+        Returns (n, 3) float64, mm, frame of the file, and (n,) float64, index, 1-based lines.
+        """
         numbers = self.file.plain_polyline(number)
         if numbers is None:
             self._check(number, "POLYLINE")
@@ -286,7 +305,7 @@ class Checked:
         return self._places(number, numbers, scale), self.file.lines_of(numbers).astype(np.float64)
 
     def point(self, number: int, scale: float = 1.0) -> F64:
-        """(3,) float64: a CARTESIAN_POINT, times ``scale``."""
+        """(3,) float64, mm, frame of the file: a CARTESIAN_POINT; ``scale`` is mm in the unit of the file."""
         self.get(number, "CARTESIAN_POINT")
         return np.asarray(self._places(number, np.array([number], np.int64), scale)[0])
 
@@ -295,7 +314,7 @@ class Checked:
         points = self.file.points(numbers)
         for k in np.flatnonzero(np.isnan(points).any(axis=1)).tolist():  # those not written plainly
             points[k] = np.array(self.one(int(numbers[k]), "CARTESIAN_POINT", "coordinates"), np.float64)
-        with np.errstate(over="ignore"):  # what has no place in a float any more is far away too
+        with np.errstate(over="ignore"):  # an overflow is beyond FARTHEST too
             points = points * scale
         if (far := np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1))).size:
             raise self.file.error(int(numbers[far[0]]), f", coordinates: numbers within {FARTHEST / scale:g} expected",
@@ -303,7 +322,7 @@ class Checked:
         return points
 
     def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:
-        """Refuse a polyline that refers to what is no point."""
+        """Refuse a polyline that refers to an instance that is not a point."""
         for target in numbers[self.file.rows(numbers) < 0].tolist():
             problem = To(("CARTESIAN_POINT",)).problem(Ref(target), self.file)
             if problem is not None:
@@ -313,12 +332,12 @@ class Checked:
         records = self.file.records(number)
         record = next((r for r in records if r[0] == entity), None)
         if record is None:
-            raise self.file.error(number, f"is to be {entity}")
+            raise self.file.error(number, f"must be {entity}")
         kinds = (self._records if len(records) > 1 else self._table).get(entity)
         if kinds is None:
             return
         if len(record[1]) != len(kinds):
-            raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are due")
+            raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are required")
         for (name, kind), value in zip(kinds, record[1], strict=True):
             problem = kind.problem(value, self.file)
             if problem is not None:

@@ -1,9 +1,9 @@
-"""STEP-NC as ISO 14649 (MACHINING_SCHEMA, MILLING_SCHEMA), read: what its main workplan makes the tool do.
+"""Reader of STEP-NC as ISO 14649 (MACHINING_SCHEMA, MILLING_SCHEMA): records the tool motion of its main workplan.
 
-Lengths are mm, feeds m/s, spindle speeds 1/s, positive counter-clockwise, as ISO 14649-10 has it where nothing is said.
-Paths are in the system of their feature, that in the workpiece, and this as the setup places it. What the reader has no
-motion for (strategies without a path, contact trajectories, splines, branches) is refused by instance: nothing is
-passed over that could move the tool.
+Lengths are mm, feeds m/s, spindle speeds 1/s, positive counter-clockwise: the defaults of [ISO14649-10]. Paths are in
+the frame of their feature, features in that of the workpiece, and the setup places the workpiece. The reader refuses,
+by instance, what could move the tool and is not read: strategies without a path, contact trajectories, splines and
+branches.
 """
 
 from __future__ import annotations
@@ -161,19 +161,19 @@ RECORDS: Table = {
 
 
 def read_iso14649(file: Part21File, recorder: MotionRecorder) -> None:
-    """Tell a recorder what the main workplan of a file makes the tool do.
+    """Record the tool motion of the main workplan of a file [ISO14649-10; ISO14649-11].
 
     Raises
     ------
     ProgramError
-        An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
-        read.
+        An instance, which the subjects name, does not have the required form, or moves the tool in a way that the
+        reader does not know.
     """
     Iso14649Reader(file, recorder).run()
 
 
 class Iso14649Reader:
-    """One reading: where workpieces stand, and what stands in force."""
+    """One reading of an ISO 14649 file: placements of workpieces, and the walk through the workplan."""
 
     def __init__(self, file: Part21File, recorder: MotionRecorder) -> None:
         self.file, self.recorder = file, recorder
@@ -183,20 +183,27 @@ class Iso14649Reader:
         self.seen: set[int] = set()
 
     def run(self) -> None:
+        """Record the motion of the main workplan.
+
+        Raises
+        ------
+        ProgramError
+            The file does not have exactly one project, or an instance is wrong.
+        """
         projects = self.data.of("PROJECT")
         if len(projects) != 1:
             raise ProgramError(f"{self.file.name}: one PROJECT expected, not {len(projects)}",
                                subjects=tuple(f"#{n}" for n in projects), measured=len(projects), limit=1,
-                               remedy="send one project a file")
+                               remedy="send one project per file")
         self._flatten(self.data.ref(projects[0], "PROJECT", "main_workplan"), np.eye(4))
         for k, (number, place) in enumerate(self.elements):
             self.place = place
             self._execute(k, number)
 
     def _flatten(self, number: int, place: F64) -> None:
-        """Note the elements of a workplan, those of workplans in it too, with the frame their workpiece is in."""
+        """List the elements of a workplan and of the workplans in it, with the frame of their workpiece."""
         if number in self.seen:
-            raise self.file.error(number, "stands in two places of the workplans, or in itself")
+            raise self.file.error(number, "appears in two places of the workplans, or inside itself")
         self.seen.add(number)
         if self.data.get(number, *_EXECUTABLES)[0] != "WORKPLAN":
             self.elements.append((number, place))
@@ -206,7 +213,7 @@ class Iso14649Reader:
             self._flatten(element, place if setup is None else self._setup(setup))
 
     def _setup(self, number: int) -> F64:
-        """(4, 4): from the workpiece to the setup frame."""
+        """(4, 4): transformation from the workpiece to the setup frame."""
         holdings = self.data.refs(number, "SETUP", "its_workpiece_setup")
         if not holdings:
             return np.eye(4)
@@ -229,7 +236,7 @@ class Iso14649Reader:
             self._operation(operation, self._feature(feature, operation))
 
     def _rapid(self, place: int, number: int, line: int) -> None:
-        """One without a path brings the tool of the next workingstep over the security plane to where that begins."""
+        """Rapid movement; without a path it takes the next tool over the security plane to the next workingstep."""
         entity = "RAPID_MOVEMENT"
         paths = self.data.maybe(number, entity, "its_toolpath")
         if paths is not None:
@@ -247,7 +254,7 @@ class Iso14649Reader:
         self.recorder.take(self._cutter(tool), line)
 
     def _feature(self, number: int, operation: int) -> F64:
-        """(4, 4): from the feature, which has to list the operation on it, to the workpiece."""
+        """(4, 4): transformation from the feature, which must list the operation on it, to the workpiece."""
         for _, values in self.file.records(number)[:1]:
             listed = values[2] if len(values) > 2 else None
             if not isinstance(listed, list) or Ref(operation) not in listed:
@@ -266,7 +273,7 @@ class Iso14649Reader:
             raise self.file.error(number, ", its_toolpath: TOOLPATH_LIST expected; strategies without one are not read")
         for attribute in ("approach", "retract"):
             if self.data.one(number, entity, attribute) is not None:
-                raise self.file.error(number, f", {attribute}: $ expected, as the tool path holds it")
+                raise self.file.error(number, f", {attribute}: $ expected; the tool path contains it")
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
         functions = self.data.ref(number, entity, "its_machine_functions")
@@ -275,7 +282,7 @@ class Iso14649Reader:
                     rapid=False)
 
     def _direction(self, number: int, entity: str) -> F64 | None:
-        """(3,): the tool axis where paths have none; None where they must."""
+        """(3,): the tool axis of paths without axes; None where paths must have axes."""
         target = self.data.maybe(number, entity, "its_tool_direction")
         if target is None:
             return None
@@ -288,7 +295,7 @@ class Iso14649Reader:
 
     def _paths(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None, *,
                rapid: bool) -> None:
-        """Follow a list of paths; direction is the tool axis where they have none, as their owner says it."""
+        """Follow a list of paths; ``direction`` is the tool axis that their owner gives to paths without axes."""
         for path in self.data.refs(number, "TOOLPATH_LIST", "its_list"):
             if self.data.get(path, "CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")[0] == "FEEDSTOP":
                 self.recorder.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
@@ -305,7 +312,7 @@ class Iso14649Reader:
             axes = self.data.unit_axes(number, "its_toolaxis", axes, len(tips))
         elif direction is None:
             raise self.file.error(number, f", its_toolaxis: POLYLINE expected, or THREE_AXES as its_tool_direction of "
-                                          f"#{owner}: nothing says how the tool stands", owner)
+                                          f"#{owner}: the tool axis is not given", owner)
         else:
             axes = np.tile(direction, (len(tips), 1))
         if self.data.one(number, entity, "its_direction") == "F":
@@ -326,7 +333,7 @@ class Iso14649Reader:
         entity = "MILLING_TECHNOLOGY"
         feed, spindle = (self.data.real(technology, entity, a) for a in ("feedrate", "spindle"))
         if feed is None and not rapid:
-            raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds a tooth are not read")
+            raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds per tooth are not read")
         if spindle is None:
             raise self.file.error(technology, ", spindle: a real number, 1/s, expected; cutting speeds are not read")
         if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
@@ -349,7 +356,7 @@ class Iso14649Reader:
                 raise self.file.error(size, f", {angle}: $ or 0. expected; tapered cutters are not read")
         corner = 0.5 * wide if kind == "BALL_ENDMILL" else edge or 0.0
         if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
-            raise self.file.error(size, f", edge_radius: {0.5 * wide:g} expected, half of the diameter, or less on a "
+            raise self.file.error(size, f", edge_radius: {0.5 * wide:g} (half of the diameter) expected, or less on a "
                                         f"bull nose, not {edge}")
         return CutterRecord(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
                       self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number)
@@ -361,13 +368,13 @@ class Iso14649Reader:
 
 
 def tool_number(name: str) -> int | None:
-    """The T number a tool's id opens with, 'T7: ball' or '7'; None where it does not."""
+    """The T number at the start of a tool id, as in 'T7: ball' or '7'; None where there is none."""
     found = re.match(r"\s*T?([0-9]{1,6})(?![0-9A-Za-z.])", name)
     return int(found.group(1)) if found else None
 
 
 def sane_rates(data: Checked, technology: int, feed: float, speed: float) -> tuple[float, float]:
-    """Feed, mm/min, nan where none is said, and speed, 1/min; ProgramError where one is of a size no machine has."""
+    """Feed, mm/min, nan where none is given, and speed, 1/min; ProgramError where no machine has such a value."""
     if not math.isnan(feed):
         data.within(technology, "feedrate in mm/min", feed, MIN_FEED, MAX_FEED)
     return feed, data.within(technology, "spindle in 1/min", speed, -MAX_SPEED, MAX_SPEED)

@@ -1,8 +1,8 @@
-"""What a STEP-NC file makes the tool do, whatever form it is in: moves of the tip with axis, feed, speed and cutter.
+"""Tool motion of a STEP-NC file of either form: moves of the tip with axis, feed, speed and cutter.
 
-The readers of both forms tell a ``MotionRecorder`` what they come upon, in order; ``moves`` gives it as plain values and
-``program`` as a program for the proof. STEP-NC says where the tool stands on the part and not how the rotary axes of a
-machine get it there: for the limits of a machine they are put where they turn least from move to move.
+The readers of both forms report paths, tools and stops to a ``MotionRecorder`` in order. ``moves`` gives the motion as
+plain values and ``program`` as a program for the proof. STEP-NC gives the tool axis on the part and not the angles of
+rotary axes; for the limits of a machine the axes take the angles that turn least from move to move.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from verify.program.move_log import MAX_MOVES
 from verify.program.program import Poses, Program, Remark, StopPoint
 from verify.program.turn_subdivision import MAX_TURN
 
-SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
-MIN_FEED, MAX_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for
+SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, between the start of a path and the end of the last one
+MIN_FEED, MAX_FEED = 1e-3, 1e7  # mm/min: F words of the supported controls have three decimals at most
 MAX_SPEED = 1e7  # 1/min
 MAX_DWELL = 1e7  # s
-HALF_TURN = math.pi - 1e-4  # rad: a move that turns the tool as far does not say which way
+HALF_TURN = math.pi - 1e-4  # rad: such a turn of the tool axis has no definite direction
 EVERY = 7  # X, Y and Z of ``Program.unknown``
 TURNED = 8
 UP = (0.0, 0.0, 1.0)
@@ -34,13 +34,13 @@ UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class CutterRecord:
-    """A tool as a file describes it; None where it does not say.
+    """A tool as a file describes it; None where the file gives no value.
 
-    number        : of the magazine place, from the id where it opens with one
-    name          : the id of the file
+    number        : T number, from the start of the id
+    name          : the id in the file
     kind          : 'ball', 'bull' or 'flat'
     diameter, corner_radius, flute_length, assembly_length : mm
-    instance      : number of the instance it is
+    instance      : number of its instance
     """
 
     number: int | None
@@ -60,9 +60,9 @@ class CutterMoves:
     start, end : (m, 3) float64, mm; start_axis, end_axis : (m, 3) float64, unit, tip to spindle
     rapid      : (m,) bool; feed : (m,) float64, mm/min, nan for rapids; speed : (m,) float64, 1/min, clockwise positive
     coolant    : (m,) bool
-    cutter     : (m,) int32, place in ``cutters``
-    line       : (m,) int32, 1-based line of the file the end stands in
-    arrival    : (m,) bool, the way there is left to the control: start is end
+    cutter     : (m,) int32, index, place in ``cutters``
+    line       : (m,) int32, index, 1-based line of the end in the file
+    arrival    : (m,) bool, the control chooses the path to this place: start equals end
     cutters    : the tools of the file
     """
 
@@ -82,7 +82,7 @@ class CutterMoves:
 
 @dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Moves of one path: tips, axes where they are not Z, what holds for all of them, and lines.
+    """Moves of one path: tips, axes where they are not Z, common values, and lines.
 
     said : rapid, feed, speed, cutter, arrival, coolant
     """
@@ -95,9 +95,9 @@ class _Chunk:
 
 
 class MotionRecorder:
-    """What was come upon so far.
+    """Record of the motion so far, in mm, in the setup frame.
 
-    name : of the file; lines : how many it has
+    name : of the file; lines : number of its lines
     coolant : whether it is on from here on
     """
 
@@ -117,7 +117,7 @@ class MotionRecorder:
         self.remarks: list[Remark] = []
 
     def take(self, cutter: CutterRecord, line: int) -> int:
-        """The place of a tool among the cutters; where it is not the one in the spindle it is changed."""
+        """Change to a tool where it is not in the spindle; returns its place among the cutters."""
         place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
         if place is None:
             place = len(self.cutters)
@@ -128,18 +128,24 @@ class MotionRecorder:
         return place
 
     def stop(self, event: str, line: int) -> None:
-        """The program stops; afterwards the tool comes from elsewhere."""
+        """Record a stop of the program; afterwards the place of the tool is unknown."""
         self._change(event, line)
 
     def over(self, point: F64, normal: F64, line: int) -> None:
-        """The next path is got to over a plane; point (3,) mm and unit normal (3,) say which, setup frame."""
+        """Approach the next path over a plane.
+
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit
+        """
         self._over = point, normal, line
 
     def follow(self, tips: F64, axes: F64 | None, *, rapid: bool, feed: float, speed: float, lines: F64) -> None:
-        """Go along a path with the tool in the spindle.
+        """Follow a path with the tool in the spindle.
 
-        tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, or None where they are Z
-        feed  : mm/min, speed : 1/min, clockwise positive; lines : (n,) float64, numbers of lines of the file
+        tips  : (n, 3) float64, mm, setup frame
+        axes  : (n, 3) float64, unit, setup frame, or None where they are Z
+        feed  : mm/min; speed : 1/min, clockwise positive
+        lines : (n,) float64, index, 1-based lines of the file
         """
         stood = np.tile(UP, (len(tips), 1)) if axes is None else axes
         there = np.hstack([tips, stood])
@@ -168,7 +174,7 @@ class MotionRecorder:
         """The moves as a program.
 
         numbers : T number of each cutter
-        machine : its rotary axes; None on one without any, where a tool that leans is remarked
+        machine : rotary axes of the machine, or None; then a tilted tool gets a remark
         """
         m, remarks, notes = self.moves(), list(self.remarks), list(self.notes)
         table = np.array([*numbers, 0], np.int32)
@@ -179,18 +185,18 @@ class MotionRecorder:
             turns = np.zeros((len(tool), 2, 2))
             if machine is None:
                 remarks.append(Remark(int(m.line[np.flatnonzero(leaning)[0]]),
-                                      "the tool leans, and the machine has no rotary axes"))
+                                      "the tool is tilted, and the machine has no rotary axes"))
             else:
                 both = np.stack([m.start_axis, m.end_axis], axis=1).reshape(-1, 3)
                 turns = least_turns(machine, both).reshape(-1, 2, 2)
-                notes.append("STEP-NC leaves it to the control where rotary axes stand; limits of the machine were "
-                             "held against the way that turns them least from move to move")
+                notes.append("STEP-NC does not give the angles of rotary axes; limits of the machine are checked for "
+                             "the angles that turn least from move to move")
             poses = Poses(m.start_axis, m.end_axis, turns[:, 0], turns[:, 1])
         standing = np.flatnonzero(~m.rapid & ~(m.speed > 0))
         if len(standing):
             k = int(standing[0])
             remarks.append(Remark(int(m.line[k]), f"a feed move while the spindle of T{tool[k]} does not turn "
-                                                  "clockwise, as right-hand cutters do"))
+                                                  "clockwise; right-hand cutters need that"))
         unknown = [(int(k), EVERY + (TURNED if leaning[k] else 0)) for k in np.flatnonzero(m.arrival)]
         length = np.linalg.norm(m.end - m.start, axis=1)
         minutes = np.where(m.rapid, np.nan, length / np.where(m.rapid, 1.0, m.feed))
@@ -214,7 +220,7 @@ class MotionRecorder:
         return [(self._line, "end of the program", self._tool, self._here)]
 
     def _change(self, event: str, line: int) -> None:
-        """The tool is put away: over the plane, where one was said, or from where it stands."""
+        """Remove the tool: over the plane where one is given, or from its present place."""
         if self._over is not None and self._here is not None:
             self._lift(self._over)
         if self._here is not None and self._tool is not None:
@@ -222,7 +228,7 @@ class MotionRecorder:
         self._here = None
 
     def _lift(self, over: tuple[F64, F64, int]) -> None:
-        """Up to the plane."""
+        """Retract to the plane."""
         point, normal, line = over
         here = self._here
         if here is None or (rise := float((point - here[:3]) @ normal)) <= 0.0:
@@ -237,7 +243,7 @@ class MotionRecorder:
         self._add(here[None], there[None], row, np.array([float(line)]), arrival)
 
     def _arrive(self, there: F64, speed: float, line: float) -> None:
-        """Come to the first place of a path from wherever the tool is."""
+        """Approach the start of a path from the present place of the tool."""
         over, here = self._over, self._here
         if here is not None and np.abs(there[:3] - here[:3]).max() <= SAME_PLACE \
                 and np.abs(there[3:] - here[3:]).max() <= SAME_AXIS:
@@ -257,13 +263,13 @@ class MotionRecorder:
         self._over = None
 
     def _add(self, start: F64, end: F64, row: tuple[bool, float, float, float], lines: F64, arrival: bool) -> None:
-        """Write moves (n, 6); one that turns the tool far is cut into pieces."""
+        """Write moves (n, 6); large turns are split into pieces."""
         angle = np.arccos(np.clip((start[:, 3:] * end[:, 3:]).sum(axis=1), -1.0, 1.0))
         if (over := np.flatnonzero(angle > HALF_TURN)).size:
             at = int(lines[over[0]])
-            raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn, which says "
-                               "no way round", subjects=(f"line {at}",),
-                               remedy="give the path points with axes between")
+            raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn; its direction is "
+                               "not defined", subjects=(f"line {at}",),
+                               remedy="add points with axes between to the path")
         pieces = np.maximum(np.ceil(angle / MAX_TURN), 1.0).astype(np.int64)
         if (pieces > 1).any():
             which = np.repeat(np.arange(len(start)), pieces)
@@ -272,7 +278,7 @@ class MotionRecorder:
             lines = lines[which]
         self._count += len(start)
         if self._count > MAX_MOVES:
-            raise VerificationError(f"{self.name} makes too many moves, {MAX_MOVES} are allowed",
+            raise VerificationError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)",
                                     code="program_too_long", measured=self._count, limit=MAX_MOVES,
                                     remedy="split the job")
         upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
@@ -293,7 +299,7 @@ def _three(values: F64) -> tuple[float, float, float]:
 
 
 def least_turns(machine: Kinematics, axes: F64) -> F64:
-    """Where the rotary axes stand along a way, turning least from place to place, from 0.
+    """Angles of the rotary axes along a path that turn least from place to place, from 0 on.
 
     axes : (n, 3) float64, unit, tip to spindle, setup frame
 

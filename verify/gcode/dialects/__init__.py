@@ -18,7 +18,8 @@ from verify.gcode.dialects.siemens import SiemensReader, is_siemens
 from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
-CONTROLS: dict[str, type[DialectReader]] = {"fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
+CONTROLS: dict[str, type[DialectReader]] = {
+    "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """Readers by dialect; ``LINUXCNC`` needs none."""
 
 DIALECTS = (LINUXCNC, *CONTROLS)

@@ -82,8 +82,8 @@ class HeidenhainReader(DialectReader):
             self.bound(float(m[1] or 0.0) != 0.0)
             if not self.unbounded:
                 return [f"G64 P{float(m[1]):.6f}"]
-            self.notes.append("cycle 32 is off: machine parameters decide how far the control rounds corners; the error "
-                              "bound does not include it")
+            self.notes.append("cycle 32 is off: machine parameters decide how far the control rounds corners; the "
+                              "error bound does not include it")
             return []
         if m := re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA({NUMBER}))?", text):
             if m[1] and float(m[1]) > SMALL:
