@@ -63,8 +63,8 @@ def one_ring():
 
 @both
 @pytest.mark.parametrize(("what", "instead", "message"), [
-    (r"(CIRCLE\('',#\d+),[0-9.]+", r"\1,4.9", "a point of the circle expected"),
-    (r"(TRIMMED_CURVE\('',#\d+),\(#\d+\)", r"\1,(PARAMETER_VALUE(0.))", "parameters alone are not read"),
+    (r"(CIRCLE\('',#\d+),[0-9.]+", r"\1,4.9", "a point on the circle expected"),
+    (r"(TRIMMED_CURVE\('',#\d+),\(#\d+\)", r"\1,(PARAMETER_VALUE(0.))", "parameters are not read"),
     (r"(TRIMMED_CURVE\(.*),\.CARTESIAN\.", r"\1,.PARAMETER.", "master_representation"),
     (r"(TRIMMED_CURVE\('',)#\d+", r"\g<1>#1", "basis_curve"),
 ])
@@ -79,7 +79,7 @@ def test_an_arc_that_is_none_is_refused_by_its_number(write, what, instead, mess
 def test_a_gap_between_segments_is_refused():
     text = write_stepnc_aim(one_ring())
     first, second = re.findall(r"#\d+=COMPOSITE_CURVE_SEGMENT\(\.CONTINUOUS\.,\.T\.,(#\d+)\);", text)[:2]
-    with pytest.raises(ProgramError, match="from the end of the one before"):
+    with pytest.raises(ProgramError, match="from the end of the segment before"):
         read_stepnc(text.replace(f".T.,{second})", f".T.,{first})"))
 
 

@@ -134,14 +134,14 @@ def test_a_shift_of_zero_is_known_to_the_bit():
 def test_notes_reach_the_proof():
     p = read("X[10]\nG52 X2\nG92.1\n")
     assert list(notes_on(p, -100.0, ProofSetup())) == [
-        "program, parameters, expressions and O-words were read as LinuxCNC reads them; other controls differ",
+        "program, parameters, expressions and O-words are read as in LinuxCNC; other controls differ",
         "program, line 9: G52 moves program zero to X2.0000 mm"]
 
 
 def test_offset_table_of_the_setup():
     p = read("X10\nG10 L20 P1 X3\nX3\nG92 X1\nG10 L20 P0 X5\nX6\nG92.1\n")
     np.testing.assert_allclose(p.end[1:, 0], [10, 10, 11])
-    assert [(r.line, "run again" in r.message) for r in p.remarks] == [(9, True), (12, True)]
+    assert [(r.line, "next run" in r.message) for r in p.remarks] == [(9, True), (12, True)]
 
 
 def test_cycles_in_other_planes_and_series():
@@ -163,7 +163,7 @@ def test_a_series_under_a_shifted_zero_keeps_its_number():
 
 def test_a_way_back_that_is_not_stated_is_told():
     assert read("G81 X1 Z-3 R1\nG80\n").notes == (
-        "drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they began)",)
+        "neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)",)
     assert read("G98 G81 X1 Z-3 R1\nG80\n").notes == () == read("G81 X1 Z-3 R10\nG80\n").notes
 
 

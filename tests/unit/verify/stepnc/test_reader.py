@@ -252,8 +252,8 @@ def test_a_tool_is_known_by_its_number_or_its_size():
     text_ = write_stepnc_arm(tiny())
     nameless = text_.replace("MILLING_CUTTING_TOOL('T1: ball", "MILLING_CUTTING_TOOL('BALL_3MM: ball")
     read = read_stepnc(nameless, tools=[BALL, OTHER])
-    assert set(read.tool.tolist()) == {1} and any("by its size" in n for n in read.notes)
-    with pytest.raises(ProgramError, match="none of the setup's"):
+    assert set(read.tool.tolist()) == {1} and any("its size matches" in n for n in read.notes)
+    with pytest.raises(ProgramError, match="matches no tool of the setup"):
         read_stepnc(nameless, tools=[OTHER])
     other = read_stepnc(text_, tools=[replace(BALL, diameter=4.0, corner_radius=2.0)])
     assert any("diameter 3 mm in the file and 4 mm" in r.message for r in other.remarks)
