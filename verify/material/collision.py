@@ -104,7 +104,7 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
     free   : (m,) bool, rapids that need no clearance; found from the moves where None
     bow    : mm, error allowed where the tool turns
 
-    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost for want of room.
+    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost because a table is full.
     """
     if len(points) == 0 or len(moves) == 0:
         return np.zeros((0, 7)), 0

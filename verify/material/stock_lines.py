@@ -150,7 +150,7 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
     points : (n, 3) float64, mm, setup frame
 
-    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost for want of room.
+    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost because a table is full.
     """
     if len(points) == 0 or len(moves) == 0:
         return np.zeros((0, 7)), 0

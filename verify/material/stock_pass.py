@@ -79,7 +79,7 @@ class StockPass:
     """Result of one pass over the stock.
 
     events : (e, 7) float64, mm, rows (move, code, depth, clearance, x, y, z) sorted by move
-    lost   : number of events lost for want of room
+    lost   : number of events lost because a table is full
     cut    : (m,) bool, moves that removed stock
     engaged : (p,) int64, bits, sectors of the cutter in stock (``verify.kernels.engaged``), by parts of moves
     taken  : (m,) float64, mm³ by move, or None where unknown

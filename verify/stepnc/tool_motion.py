@@ -84,13 +84,13 @@ class CutterMoves:
 class _Chunk:
     """Moves of one path: tips, axes where they are not Z, common values, and lines.
 
-    said : rapid, feed, speed, cutter, arrival, coolant
+    shared : rapid, feed, speed, cutter, arrival, coolant
     """
 
     start: F64
     end: F64
     axes: tuple[F64, F64] | None
-    said: tuple[float, ...]
+    shared: tuple[float, ...]
     line: I32
 
 
@@ -165,10 +165,10 @@ class MotionRecorder:
         if any(c.axes is not None for c in chunks):
             first, last = (np.concatenate([np.tile(UP, (len(c.start), 1)) if c.axes is None else c.axes[k]
                                            for c in chunks]) for k in (0, 1))
-        said = np.repeat(np.array([c.said for c in chunks]).reshape(-1, 6), count, axis=0)
+        shared = np.repeat(np.array([c.shared for c in chunks]).reshape(-1, 6), count, axis=0)
         line = np.concatenate([np.zeros(0, np.int32), *(c.line for c in chunks)])
-        return CutterMoves(start, end, first, last, said[:, 0] > 0, said[:, 1].copy(), said[:, 2].copy(),
-                           said[:, 5] > 0, said[:, 3].astype(np.int32), line, said[:, 4] > 0, tuple(self.cutters))
+        return CutterMoves(start, end, first, last, shared[:, 0] > 0, shared[:, 1].copy(), shared[:, 2].copy(),
+                           shared[:, 5] > 0, shared[:, 3].astype(np.int32), line, shared[:, 4] > 0, tuple(self.cutters))
 
     def program(self, numbers: Sequence[int], machine: Kinematics | None) -> Program:
         """The moves as a program.
@@ -283,8 +283,8 @@ class MotionRecorder:
                                     remedy="split the job")
         upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
         axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
-        said = (*(float(v) for v in row), float(arrival), float(self.coolant))
-        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, said, lines.astype(np.int32)))
+        shared = (*(float(v) for v in row), float(arrival), float(self.coolant))
+        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, shared, lines.astype(np.int32)))
 
 
 def _between(start: F64, end: F64, share: F64) -> F64:
