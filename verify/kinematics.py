@@ -5,12 +5,12 @@ both rotary axes stand at zero; the joints are the linear axes, zeroed so that t
 frame with the length offset on. With Rx, Ry, Rz the right-handed turns about the axes, A, B, C the angles as
 programmed, T the tilt (Rx(A) or Ry(B)):
 
-- a table carries the part: a point p of it stands at q1 + T (q2 + Rz(C) (p - q2) - q1) in the machine, where q1 lies
-  on the tilting axis and q2 on the turning one (table-table), or at q2 + Rz(C) (p - q2) (head-table);
-- a head carries the tool: its axis is h = T e_z (head-table) or h = Rz(C) T e_z (head-head), and its tip swings round
-  the swivel, a distance L = swivel to spindle face + gauge length up the tool: it is at j + L (e_z - h).
+- A table carries the part. A point p of the part is at q1 + T (q2 + Rz(C) (p - q2) - q1) in the machine
+  (table-table), or at q2 + Rz(C) (p - q2) (head-table). q1 lies on the tilting axis, q2 on the turning axis.
+- A head carries the tool. Its axis is h = T e_z (head-table) or h = Rz(C) T e_z (head-head). Its tip swings round the
+  swivel at the distance L = swivel to spindle face + gauge length: it is at j + L (e_z - h).
 
-``tip`` and ``axis`` come from putting the tip of the tool where the part is; ``joints`` is the same read backwards.
+``tip`` and ``axis`` follow from the tip of the tool at the point of the part; ``joints`` is the inverse.
 The sense of the angles is that of LinuxCNC's xyzac-trt and xyzbc-trt: with A30 C90 the point (10, 0, 5) of the part
 stands at (0, 6.160, 9.330). Names and positive directions of the axes are those of [ISO841].
 """

@@ -102,8 +102,8 @@ def parse_block(text: str, rotary: str = "") -> Block:
     Raises
     ------
     BlockError
-        Text that is not a word, an open comment, a character outside ASCII, an unknown word, a repeated letter, two
-        words of one modal group, a fraction at an address of whole numbers, a number above 1e15.
+        Text that is not a word, an unknown word, an open comment, or a character outside ASCII. A repeated letter, or
+        two words of one modal group. A fraction at an address of whole numbers, or a number above 1e15.
 
     Notes
     -----

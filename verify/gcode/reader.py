@@ -201,10 +201,10 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     Raises
     ------
     ProgramError
-        With every line that cannot be read: unknown words, two words of one modal group, a feed move without a
-        feed, an arc without a centre or whose ends lie on two circles, a tool that is not in the table, an
-        incomplete program, a move of the joints off rotary zero where no pivots are known. Without a line:
-        ``spindle_tool`` is not in the table.
+        Lines that cannot be read; the subjects name them. Reasons are unknown words, two words of one modal group, a
+        feed move without a feed, and an arc without a centre or with ends on two circles. Further reasons are a tool
+        that is not in the table, an incomplete program, and a move of the joints off rotary zero without known
+        pivots. Without a line: ``spindle_tool`` is not in the table.
     VerificationError
         Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000;
         unknown_dialect.

@@ -64,8 +64,8 @@ def ways_before(moves: Moves) -> F64:
 def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
     """(m + 1,) int64, index: first of the even parts of each move that engaged angles refer to; last, their number.
 
-    Feed moves of a tool that does not turn have parts of half a radius at most, so that contacts at one end of a long
-    move do not add to those at the other end. All other moves have one part.
+    Feed moves of a tool that does not turn have parts of half a radius at most. Contacts at one end of a long move then
+    do not add to those at the other end. All other moves have one part.
     """
     part_length = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     length = np.linalg.norm(moves.end - moves.start, axis=1)

@@ -1,8 +1,8 @@
 """Support of thin walls: both sides are cut down in turn, and stock stands beside them not far below.
 
 Notation: p and q are opposite places of a thin wall (``verify.surface.slender_walls``), K is the allowed ratio of free
-height to thickness. ``done(p)`` is the time at which no more than twice the scallop is left at p over the allowance,
-``gone(p)`` the time at which the stock in front of p no longer supports the wall. **The rule**: when both p and q are
+height to thickness. ``done(p)`` is the time at which at most twice the scallop is left at p over the allowance.
+``gone(p)`` is the time at which the stock in front of p stops supporting the wall. **The rule**: when both p and q are
 done, stock still stands on both sides at a place of the same wall within the limit of p, K times the mean thickness
 below p; or the finished part supports the wall within that limit.
 """

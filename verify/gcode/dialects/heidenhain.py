@@ -1,10 +1,10 @@
 """Heidenhain, conversational: a keyword opens each block, FMAX makes a rapid for one block, F is modal.
 
-The reader knows BEGIN and END PGM, BLK FORM, TOOL CALL and TOOL DEF, L, CC with C or with CP and IPA, CR, M words, LBL,
-STOP and the cycles 247 (preset) and 32 (tolerance). It knows PLANE SPATIAL with STAY while M128 is on: X, Y, Z count in
-the setup frame turned about its X, then Y, then Z, the tip stays, and no axis moves. It reads M126 and M127 where they
-make no difference. It refuses by name planes that move axes, radius compensation, other incremental words (IX), other
-arcs, Q parameters, calls and shifts. F of an INCH program counts tenths of an inch.
+The reader knows BEGIN and END PGM, BLK FORM, TOOL CALL, TOOL DEF, M words, LBL and STOP. Of motion it knows L, CC with
+C or with CP and IPA, and CR, and the cycles 247 (preset) and 32 (tolerance). It knows PLANE SPATIAL with STAY while
+M128 is on: X, Y, Z count in the setup frame turned about its X, then Y, then Z, the tip stays, and no axis moves. It
+reads M126 and M127 where they make no difference. It refuses by name planes that move axes, radius compensation, other
+incremental words (IX), other arcs, Q parameters, calls and shifts. F of an INCH program counts tenths of an inch.
 """
 
 from __future__ import annotations
